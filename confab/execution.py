@@ -15,7 +15,7 @@ from confab.interchange import step_json
 from confab.planner.acting.episode import Change, End, Episode, Intervention
 from confab.planner.acting.executive import Moment, Patience, act
 from confab.planner.acting.failure_memory import Caution
-from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, Step, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode
@@ -23,7 +23,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import nearest, right_names
-from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
@@ -41,7 +41,8 @@ WORLDS = ("symbolic", "pybullet")
 
 FORMS = (
     "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "
-    "'after=28 add Cup cup9 FACT', with after=ID, after=PATH (0.1.2) or at=SECONDS"
+    "'after=28 add Cup cup9 FACT', 'after=28 knock cup2', 'after=28 push cup2 6 -3' (cm), 'after=28 box location7 [6x6x12]' (cm), "
+    "with after=ID, after=PATH (0.1.2) or at=SECONDS"
 )
 
 
@@ -97,10 +98,14 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         return Intervention(Change.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
     if verb == "drop-goal":
         return Intervention(Change.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
-    if verb == "remove":
+    if verb in ("remove", "knock"):
         if len(words) != 1:
-            raise KnowledgeError(f"'{text}': wanted 'remove OBJECT', one object; got {len(words)}")
-        return Intervention(Change.REMOVE, individual=_known(problem, words[0], text), **when)
+            raise KnowledgeError(f"'{text}': wanted '{verb} OBJECT', one object; got {len(words)}")
+        return Intervention(Change(verb), individual=_placed(problem, words[0], text, verb), **when)
+    if verb == "push":
+        return _push(problem, words, text, when)
+    if verb == "box":
+        return _box(problem, words, text, when)
     if verb == "add":
         return _add(problem, words, text, when)
     fact = Fact(*parse_fact(problem, match[3]))
@@ -139,6 +144,48 @@ def _known(problem: Problem, individual: str, text: str) -> str:
     if individual not in individuals:
         raise KnowledgeError(f"'{text}': no object '{individual}'{nearest(individual, individuals)}")
     return individual
+
+
+def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
+    """Return an object that can be knocked over or pushed: one whose place is perceived."""
+    _known(problem, individual, text)
+    if verb != "remove" and not any(symbol in problem.initial for symbol in place_symbols(problem, individual)):
+        raise KnowledgeError(f"'{text}': {individual} is no object that stands at a place which physics perceives")
+    return individual
+
+
+def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
+    """Read ``OBJECT X Y``, centimetres away from the robot and to its left."""
+    try:
+        individual, *by = words
+        numbers = tuple(float(number) / 100 for number in by)
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 2 or not all(map(math.isfinite, numbers)) or not any(numbers):
+        raise KnowledgeError(f"'{text}': wanted 'push OBJECT X Y', centimetres away from the robot and to its left")
+    return Intervention(Change.PUSH, individual=_placed(problem, individual, text, "push"), numbers=numbers, **when)
+
+
+def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
+    """Read ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres: a box of which no fact speaks."""
+    place, size = (*words, "6x6x12")[:2] if words else ("", "")
+    try:
+        numbers = tuple(float(number) / 100 for number in size.split("x"))
+    except ValueError:
+        numbers = ()
+    if len(words) not in (1, 2) or len(numbers) != 3 or not all(0.01 <= number <= 1 for number in numbers):
+        raise KnowledgeError(f"'{text}': wanted 'box PLACE', or 'box PLACE 6x6x12' with centimetres from 1 to 100")
+    situations = [s for s in problem.domain.situations.values() if s.perceived is not None and s.perceived.by == PLACE]
+    wheres = [s for s in situations if len(s.arguments) == 1 and place in problem.members(s.range)]
+    if not wheres:
+        known = [one for s in situations for one in problem.members(s.range)]
+        raise KnowledgeError(f"'{text}': no place '{place}' at which physics perceives objects{nearest(place, known)}")
+    name, number = "box1", 1
+    while name in problem.individuals:
+        number += 1
+        name = f"box{number}"
+    fact = Fact(Symbol(wheres[0].name, (name,)), place)
+    return Intervention(Change.BOX, (fact,), individual=name, kind=wheres[0].arguments[0], numbers=numbers, **when)
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
@@ -211,6 +258,10 @@ def episode_json(episode: Episode) -> dict[str, Any]:
                 "message": failure.message,
             }
             for failure in episode.failures
+        ],
+        "discovered": [
+            {"individual": found.individual, "classes": list(found.kinds), "text": found.text, "seconds": round(at, 4)}
+            for found, at in episode.discovered
         ],
         "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
         "initial": [_situated(symbol, value, 0.0) for symbol, value in sorted(episode.initial.items())],
@@ -468,13 +519,23 @@ def execute(
     with possible(), Physics(scene.embodiment, problem.initial, seed, varied) as physics:
         if prepare is not None:
             prepare(physics)
-        live = LiveWorld(physics, problem.classes, problem)
+        live = LiveWorld(physics, problem.classes, problem, _reach_of(scene))
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
         if both_hands:
             return Execution(scene, _with_both_hands(problem, live, plan, planner, patience, tell, caution))
         return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell, True, caution))
+
+
+def _reach_of(scene: Known) -> str:
+    """Return the name of the scene's relation of reach facts; an empty string if it has none."""
+    from confab.reasoner.embodiment.reach import reach_relation
+
+    try:
+        return scene.names.short(reach_relation(scene.knowledge))
+    except KnowledgeError:
+        return ""
 
 
 def _with_both_hands(

@@ -35,6 +35,8 @@ class View:
             self.known |= {s.symbol: s.observed for s in moment.surprises if s.observed is not None}
         if moment.what == "intervention":
             self.log.append(f"✋ {moment.text}")
+        elif moment.what == "discovery":
+            self.log.append(f"👁 {moment.text}")
         elif moment.what in ("repair", "replan"):
             self.log.append(f"↻ {moment.what}: {moment.text}")
         elif moment.what == "over":

@@ -24,6 +24,13 @@ class Refutation:
     facts: tuple[Fact, ...]
     why: str = ""
 
+    @property
+    def individuals(self) -> frozenset[str]:
+        """The individuals that it names."""
+        return frozenset(
+            {*self.arguments, *(part for fact in self.facts for part in (*fact.symbol.arguments, fact.value))}
+        )
+
     def covers(self, other: Refutation) -> bool:
         """Return whether this refutation implies another one."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}

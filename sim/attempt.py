@@ -36,6 +36,9 @@ from confab.sim.verdict import REFUTED, SkillError, named
 CLOSE = 0.002
 """Margin in metres on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
 
+TOPPLED = 0.5
+"""Tilt in radians from which on a body counts as toppled."""
+
 NOWHERE = 100.0
 """Distance in metres from which on a pose stands for one that the hand cannot take at all."""
 
@@ -65,13 +68,13 @@ BATCH, ENOUGH = 24, 6
 class Attempt:
     """One execution of a skill: the world, the hand, the body it holds, and the bodies and stray beads before the skill.
 
-    `before` has for each body its carrier, such as a drawer, and its position in the carrier's frame.
+    `before` has for each body its carrier, such as a drawer, its position in the carrier's frame, and its tilt.
     """
 
     world: Engine
     hand: Manipulator
     held: str | None
-    before: Mapping[str, tuple[str, Array]]
+    before: Mapping[str, tuple[str, Array, float]]
     stray: int
 
     @classmethod
@@ -80,7 +83,7 @@ class Attempt:
         before = {}
         for name in world.bodies:
             carrier = world.carried_by(name)
-            before[name] = carrier, _position_in(world, carrier, name)
+            before[name] = carrier, _position_in(world, carrier, name), tilt_of(world.truth(name)[0])
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
@@ -302,12 +305,12 @@ class Attempt:
 
     def check_others(self, numbers: Numbers, *moved: str) -> None:
         """Raise `SkillError` if a body other than the `moved` and the held one was shifted or toppled."""
-        for name, (carrier, position) in self.before.items():
+        for name, (carrier, position, tilt) in self.before.items():
             if name in (*moved, self.held, *self.world.moved_by_others) or name not in self.world.bodies:
                 continue
             rotation = self.world.truth(name)[0]
             shift = float(np.linalg.norm(_position_in(self.world, carrier, name) - position))
-            if tilt_of(rotation) > 0.5:
+            if tilt_of(rotation) > TOPPLED > tilt:
                 raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
             if shift > numbers["disturbance"]:
                 most = f"at most {numbers['disturbance'] * 1000:.0f} mm are let pass"

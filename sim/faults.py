@@ -155,6 +155,8 @@ def knocked(world: Engine, body: str, step: int, seconds: float, speed: float = 
 
     def hit(world: Engine) -> None:
         thing = world.bodies[body]
+        awake = {"activationState": pybullet.ACTIVATION_STATE_WAKE_UP, "physicsClientId": world.client}
+        pybullet.changeDynamics(thing.body, -1, **awake)
         pybullet.resetBaseVelocity(thing.body, [0, speed / 3, 0.2], [-12 * speed, 0, 0], physicsClientId=world.client)
 
     later(world, step, seconds, hit)

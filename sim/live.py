@@ -3,30 +3,30 @@
 Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents.
 Rule 2: an intervention that changes an object of the running primitive stops the primitive.
 Rule 3: a hand at a position without a fact, or an empty tilted hand, is brought upright and lifted before facts are observed.
+Rule 4: what stands somewhere else than at a place of the scene gets a spot of its own (`confab.sim.lookout`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 
+from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Change, Intervention
 from confab.planner.acting.symbolic_world import disturbed, with_individual
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
-from confab.reasoner.embodiment.values import Body, PerceiverUse
+from confab.reasoner.embodiment.values import Body
 from confab.reasoner.possible import refuse_impossible
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
-from confab.sim.bodies import KINDS, center_height
+from confab.reasoner.symbols import Fact, Problem, State
+from confab.sim.bodies import KINDS
 from confab.sim.engine import Engine, Thing
-from confab.sim.linkage import wide
+from confab.sim.interventions import DISTURBERS, HANDLED, move, put_box
+from confab.sim.lookout import Lookout
 from confab.sim.perception import tilt_of
 from confab.sim.skills import perform
-from confab.sim.staging import pour_in
-from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import World
 
@@ -49,14 +49,20 @@ class LiveWorld:
     classes : mapping of class to individuals
         An object that an intervention adds gets the shape of an object of its class.
     problem : Problem, optional
-        What an intervention would lead to is checked against it.
+        What an intervention would lead to is checked against it; without it nothing is discovered.
+    reaching : str
+        The relation of reach facts, for spots that are discovered.
     """
 
-    def __init__(self, world: World, classes: Mapping[str, Sequence[str]], problem: Problem | None = None) -> None:
-        self.world, self.classes, self.problem = world, classes, problem
+    def __init__(
+        self, world: World, classes: Mapping[str, Sequence[str]], problem: Problem | None = None, reaching: str = ""
+    ) -> None:
+        self.world, self.classes = world, classes
+        self.lookout = None if problem is None else Lookout(world, problem, reaching)
         self.waiting: list[Intervention] = []
         self.stopping = False
         self.concerned: set[str] = set()
+        self.planted = world.disturb  # faults that were planted before
         world.disturb = self._each_step
 
     @property
@@ -75,7 +81,23 @@ class LiveWorld:
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
         for hand in sorted(lost):
             self.retreat(hand)
-        return self.world.observe() if lost else seen
+        news = self.lookout is not None and self.lookout.look()
+        return self.world.observe() if lost or news else seen
+
+    def discoveries(self) -> tuple[Discovery, ...]:
+        """Return the things and spots discovered since the last call."""
+        if self.lookout is None:
+            return ()
+        news, self.lookout.news = tuple(self.lookout.news), []
+        return news
+
+    def free_spots(self) -> Sequence[Discovery]:
+        """Return spots on the furniture at which something can be put down."""
+        return () if self.lookout is None else self.lookout.free_spots()
+
+    def why_unplaced(self, individual: str) -> str:
+        """Return why an object has no perceived place."""
+        return "" if self.lookout is None else self.lookout.why_unplaced(individual)
 
     def execute(self, step: Step) -> Verdict:
         """Execute a primitive; stop it when an intervention changes one of its objects."""
@@ -114,7 +136,8 @@ class LiveWorld:
         """Return why an intervention is impossible in this world at any time, or None if it is possible."""
         if intervention.change is Change.ADD and self._model_of(intervention.kind) is None:
             return f"no {intervention.kind} of this scene has a shape for {intervention.individual}"
-        if intervention.change is Change.REMOVE and intervention.individual not in self.world.bodies:
+        handled = (Change.REMOVE, Change.KNOCK, Change.PUSH)
+        if intervention.change in handled and intervention.individual not in self.world.bodies:
             return f"{intervention.individual} is no body of this world (bodies: {', '.join(self.world.bodies)})"
         if not intervention.of_world:
             return None
@@ -156,6 +179,8 @@ class LiveWorld:
     # ------------------------------------------------------------------------------------------------- interventions
 
     def _each_step(self, world: Engine) -> None:
+        if self.planted is not None:
+            self.planted(world)
         if self.stopping:
             self.stopping = False
             raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "it was stopped")
@@ -170,17 +195,23 @@ class LiveWorld:
             raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "an intervention changed an object of it")
 
     def _interfere(self, intervention: Intervention) -> None:
-        if self.problem is not None:
-            if intervention.change is Change.ADD:
-                self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
+        name, change = intervention.individual, intervention.change
+        if self.lookout is not None:
+            if change is Change.ADD:
+                self.lookout.problem = with_individual(self.lookout.problem, name, intervention.kind)
+            problem = self.lookout.problem
+            if change is Change.BOX:
+                problem = with_individual(problem, name, intervention.kind)
             now = self.world.observe()
             refuse_impossible(
-                self.problem, now, disturbed(self.problem, now, intervention), f"'{intervention.text}' can't happen"
+                problem, now, disturbed(problem, now, intervention), f"'{intervention.text}' can't happen"
             )
-        if intervention.change is Change.REMOVE:
-            take_away(self.world, intervention.individual)
-        elif intervention.change is Change.ADD:
+        if change is Change.ADD:
             self._add(intervention)
+        elif change is Change.BOX:
+            put_box(self.world, name, intervention.facts[0].value, intervention.numbers)
+        elif name:
+            HANDLED[change](self.world, name, intervention.numbers)
         else:
             for fact in intervention.facts:
                 if fact.symbol.arguments[0] in (*self.world.bodies, *self.world.links):  # else it has been removed
@@ -214,74 +245,3 @@ def _named(intervention: Intervention) -> set[str]:
     """Return the individuals that an intervention names: the changed ones and their new values."""
     named = {intervention.individual, *(fact.symbol.arguments[0] for fact in intervention.facts)}
     return named | {fact.value for fact in intervention.facts}
-
-
-def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Put an object with its contents at a place; a hand that holds it opens."""
-    name = symbol.arguments[0]
-    for hand in world.hands:
-        if world.held(hand) == name:
-            world.hands[hand].open()
-    beads = world.inside(name)
-    rotation, base = world.truth(name)
-    inside = [(point - base) @ rotation for point in world.positions_of(beads)]
-    place = world.place(value)
-    thing = world.bodies[name]
-    _set(world, thing.body, np.array([*place[:2], place[2] + center_height(thing.shape)]))
-    for bead, local in zip(beads, inside, strict=True):
-        _set(world, bead.body, place + local)
-
-
-def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Empty a vessel, and fill it with the value unless that is `empty`."""
-    for bead in world.inside(symbol.arguments[0]):
-        pybullet.removeBody(bead.body, physicsClientId=world.client)
-        world.beads.remove(bead)
-    if value != use.values.get("empty"):
-        pour_in(world, symbol.arguments[0], value, world.perturb)
-
-
-def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Open or shut a link with the bodies that it carries; a hand that holds the link opens."""
-    name = symbol.arguments[0]
-    mechanic = world.links[name]
-    for hand in world.hands.values():
-        if min(hand.pressing(mechanic.body, mechanic.joints[name])) > 0:
-            hand.open()
-    opened = value == use.values.get("opened", "true")
-    goal = {name: wide(mechanic.link(name)) if opened else 0.0}
-    frame, origin = mechanic.frame(name)
-    along = {body: frame.T @ (world.truth(body)[1] - origin) for body in world.bodies if world.carried_by(body) == name}
-    mechanic.set(name, opened)
-    frame, origin = mechanic.frame(name, {**mechanic.values(), **goal})
-    for body, local in along.items():
-        thing, base = world.bodies[body], origin + frame @ local
-        _set(world, thing.body, base + np.array([0.0, 0.0, center_height(thing.shape)]))
-
-
-def take_away(world: World, name: str) -> None:
-    """Remove an object and its contents from the world, if it is still there."""
-    if name not in world.bodies:
-        return
-    for bead in world.inside(name):
-        pybullet.removeBody(bead.body, physicsClientId=world.client)
-        world.beads.remove(bead)
-    for hand in world.hands:
-        if world.held(hand) == name:
-            world.hands[hand].open()
-    thing = world.bodies.pop(name)
-    del world.names[thing.body]
-    pybullet.removeBody(thing.body, physicsClientId=world.client)
-
-
-def _set(world: World, body: int, position: Array) -> None:
-    pybullet.resetBasePositionAndOrientation(body, position.tolist(), [0, 0, 0, 1], physicsClientId=world.client)
-    pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], physicsClientId=world.client)
-
-
-DISTURBERS: Mapping[str, Callable[[World, PerceiverUse, Symbol, str], None]] = {
-    "perceive_place": move,
-    "perceive_content": fill,
-    "perceive_joint": push_joint,
-}
-"""By perceiver: the function that makes a value of its situation types true."""

@@ -298,7 +298,8 @@ def execute(
     if execution.episode.refuted:
         from confab.refuting import keep
 
-        keep(loaded, execution.episode.refuted)
+        met = {found.individual for found, _ in execution.episode.discovered}  # of which no other episode knows
+        keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
         with undisturbed(memory):  # others may have learned meanwhile
             newest = Memory.load(memory, loaded)

@@ -57,8 +57,8 @@ class Following:
                     periods = self._periods.setdefault(symbol, [])
                     if not periods or periods[-1][1] != value:
                         periods.append((moment.seconds, value))
-            elif moment.what in ("intervention", "repair", "replan"):
-                text = moment.text if moment.what == "intervention" else f"{moment.what}: {moment.text}"
+            elif moment.what in ("intervention", "discovery", "repair", "replan"):
+                text = moment.text if moment.what in ("intervention", "discovery") else f"{moment.what}: {moment.text}"
                 self._marks.append((moment.seconds, text))
 
     def data(self) -> PageData:

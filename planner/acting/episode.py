@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact, State, Symbol
@@ -17,6 +18,9 @@ class Change(Enum):
     WORLD = "world"  # an object gets another value: moved, emptied, filled
     REMOVE = "remove"  # an object is taken away
     ADD = "add"  # an object appears
+    KNOCK = "knock"  # an object is knocked over
+    PUSH = "push"  # an object is pushed off its place
+    BOX = "box"  # a box of which no fact speaks is put at a place
     GOAL = "goal"  # a goal is added, or replaces that of its symbol
     DROP_GOAL = "drop-goal"
 
@@ -36,7 +40,9 @@ class Intervention:
     symbol : Symbol, optional
         Whose goal is dropped.
     individual, kind : str
-        What is added or taken away; of which class it is.
+        What is added, taken away, pushed, knocked over; of which class it is.
+    numbers : tuple of float
+        Metres: by which an object is pushed along x and y; width, depth and height of a box.
     after : int or tuple of int, optional
     at : float, optional
     text : str
@@ -48,6 +54,7 @@ class Intervention:
     symbol: Symbol | None = None
     individual: str = ""
     kind: str = ""
+    numbers: tuple[float, ...] = ()
     after: int | tuple[int, ...] | None = None
     at: float | None = None
     text: str = ""
@@ -55,7 +62,7 @@ class Intervention:
     @property
     def of_world(self) -> bool:
         """Whether it changes the world, and not what is wanted of it."""
-        return self.change in (Change.WORLD, Change.REMOVE, Change.ADD)
+        return self.change not in (Change.GOAL, Change.DROP_GOAL)
 
 
 class End(Enum):
@@ -166,6 +173,8 @@ class Episode:
         How the situation changed from `initial` to `observed`, in the order of time.
     refuted : tuple of Refutation
         What planners of motions found to be impossible as things stood, and what was then done otherwise.
+    discovered : tuple of (Discovery, float)
+        What the world came across that the scene doesn't have, and when.
     """
 
     scene: str
@@ -184,3 +193,4 @@ class Episode:
     missed: tuple[Intervention, ...] = ()
     course: tuple[Seen, ...] = ()
     refuted: tuple[Refutation, ...] = ()
+    discovered: tuple[tuple[Discovery, float], ...] = ()

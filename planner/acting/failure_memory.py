@@ -17,7 +17,7 @@ from typing import TypeAlias
 from confab.planner.acting.episode import Episode
 from confab.planner.plan import Limits, Plan, Planner, Status, Step
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, Problem, ValueEffect
+from confab.reasoner.symbols import Fact, Problem, RelationCondition, ValueEffect
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
@@ -132,3 +132,20 @@ def _alike(one: ValueEffect, other: ValueEffect) -> bool:
 def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
     """Return the step of a plan at a path, behind all that is above it."""
     return tuple(step for step in plan.walk() if step.path == path[: len(step.path)])
+
+
+def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
+    """Return the static facts that a primitive, or else the next behaviour above it, relied on."""
+    for step in reversed(chain):
+        behavior = problem.domain.behaviors[step.behavior]
+        env = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
+        env |= {f"?{name}": value for name, value in step.bindings.items()}
+        found = [
+            (c.relation, tuple(env.get(a, a) for a in c.arguments))
+            for c in behavior.preconditions
+            if isinstance(c, RelationCondition) and not c.negated
+        ]
+        found = [(name, row) for name, row in found if row in problem.relations.get(name, ())]
+        if found:
+            return found
+    return []

@@ -14,7 +14,7 @@ Nothing leaves here to be followed that `confab.planner.validation` doesn't acce
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
@@ -188,13 +188,18 @@ def rejected(problem: Problem, steps: Sequence[Step]) -> Reason | None:
     return Reason(f"the steps that were found can't be followed: {faults[0].text}") if faults else None
 
 
-def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
-    """Return the goals that can't hold because what they are about is gone, or lies where no fact speaks of it, and why."""
+def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> list[tuple[Symbol, Reason]]:
+    """Return the goals that can't hold because what they are about is gone, or lies where no fact speaks of it, and why.
+
+    `why` says of an object why it has no perceived place, if it can.
+    """
     return [
         (
             symbol,
             Reason(
-                f"{symbol} = {value} is wanted, but {symbol.arguments[0]} isn't to be seen", (*symbol.arguments, value)
+                f"{symbol} = {value} is wanted, but {symbol.arguments[0]} "
+                + (why(symbol.arguments[0]) or "isn't to be seen"),
+                (*symbol.arguments, value),
             ),
         )
         for symbol, value in problem.goal.items()

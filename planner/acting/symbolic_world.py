@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
+from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Change, Intervention
 from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.planner.validation import successor
-from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol
 
 DONE = Report(True)
@@ -38,6 +39,7 @@ class SymbolicWorld:
         self._seconds_of = dict(seconds_of or {})
         self._fault = fault
         self._waiting: list[Intervention] = []
+        self._news: list[Discovery] = []
 
     def observe(self) -> State:
         """Return the whole state."""
@@ -80,19 +82,67 @@ class SymbolicWorld:
         ImpossibleStateError
             What it would lead to can't be.
         """
-        if intervention.change is Change.ADD:
+        if intervention.change in (Change.ADD, Change.BOX):
             self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
+        if intervention.change is Change.BOX:
+            text = f"{intervention.individual}, of which no fact speaks, is there"
+            self._news.append(Discovery(intervention.individual, (intervention.kind,), text=text))
+        if intervention.change is Change.PUSH:
+            self._add_spot(intervention.individual)
+            return
         after = disturbed(self.problem, self.state, intervention)
         refuse_impossible(self.problem, self.state, after, f"'{intervention.text}' can't happen")
         self.state = after
+
+    def discoveries(self) -> tuple[Discovery, ...]:
+        """Return the boxes and spots that came up since the last call."""
+        news, self._news = tuple(self._news), []
+        return news
+
+    def free_spots(self) -> tuple[Discovery, ...]:
+        """Return nothing: this world has no room but its places."""
+        return ()
+
+    def why_unplaced(self, individual: str) -> str:
+        """Return that an object lies, if it is still there."""
+        return "lies" if any(symbol.arguments[0] == individual for symbol in self.state) else ""
+
+    def _add_spot(self, individual: str) -> None:
+        """Put an object that stands at a place on a new spot beside it, of which the same static facts hold."""
+        symbols = place_symbols(self.problem, individual)
+        there = next((self.state[s] for s in symbols if self.state.get(s) in self.problem.individuals), None)
+        symbol = next((s for s in symbols if s in self.state), None)
+        if there is None or symbol is None:
+            return
+        name = f"spot{1 + sum(one.startswith('spot') for one in self.problem.individuals)}"
+        relations = tuple(
+            (relation, tuple(name if one == there else one for one in row))
+            for relation, rows in sorted(self.problem.relations.items())
+            for row in sorted(rows)
+            if there in row
+        )
+        values = self.problem.classes[self.problem.domain.situations[symbol.situation].range]
+        special = {
+            s for one in self.problem.domain.situations.values() if one.perceived for _, s in one.perceived.special
+        }
+        kinds = shared_kinds(self.problem, [value for value in values if value not in special])
+        found = Discovery(name, kinds, relations, text=f"{individual} stands beside {there}: {name}")
+        self.problem = met(self.problem, found)
+        self._news.append(found)
+        self.state[symbol] = name
 
 
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
     """Return the state after somebody has changed the world.
 
-    An object that is moved or taken away is let go: a hand that held it rests, and one that was at it stays where it was.
+    An object that is moved, knocked over or taken away is let go: a hand that held it rests, and one that was at it stays where it
+    was. An object that lies is at no place.
     """
     after = dict(state)
+    if intervention.change is Change.KNOCK:
+        for symbol in place_symbols(problem, intervention.individual):
+            after.pop(symbol, None)
+        _let_go(problem, state, after, intervention.individual)
     if intervention.change is Change.REMOVE:
         for symbol in state:
             if symbol.arguments[0] == intervention.individual:
@@ -142,3 +192,27 @@ def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
         for name, members in problem.classes.items()
     }
     return replace(problem, classes=classes)
+
+
+def met(problem: Problem, found: Discovery) -> Problem:
+    """Return the problem with a discovered individual and the static facts about it."""
+    for kind in found.kinds:
+        problem = with_individual(problem, found.individual, kind)
+    relations = dict(problem.relations)
+    for name, row in found.relations:
+        relations[name] = relations.get(name, frozenset()) | {row}
+    return replace(problem, relations=relations)
+
+
+def shared_kinds(problem: Problem, individuals: Iterable[str]) -> tuple[str, ...]:
+    """Return the classes that some individuals have in common, without those whose superclasses they are."""
+    names = {*individuals}
+    common = [kind for kind, members in problem.classes.items() if names and names <= {*members}]
+    above = {parent for kind in common for parent in problem.parents.get(kind, ())}
+    return tuple(kind for kind in common if kind not in above)
+
+
+def place_symbols(problem: Problem, individual: str) -> list[Symbol]:
+    """Return the symbols that say at which place an object is."""
+    situations = problem.domain.situations.values()
+    return [Symbol(s.name, (individual,)) for s in situations if s.perceived is not None and s.perceived.by == PLACE]

@@ -7,12 +7,13 @@ A world has three functions and a clock. The executive calls `observe` and `exec
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from threading import Timer
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Step
 from confab.reasoner.limits import current
 from confab.reasoner.possible import ImpossibleStateError
@@ -89,6 +90,20 @@ class Disturbable(World, Protocol):
         """Take note of interventions that shall take place at a time of the world's clock."""
 
 
+@runtime_checkable
+class Discoverer(Protocol):
+    """A world that comes across individuals which the scene doesn't have."""
+
+    def discoveries(self) -> Sequence[Discovery]:
+        """Return what was discovered since the last call. Observations may name it from then on."""
+
+    def free_spots(self) -> Sequence[Discovery]:
+        """Return spots at which something can be put down; called once, when the places of the scene don't suffice."""
+
+    def why_unplaced(self, individual: str) -> str:
+        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``; an empty text if that can't be said."""
+
+
 @dataclass(frozen=True)
 class Guarded:
     """A world whose exceptions and malformed answers become one `WorldError` that names the call.
@@ -146,6 +161,27 @@ class Guarded:
         if interventions:
             with _asking("announce()"):
                 self._disturbable().announce(interventions)
+
+    def discoveries(self) -> tuple[Discovery, ...]:
+        """Return what was discovered since the last call; nothing if the world is no `Discoverer`."""
+        if not isinstance(self.world, Discoverer):
+            return ()
+        with _asking("discoveries()"):
+            return tuple(self.world.discoveries())
+
+    def free_spots(self) -> tuple[Discovery, ...]:
+        """Return spots that are free to put something down."""
+        if not isinstance(self.world, Discoverer):
+            return ()
+        with _asking("free_spots()"):
+            return tuple(self.world.free_spots())
+
+    def why_unplaced(self, individual: str) -> str:
+        """Return why an object has no perceived place; an empty text if the world can't say."""
+        if not isinstance(self.world, Discoverer):
+            return ""
+        with _asking(f"why_unplaced({individual})"):
+            return str(self.world.why_unplaced(individual))
 
     def _disturbable(self) -> Disturbable:
         world = self.world

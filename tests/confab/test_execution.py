@@ -107,6 +107,22 @@ def test_every_form_of_intervention_is_read() -> None:
     assert [i.after for i in read] == [28, 28, (0, 1, 2), None, 28]
     assert read[3].at == 12.5
     assert [str(fact) for fact in read[4].facts] == ["cup9 LOCATION location5", "cup9 BEVERAGE no_beverage"]
+    hands_on = ["after=22 knock cup2", "after=22 push cup2 6 -3", "after=22 box location7 12x10x20"]
+    knock, push, box = parse_interventions(problem, hands_on)
+    assert (knock.individual, push.numbers) == ("cup2", (0.06, -0.03))
+    assert (box.kind, box.numbers, [str(fact) for fact in box.facts]) == (
+        "Movable",
+        (0.12, 0.1, 0.2),
+        ["box1 LOCATION location7"],
+    )
+    for wrong in (
+        "after=28 push cup2 x 3",
+        "after=28 box in_hnd",
+        "after=28 box location7 0x1x1",
+        "after=28 knock left_hand",
+    ):
+        with pytest.raises(KnowledgeError):
+            parse_interventions(problem, [wrong])
     with pytest.raises(KnowledgeError):
         parse_interventions(problem, ["after=28"])
 

@@ -416,6 +416,48 @@ def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
     assert len(episode.failures) == 4
 
 
+def test_only_what_failures_stand_against_is_given_up() -> None:
+    """No hand ever gets hold of cup2: everything else is done first, and the reason names the failure."""
+    episode = failing(lambda step, state: "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT")
+    assert episode.status is End.GAVE_UP
+    assert episode.observed[Symbol("BEVERAGE", ("cup1",))] == "beverage1"
+    assert all("B3_REACH_HAND_OBJECT" in reason.text and "cup2" in reason.terms for reason in episode.reasons)
+    assert holds(episode)
+    last = [event for event in episode.events if event.ok][-1]
+    first = next(event for event in episode.events if not event.ok)
+    assert first.begin < last.begin
+
+
+# ------------------------------------------------------------------------------------------------------------- beyond the scene
+
+
+def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
+    push = Intervention(Change.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28)  # cup2 is where it shall be
+    episode = acted(push)
+    assert episode.status is End.REACHED
+    assert [found.individual for found, _ in episode.discovered] == ["spot1"]
+    assert Symbol("LOCATION", ("cup2",)) in {s.symbol for event in episode.events for s in event.surprises} or any(
+        seen.value == "spot1" for seen in episode.course
+    )
+    assert episode.observed[Symbol("LOCATION", ("cup2",))] == "location5"
+
+
+def test_a_box_that_nobody_spoke_of_is_put_aside() -> None:
+    fact = at("box1", "location5")
+    episode = acted(Intervention(Change.BOX, (fact,), individual="box1", kind="Movable", numbers=(0.1,) * 3, after=22))
+    assert episode.status is End.REACHED
+    assert episode.observed[fact.symbol] not in ("location5", "in_hand")
+
+
+@pytest.mark.parametrize("knocked", ["cup2", "bottle1"])
+def test_what_lies_is_given_up_alone(knocked: str) -> None:
+    episode = acted(Intervention(Change.KNOCK, individual=knocked, after=22))
+    assert episode.status is End.IMPOSSIBLE
+    assert any(knocked in reason.text for reason in episode.reasons)
+    assert holds(episode)
+    assert at_rest(episode)
+
+
 class Broken(SymbolicWorld):
     """A robot whose driver is broken, each time otherwise."""
 

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 import confab
 from confab.planner.acting.episode import Change, Intervention
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Fact, Symbol
+from confab.sim.faults import knocked
 from confab.sim.live import LiveWorld
 from confab.sim.world import World
 
@@ -18,7 +20,7 @@ REACH = Step((0,), 8, 3, "B3_REACH_HAND_OBJECT", ("right_hand", "bottle1"), {"pl
 def live() -> Iterator[LiveWorld]:
     scene = confab.load("beverage-serving")
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:
-        yield LiveWorld(world, scene.problem.classes)
+        yield LiveWorld(world, scene.problem.classes, scene.problem, "canReach")
 
 
 def put(individual: str, place: str, **when: float) -> Intervention:
@@ -93,3 +95,58 @@ def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
         hand = world.hands["right_hand"]
         assert abs(hand.measured() - hand.hand.home).max() < 0.03
         assert live.execute(opening).ok
+
+
+LOCATION = {name: Symbol("LOCATION", (name,)) for name in ("cup1", "cup2", "bottle1", "box1")}
+
+
+def handled(change: Change, individual: str, *numbers: float, place: str = "") -> Intervention:
+    facts = (Fact(LOCATION[individual], place),) if place else ()
+    return Intervention(change, facts, individual=individual, kind="Movable", numbers=numbers)
+
+
+def test_what_stands_beside_its_places_is_at_a_spot_that_the_same_hand_reaches(live: LiveWorld) -> None:
+    live.disturb(handled(Change.PUSH, "cup2", 0.02, 0.08))
+    assert live.observe()[LOCATION["cup2"]] == "spot1"
+    (spot,) = live.discoveries()
+    assert "Location" in spot.kinds
+    assert ("canReach", ("left_hand", "spot1")) in spot.relations
+    assert live.discoveries() == ()
+    assert live.observe()[LOCATION["cup2"]] == "spot1"  # it isn't discovered twice
+    live.disturb(handled(Change.PUSH, "cup2", -0.02, -0.08))
+    assert live.observe()[LOCATION["cup2"]] == "location1"
+
+
+def test_a_thing_of_which_no_fact_speaks_is_fixed_if_no_hand_opens_wide_enough(live: LiveWorld) -> None:
+    live.disturb(handled(Change.BOX, "box1", 0.12, 0.12, 0.2, place="location7"))
+    assert live.observe()[LOCATION["box1"]] == "location7"
+    (box,) = live.discoveries()
+    assert box.kinds == ("Movable",)
+    assert "hands open to 10 cm" in box.fixed
+
+
+def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
+    live.disturb(handled(Change.KNOCK, "cup1"))
+    assert LOCATION["cup1"] not in live.observe()
+    assert live.why_unplaced("cup1").startswith("lies ")
+    assert live.why_unplaced("cup2").startswith("stands ")
+    assert live.execute(REACH).ok  # only the primitive during which it fell would fail for it
+
+
+def test_room_on_the_table_is_within_reach_and_clear_of_everything(live: LiveWorld) -> None:
+    spots = live.free_spots()
+    assert spots
+    world = live.world
+    for spot in spots:
+        assert any(name == "canReach" for name, _ in spot.relations)
+        point = world.place(spot.individual)
+        others = [world.place(name) for name in world.embodiment.places if name not in {s.individual for s in spots}]
+        assert min(float(np.linalg.norm(point - other)) for other in others) >= 0.1
+
+
+def test_a_timed_fault_that_was_planted_before_happens_in_a_live_world() -> None:
+    scene = confab.load("beverage-serving")
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        knocked("cup2", 0, 0.1)(world)
+        live = LiveWorld(world, scene.problem.classes)
+        assert live.execute(REACH).code == "toppled"

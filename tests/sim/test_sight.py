@@ -13,7 +13,8 @@ from confab.reasoner.embodiment.values import Embodiment, Mechanism, Part, Perce
 from confab.reasoner.symbols import Fact, Symbol
 from confab.scene import Scene
 from confab.sim.faults import displaced
-from confab.sim.live import LiveWorld, take_away
+from confab.sim.interventions import take_away
+from confab.sim.live import LiveWorld
 from confab.sim.perception import observe_covered
 from confab.sim.verdict import SkillError
 from confab.sim.verify import Rollout, verify

@@ -1,0 +1,129 @@
+"""The executive's belief: the situation as last seen, the goal, what is known of the scene, and what of it is in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from confab.planner.acting.discovery import Discovery
+from confab.planner.acting.episode import Surprise
+from confab.planner.acting.failure_memory import Static, without_relations
+from confab.planner.acting.symbolic_world import met, with_individual
+from confab.planner.hierarchical.planner import compiled
+from confab.planner.validation import successor
+from confab.reasoner.refutations import Refutation, with_refuted
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol, ValueEffect
+
+
+@dataclass
+class Belief:
+    """The task as it is believed to be.
+
+    `problem` has the situation, the goal, and the static facts and behaviours without those in doubt; `certain` has all static
+    facts and behaviours. `obstacles` are the discovered things that nothing can move: the behaviours that would move them
+    are refuted, in `certain`, too. `withdrawn` and `refuted` are the doubts. `unseen` are the symbols that the first observation
+    left out.
+    """
+
+    problem: Problem
+    withdrawn: set[Static] = field(default_factory=set)
+    refuted: dict[Refutation, None] = field(default_factory=dict)
+    obstacles: dict[str, Discovery] = field(default_factory=dict)
+    unseen: frozenset[Symbol] | None = None
+
+    def __post_init__(self) -> None:
+        self.certain, self.unobstructed = self.problem, self.problem.domain
+        self.using = compiled(self.problem)
+
+    @property
+    def state(self) -> dict[Symbol, str]:
+        """The situation as it was last seen."""
+        return dict(self.problem.initial)
+
+    @property
+    def goal(self) -> dict[Symbol, str]:
+        """What is wanted now."""
+        return dict(self.problem.goal)
+
+    @property
+    def doubted(self) -> bool:
+        """Whether anything is in doubt."""
+        return bool(self.withdrawn or self.refuted)
+
+    def want(self, goal: Mapping[Symbol, str]) -> None:
+        """Replace the goal."""
+        self.problem = replace(self.problem, goal=dict(sorted(goal.items())))
+
+    def boolean(self, symbol: Symbol) -> bool:
+        """Return whether a symbol is true or false, so that not to see it is to see that it is false."""
+        return self.problem.domain.situations[symbol.situation].boolean
+
+    def take_in(self, expected: State, seen: State) -> tuple[Surprise, ...]:
+        """Believe what is seen, and of what can't be seen what is expected; return the differences from what is expected."""
+        if self.unseen is None:
+            self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
+        now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
+        now.update(seen)
+        surprises = []
+        for symbol in sorted(expected.keys() | now.keys()):
+            default = FALSE if self.boolean(symbol) else None
+            wanted, found = expected.get(symbol, default), now.get(symbol, default)
+            if wanted != found:
+                surprises.append(Surprise(symbol, wanted, found))
+        self.problem = replace(self.problem, initial=now)
+        return tuple(surprises)
+
+    def could_begin(self, behavior: str, arguments: tuple[str, ...], state: State) -> bool:
+        """Return whether a behaviour is applicable in a state."""
+        return successor(self.problem, self.problem.domain.behaviors[behavior], arguments, state) is not None
+
+    # ------------------------------------------------------------------------------------------------- knowledge of the scene
+
+    def add(self, individual: str, kinds: Iterable[str]) -> None:
+        """Believe in one more individual."""
+        for kind in kinds:
+            self.problem = with_individual(self.problem, individual, kind)
+            self.certain = with_individual(self.certain, individual, kind)
+        self.using = compiled(self.problem)
+
+    def meet(self, found: Discovery) -> None:
+        """Believe in what a world has discovered."""
+        self.problem, self.certain = met(self.problem, found), met(self.certain, found)
+        if found.fixed:
+            self.obstacles[found.individual] = found
+            self.certain = with_refuted(self.certain, _moving(self.certain, found))
+        self._apply_doubts()
+
+    def without_obstacles(self, goal: Mapping[Symbol, str]) -> Problem:
+        """Return the task of reaching a goal as if every obstacle could be moved."""
+        return replace(self.problem, domain=self.unobstructed, relations=self.certain.relations, goal=dict(goal))
+
+    # ------------------------------------------------------------------------------------------------- doubts
+
+    def doubt(self, facts: Iterable[Static] = (), refutations: Iterable[Refutation] = ()) -> None:
+        """Doubt static facts, or the possibility of behaviours."""
+        self.withdrawn.update(facts)
+        self.refuted |= dict.fromkeys(refutations)
+        self._apply_doubts()
+
+    def trust_again(self) -> None:
+        """Drop all doubts."""
+        self.withdrawn.clear()
+        self.refuted.clear()
+        self._apply_doubts()
+
+    def _apply_doubts(self) -> None:
+        known = replace(self.problem, relations=self.certain.relations, domain=self.certain.domain)
+        self.problem = with_refuted(without_relations(known, self.withdrawn), self.refuted)
+        self.using = compiled(self.problem)
+
+
+def _moving(problem: Problem, found: Discovery) -> Iterable[Refutation]:
+    """Yield the refutations of all behaviours that would change where a fixed thing is, or take hold of it."""
+    for behavior in problem.domain.behaviors.values():
+        values = (effect for effect in behavior.effects if isinstance(effect, ValueEffect))
+        changed = {term for effect in values for term in (*effect.arguments, effect.value)}
+        for parameter in behavior.parameters:
+            if parameter.name in changed and found.individual in problem.classes.get(parameter.kind, ()):
+                arguments = tuple(found.individual if p is parameter else "" for p in behavior.parameters)
+                yield Refutation(behavior.name, arguments, (), found.fixed)

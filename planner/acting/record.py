@@ -1,0 +1,76 @@
+"""The record of an episode in the making."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from confab.planner.acting.discovery import Discovery
+from confab.planner.acting.episode import (
+    End,
+    Episode,
+    Event,
+    Failure,
+    Intervention,
+    Replan,
+    Seen,
+)
+from confab.planner.acting.step_trees import tree_of
+from confab.planner.plan import Plan, Reason, Step
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Problem, State
+
+
+@dataclass
+class Record:
+    """What has happened so far: steps done by path, events, and why not everything that was wanted is reached."""
+
+    initial: State
+    planned: Plan = Plan(())  # noqa: RUF009 - frozen
+    status: End = End.REACHED
+    reasons: list[Reason] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    interventions: list[tuple[Intervention, float]] = field(default_factory=list)
+    course: list[Seen] = field(default_factory=list)
+    replans: list[Replan] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    refuted: dict[Refutation, None] = field(default_factory=dict)
+    discovered: list[tuple[Discovery, float]] = field(default_factory=list)
+    done: dict[tuple[int, ...], Step] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=lambda: {"planning": 0.0, "repairing": 0.0})
+
+    @property
+    def executed(self) -> Plan:
+        """The steps done, as a tree."""
+        return Plan(tree_of(self.done))
+
+    def changes(self, before: State, after: State, seconds: float) -> None:
+        """Record which symbols have other values than before."""
+        changed = (s for s in sorted(before.keys() | after.keys()) if before.get(s) != after.get(s))
+        self.course += [Seen(seconds, symbol, after.get(symbol)) for symbol in changed]
+
+    def reason(self, reason: Reason) -> None:
+        """Record a reason once."""
+        if reason not in self.reasons:
+            self.reasons.append(reason)
+
+    def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...]) -> Episode:
+        """Return the episode: the record, with the task as it is in the end."""
+        return Episode(
+            task.scene,
+            self.status,
+            tuple(self.reasons),
+            self.planned,
+            self.executed,
+            self.initial,
+            dict(task.initial),
+            dict(task.goal),
+            tuple(self.events),
+            tuple(self.interventions),
+            tuple(self.replans),
+            tuple(self.failures),
+            {**self.seconds, "simulated": clock},
+            missed,
+            tuple(self.course),
+            tuple(self.refuted),
+            tuple(self.discovered),
+        )

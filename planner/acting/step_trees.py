@@ -1,0 +1,37 @@
+"""Trees of steps that are partly done: the next primitive, the rest, and the whole as it was carried out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from confab.planner.plan import Step
+
+
+def first_chain(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return the first primitive below the first step, behind all steps that are above it."""
+    chain = list(steps[:1])
+    while chain and chain[-1].steps:
+        chain.append(chain[-1].steps[0])
+    return tuple(chain)
+
+
+def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return the steps without their first primitive, and without the steps that end with it."""
+    if not steps[0].steps:
+        return tuple(steps[1:])
+    below = without_first(steps[0].steps)
+    return (replace(steps[0], steps=below), *steps[1:]) if below else tuple(steps[1:])
+
+
+def all_steps(steps: Sequence[Step]) -> Iterator[Step]:
+    """Yield the steps and everything below them."""
+    return (step for root in steps for step in root.walk())
+
+
+def tree_of(steps: Mapping[tuple[int, ...], Step], above: tuple[int, ...] = ()) -> tuple[Step, ...]:
+    """Return steps, given by path, as trees."""
+    below: dict[tuple[int, ...], list[Step]] = {}
+    for path in sorted(steps, key=lambda p: (-len(p), p)):
+        below.setdefault(path[:-1], []).append(replace(steps[path], steps=tuple(below.get(path, ()))))
+    return tuple(below.get(above, ()))
