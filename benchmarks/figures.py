@@ -99,8 +99,8 @@ class Block:
 
 
 def blocks(root: Path = ROOT) -> list[Block]:
-    """Return all blocks of figures in README and docs/."""
-    pages = [page for page in (root / "README.md", *sorted((root / "docs").glob("*.md"))) if page.exists()]
+    """Return all blocks of figures in README and docs/, subfolders included."""
+    pages = [page for page in (root / "README.md", *sorted((root / "docs").rglob("*.md"))) if page.exists()]
     return [Block(page, m["name"], m["header"]) for page in pages for m in BLOCK.finditer(page.read_text("utf-8"))]
 
 

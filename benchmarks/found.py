@@ -1,6 +1,6 @@
 """What broke once by hand, and what it answers now: each case is made anew from what is shipped, and run as people run it.
 
-python -m benchmarks.found    the table of docs/promises.md; exit 1 if an answer isn't foreseen
+python -m benchmarks.found    the table of docs/figures/promises.md; exit 1 if an answer isn't foreseen
 """
 
 from __future__ import annotations

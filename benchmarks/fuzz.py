@@ -3,7 +3,7 @@
     python -m benchmarks.fuzz                          until 100,000 cases are tried, going on where the last run ended
     python -m benchmarks.fuzz --cases 500 --door plan  so many more of one door
     python -m benchmarks.fuzz --again memory:17        one case again, its files kept
-    python -m benchmarks.fuzz --table                  what was tried and what broke, as docs/promises.md has it
+    python -m benchmarks.fuzz --table                  what was tried and what broke, as docs/figures/promises.md has it
 
 A case is a door and a number, from which everything in it is drawn. Cases run one after the other in a process that has limits of
 time and memory and ends after `BATCH` of them; what breaks is run again in a process of its own. How many were tried stands in
@@ -384,7 +384,7 @@ def fuzz(cases: int, doors: Sequence[str]) -> int:
 
 def table() -> None:
     """Print what was tried at each door, what broke, and how many causes were mended."""
-    print("| door | cases tried | broke | causes mended | open |\n|---|---|---|---|---|")
+    print("| door | cases tried | broke | causes corrected | open |\n|---|---|---|---|---|")
     cases, counts = list(known()), tried()
     for door, (run, _) in DOORS.items():
         causes = [cause for d, _, cause in cases if d == door]
@@ -395,7 +395,7 @@ def table() -> None:
     causes = [cause for *_, cause in cases]
     all_tried, all_broke = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
     print(f"| all | {all_tried:,} | {all_broke} | {len(set(causes) - {''})} | {causes.count('')} |")
-    print("\nMended, each cause once:\n")
+    print("\nCorrected, each cause once:\n")
     for cause in sorted(set(causes) - {""}):
         print(f"- {cause}")
 

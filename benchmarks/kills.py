@@ -1,6 +1,6 @@
 """Writers of files, killed at any moment: what was acknowledged is still there, and every file is whole.
 
-python -m benchmarks.kills             100 SIGKILLs for each command, as docs/promises.md quotes them
+python -m benchmarks.kills             100 SIGKILLs for each command, as docs/figures/promises.md quotes them
 python -m benchmarks.kills save 20     so many for one
 python -m benchmarks.kills --ctrl-c    SIGINTs in their place: each call ends with 0 or 130, and in no other way
 """

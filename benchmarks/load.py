@@ -1,6 +1,6 @@
 """Latency of honest requests to `confab serve`, alone and beside slow, abandoned and malformed ones.
 
-    python -m benchmarks.load        1,000 honest ones beside 300, 500 and 200, within a minute, as docs/promises.md quotes them
+    python -m benchmarks.load        1,000 honest ones beside 300, 500 and 200, within a minute (docs/figures/promises.md)
     python -m benchmarks.load 50     a fiftieth of each
 
 Honest clients ask a short query; slow ones send a byte of it a second; abandoned ones ask for a cross product and leave after

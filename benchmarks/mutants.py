@@ -3,7 +3,7 @@
     python -m benchmarks.mutants               60 faults in each module, drawn by seed, going on where the last run ended
     python -m benchmarks.mutants 20 validation so many in one
     python -m benchmarks.mutants --again repair what survived in one, after its tests were changed
-    python -m benchmarks.mutants --table       what was noticed, as docs/promises.md has it
+    python -m benchmarks.mutants --table       what was noticed, as docs/figures/promises.md has it
 
 The faults are cosmic-ray's (`pip install cosmic-ray`; no extra has it). Each is put into the module of a process of its own, which
 runs the module's tests until the first that fails. Faults in annotations and docstrings are none. What came of each stands in

@@ -1,6 +1,6 @@
 """Commands that start processes, ended at any moment by kill -9, a crash or Ctrl-C: how many processes they leave behind.
 
-python -m benchmarks.orphans             50 moments for each command and each end, as docs/promises.md quotes them
+python -m benchmarks.orphans             50 moments for each command and each end, as docs/figures/promises.md quotes them
 python -m benchmarks.orphans query 5     so many for one command
 """
 

@@ -1,4 +1,4 @@
-"""What each command does to a file that is there already where it writes: a table for docs/promises.md.
+"""What each command does to a file that is there already where it writes: a table for docs/figures/promises.md.
 
 python -m benchmarks outputs
 

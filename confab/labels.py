@@ -1,8 +1,8 @@
-"""What people call things: sentences about facts, conditions and steps in the ontology's labels, not in names and IDs.
+"""Sentences about facts, conditions and steps, in the labels of the ontology.
 
-A behaviour's label is a sentence about its roles ("move object to location"), so the individuals are put in for the roles that
-it mentions ("move cup 1 to location 7"); what it doesn't mention stands in brackets behind it. A fact is said by the label of its
-situation type's property ("cup 1 is at location 7"). What has no label keeps its name.
+The label of a behaviour is a sentence about its roles ("move object to location"). Individuals replace the roles that the label
+mentions ("move cup 1 to location 7"); the other individuals follow in brackets. A fact uses the label of the value property of its
+situation type ("cup 1 is at location 7"). A term without a label keeps its name.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""
 PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation ?property"
 AT_ONCE = 400
-"""So many labels are asked for in one query."""
+"""Maximum number of labels in one query."""
 
 
 @dataclass(frozen=True)
 class Labels:
-    """Names and what people call them; `verbs` are the labels of situation types' properties."""
+    """Labels of terms: `words` by name, `verbs` by situation type (the label of its value property)."""
 
     words: Mapping[str, str]
     verbs: Mapping[str, str]
     domain: Domain
 
     def name(self, name: str) -> str:
-        """Return what people call something."""
+        """Return the label of a term, or its name if it has none."""
         return self.words.get(name, name.lstrip("?"))
 
     def fact(self, fact: Fact) -> str:
@@ -41,20 +41,28 @@ class Labels:
         situation, (about, *rest) = fact.symbol.situation, fact.symbol.arguments or ("",)
         kind = self.domain.situations.get(situation)
         boolean = kind is not None and kind.boolean
-        if kind is not None and kind.quantity is not None and kind.quantity.unit and fact.value:
-            fact = Fact(fact.symbol, f"{fact.value} {kind.quantity.unit}")
+        unit = kind.quantity.unit if kind is not None and kind.quantity is not None else ""
+        if unit and fact.value:
+            fact = Fact(fact.symbol, f"{fact.value} {unit}")
         if situation not in self.verbs and situation in self.words and about and not boolean:
             of = " ".join(map(self.name, (about, *rest)))
             return f"{self.words[situation]} of {of} is {self.name(fact.value)}"
         named = self.words.get(situation, "")
-        of_itself = f"is {named.removeprefix('being ')}" if boolean and named.startswith("being ") else situation
-        verb = self.verbs.get(situation, of_itself)
+        of_itself = f"is {named.removeprefix('being ') or situation}" if boolean and not rest else situation
+        verb = self.verbs.get(situation, of_itself).removesuffix(f" {unit}" if unit else "")
         value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
         verb = _chosen(verb, self.name(fact.value)) if not rest and value else verb
         if verb.endswith(f" {self.name(fact.value)}"):
             value = []
-        words = [*([self.name(about)] if about else []), verb, *map(self.name, (*rest, *value))]
+        subject = [self.placed(about)] if about else []
+        words = [*subject, verb, *map(self.name, (*rest, *value))]
         return denied(_joined(words)) if boolean and fact.value == FALSE else _joined(words)
+
+    def placed(self, name: str) -> str:
+        """Return the label of an individual as a noun: "the place in the box" where the label is "in the box"."""
+        label = self.name(name)
+        first, *more = label.split(" ")
+        return f"the place {label}" if first in PLACING and more and more[-1] not in WAYS | {"of"} else label
 
     def about(self, symbol: Symbol) -> str:
         """Return the beginning of a sentence that a value of a symbol ends: "cup 1 is at"."""
@@ -66,17 +74,17 @@ class Labels:
 
     def condition(self, condition: Condition) -> str:
         """Return a condition as a sentence."""
-        return said(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.name(what))
+        return said(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.placed(what))
 
     def step(self, step: Step) -> str:
-        """Return what a step does as a sentence."""
+        """Return a step as a sentence."""
         behavior = self.domain.behaviors[step.behavior]
         terms = dict(zip((p.name for p in behavior.parameters), step.arguments, strict=True))
         terms |= {f"?{name.lstrip('?')}": value for name, value in step.bindings.items()}
         return self.behavior(behavior, terms)
 
     def behavior(self, behavior: Behavior, terms: Mapping[str, str]) -> str:
-        """Return what a behaviour does, with individuals for some of its roles, as a sentence."""
+        """Return a behaviour as a sentence, with individuals in the place of some of its roles."""
         label = self.words.get(behavior.name)
         if label is None:
             return " ".join((behavior.name, *(self.name(terms.get(p.name, p.name)) for p in behavior.parameters)))
@@ -88,6 +96,8 @@ class Labels:
         for mark, pattern in zip(marks, mentioned.values(), strict=True):
             label = pattern.sub(rf"\g<1>{mark}", label, count=1)
         for mark, name in marks.items():
+            if name.split(" ")[0] in PLACING:  # "put letter in the box", not "put letter to in the box"
+                label = re.sub(rf"\b(?:{'|'.join(PLACING)}) {mark}", mark, label)
             label = label.replace(mark, name)
         rest = dict.fromkeys(self.name(terms[role]) for role in roles if role in terms and role not in mentioned)
         return f"{label} ({', '.join(rest)})" if rest else label
@@ -95,11 +105,11 @@ class Labels:
 
 PLACING = {"at", "in", "on", "under", "to"}
 WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind", "beside"}
-"""Words that stand before what a role is filled with, where the role itself is called so."""
+"""Prepositions, which are also names of roles: in "move onto block" the role `onto` is the block."""
 
 
 def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
-    """Return what in a label stands for a role, or None; of a role called "onto" it is what stands behind that word."""
+    """Return a pattern of the words in a label that stand for a role, or None; for a role named "onto", the words after "onto"."""
     name = role.lstrip("?")
     if name.lower() in WAYS:
         others = "|".join(re.escape(term.lstrip("?")) for term in terms)
@@ -110,7 +120,7 @@ def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | N
 
 
 def _chosen(verb: str, value: str) -> str:
-    """Return a property's label that names the values with the one that there is.
+    """Return the label of a property, reduced to one value if the label lists the values.
 
     >>> _chosen("is tied up or loose", "loose"), _chosen("is clean or dirty", "clean"), _chosen("is at", "cup 1")
     ('is loose', 'is clean', 'is at')
@@ -120,7 +130,7 @@ def _chosen(verb: str, value: str) -> str:
 
 
 def _joined(parts: Sequence[str]) -> str:
-    """Return parts of a sentence as one, without a word said twice or two prepositions in a row.
+    """Return the parts of a sentence joined, without repeated words and without two prepositions in a row.
 
     >>> _joined(["left hand", "hand is at", "cup 1"]), _joined(["cup 1", "is at", "in a hand"])
     ('left hand is at cup 1', 'cup 1 is in a hand')

@@ -297,7 +297,7 @@ def _because(step: Step, purpose: Purpose, labels: Labels, steps: Steps, number:
         str(step),
         labels.step(step),
         tuple(f"{labels.fact(change.fact)} (before: {labels.name(change.before)})" for change in purpose.gives),
-        needs or ("nothing that follows needs what it gives",),
+        needs or ("no later step and no goal depends on its effects",),
     )
 
 
@@ -323,8 +323,8 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
         cases = f"{certificate.cases} combination{'s' * (certificate.cases != 1)}"
         lines.append(f"of the values of {'; '.join(about[:MOST_TOLD])}{more}, {cases} can be reached")
     goals = " and ".join(labels.fact(fact) for fact in certificate.unmet[:MOST_TOLD])
-    together = "they never hold together" if len(certificate.unmet) > 1 else "that never holds"
-    return (*lines, f"It is wanted that {goals}: {together}.")
+    never = "these never hold together" if len(certificate.unmet) > 1 else "this never holds"
+    return (*lines, f"The goal requires that {goals}; {never}.")
 
 
 def _listed(before: str, sentences: Sequence[str]) -> list[str]:
@@ -343,25 +343,25 @@ def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Lab
 def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labels) -> str:
     facts = " and ".join(labels.fact(change.fact) for change in need.gives)
     if need.kind is Kind.GOAL and need.conditions:
-        return f"it is wanted that {' and '.join(map(labels.condition, need.conditions))}: that follows since {facts}"
+        return f"the goal requires that {' and '.join(map(labels.condition, need.conditions))}, which follows from: {facts}"
     if need.kind is Kind.GOAL:
-        return f"it is wanted that {facts}"
+        return f"the goal requires that {facts}"
     if need.kind is Kind.REST:
-        where = f" after “{labels.step(steps[need.by])}”" if need.by else " in the end"
-        return f"so it is at rest{where}: {facts}"
+        where = f"“{labels.step(steps[need.by])}”" if need.by else "the plan"
+        return f"{where} has to end with the rest value: {facts}"
     by = f"“{labels.step(steps[need.by])}” ({number[need.by]})"
     if need.kind is Kind.ABOVE:
-        return f"{by} is to leave that {facts}"
+        return f"it achieves an effect of {by}: {facts}"
     asks = " and ".join(labels.condition(condition) for condition in need.conditions)
     if not asks:
-        return f"{by} does what it does because {facts}"
+        return f"the effect of {by} depends on it: {facts}"
     if asks == facts:
         return f"{by} requires that {asks}"
     return f"{by} requires that {asks}; {_instead(need.gives, labels)}"
 
 
 def _instead(changes: Sequence[Change], labels: Labels) -> str:
-    return "before: " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
+    return "before this step, " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
 
 
 # -------------------------------------------------------------------------------------------------------------- why not
@@ -445,7 +445,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
         return WhyNot(
             asked,
-            f"“{what}” can't be done; where the fewest conditions fail, in the place of {place}, it requires that",
+            f"“{what}” can't be done. In the place of {place}, where the fewest of its preconditions fail, it requires that",
             lacks,
         )
     if found.plan is not None:
@@ -453,9 +453,9 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
     if found.reason is not None:
         return WhyNot(
             asked,
-            f"“{what}” could be done in the place of {place}, but no plan was found from there: {found.reason.text}",
+            f"“{what}” could be done in the place of {place}, but no plan was found from there on: {found.reason.text}",
         )
-    return WhyNot(asked, f"it is what is done: {place}", more=0.0)
+    return WhyNot(asked, f"the plan already has this step: {place}", more=0.0)
 
 
 def _fact_told(
@@ -478,7 +478,7 @@ def _fact_told(
             problem, outcome, labels = replan([*goals, fact])
     words = labels.fact(Fact(symbol, value))
     if by is None and problem.goal.get(symbol) == value and outcome.plan is plan:
-        return WhyNot(asked, f"it is what is wanted: {words}", more=0.0)
+        return WhyNot(asked, f"this is a goal already: {words}", more=0.0)
     before = cost_of(problem, plan)
     if by is not None:
         if not any(by in members for members in problem.classes.values()):
@@ -488,27 +488,29 @@ def _fact_told(
             found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)
         except NoChoiceError as error:
             return WhyNot(asked, str(error))
-        words += f", with {labels.name(by)} in all that changes it for {labels.name(about)}"
+        words += f", with {labels.name(by)} in every step that changes it"
         found = replace(found, before=before)
     else:
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
         found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
     if found.plan is None:
-        return WhyNot(asked, f"that {words}: there is no such plan: {found.reason.text if found.reason else ''}")
-    return _planned(asked, f"that {words}", problem, plan, labels, found)
+        return WhyNot(
+            asked, f"no plan achieves that {words}: {found.reason.text if found.reason else 'no reason is known'}"
+        )
+    return _planned(asked, f"the goal that {words}", problem, plan, labels, found)
 
 
 def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:
     assert found.plan is not None
     assert found.cost is not None
     more = found.cost - found.before
-    count = f"{len(found.plan.primitives)} primitives in the place of {len(plan.primitives)}"
-    said = f"costs {more:g} more" if more > 0 else "costs as much" if more == 0 else f"would cost {-more:g} less"
+    count = f"{len(found.plan.primitives)} primitives instead of {len(plan.primitives)}"
+    said = f"costs {more:g} more" if more > 0 else "costs the same" if more == 0 else f"costs {-more:g} less"
     steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
     if breaks := _breaks(problem, plan, found.plan, labels):
-        said = f"it can be done only against what a level above asks, and {said} ({count}):"
-        return WhyNot(asked, f"{what}: {said}", (), found.plan, more, steps, breaks)
-    return WhyNot(asked, f"{what}: it can be done, and {said} ({count}):", (), found.plan, more, steps)
+        said = f"is possible only if a condition of a level above is violated, and {said} ({count}):"
+        return WhyNot(asked, f"{what} {said}", (), found.plan, more, steps, breaks)
+    return WhyNot(asked, f"{what} is possible and {said} ({count}):", (), found.plan, more, steps)
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What a certificate says in a sentence: the cause that no behaviour changes, and what follows from it."""
+"""The reason that a certificate of unsolvability gives, as a sentence: the first cause, and what follows from it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from confab.planner.certificates import Certificate
 from confab.planner.plan import Reason
 from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
 from confab.reasoner.amounts import MORE, Expression, terms_of, towards, written
-from confab.reasoner.sentences import said
+from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -32,22 +32,22 @@ from confab.reasoner.symbols import (
 )
 
 WORK = 300_000
-"""How many tests may be spent to find the cause."""
+"""Maximum number of tests to find the cause."""
 WORDS, ONE = ("none", "one", "two", "three", "four", "five"), "?one"
-"""Small numbers, and the variable of one of several individuals that are counted."""
+"""Small numbers in words; the variable that stands for each of several counted individuals."""
 SHOWN = 4
-"""So many facts of a chain or of a goal, at most, are named."""
+"""Maximum number of facts of a chain or of a goal that a sentence names."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A fact that never holds, or always does; or such facts of all individuals of some classes, which its variables stand for."""
+    """A fact that never holds or always holds; with variables, such facts of all individuals of the variables' classes."""
 
     fact: Fact
     kinds: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
-        """Return it in words, variables by their classes."""
+        """Return the claim in words; a variable is named by its class."""
         names = {variable: f"some {kind}" for variable, kind in self.kinds}
         symbol = self.fact.symbol
         named = Symbol(symbol.situation, tuple(names.get(a, a) for a in symbol.arguments))
@@ -56,12 +56,12 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cause:
-    """Why something can't be: a sentence, the terms it names, and the claims that it rests on (none: nothing changes it)."""
+    """Why a fact can't hold: a sentence, the terms in it, and the claims it depends on (none if nothing can change it)."""
 
     text: str
     terms: tuple[str, ...] = ()
     rests_on: tuple[Claim, ...] = ()
-    parts: int = 1  # how many conditions it names
+    parts: int = 1  # number of conditions in the sentence
 
 
 def told(problem: Problem, certificate: Certificate) -> Reason:
@@ -73,18 +73,21 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         symbols = sorted(certificate.told_apart)
         about = ", ".join(map(str, symbols[:SHOWN])) + f" and {len(symbols) - SHOWN} more" * (len(symbols) > SHOWN)
         one, many = certificate.cases == 1, len(goals) > 1
-        cases = f"{certificate.cases} combination{'' if one else 's'} of values of {about} can be reached"
         how = "exclude each other" if many else "can't be reached"
         values = {(fact.symbol.situation, fact.value) for fact in goals}
         if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
             ((situation, value),) = values
-            return Reason(f"{what} {how}: only one at a time is {situation} {value}", tuple(dict.fromkeys(terms)))
-        text = f"{what} {how}: {cases}, {'and not' if one else 'none'} with {'all of them' if many else 'it'}"
+            return Reason(
+                f"{what} {how}: {situation} {value} holds for one object at a time", tuple(dict.fromkeys(terms))
+            )
+        which = "the only reachable combination" if one else f"none of the {certificate.cases} reachable combinations"
+        has = "doesn't have" if one else "has"
+        text = f"{what} {how}: {which} of values of {about} {has} {'all of them' if many else 'it'}"
         return Reason(text, tuple(dict.fromkeys(terms)))
     try:
         chain, cause = _Causes(problem, certificate).chain()
     except (WorkLimitError, RecursionError):
-        chain, cause = [], Cause("nothing brings it about")
+        chain, cause = [], Cause("no behaviour achieves it")
     goal = certificate.unmet[0]
     follows = [claim for claim in reversed(chain) if claim.fact != goal]
     kept = [claim for claim in follows if certificate.always.get(claim.fact.symbol) == claim.fact.value]
@@ -117,7 +120,7 @@ class _Causes:
         return Reading(self.lowest, view), view
 
     def chain(self) -> tuple[list[Claim], Cause]:
-        """Return the shortest chain of claims from the goal to one with a cause that nothing changes."""
+        """Return the shortest chain of claims from the goal to a claim whose cause depends on no other claim."""
         goal = Claim(self.certificate.unmet[0])
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
@@ -132,10 +135,10 @@ class _Causes:
                     if claim not in seen:
                         seen.add(claim)
                         queue.append((*chain, claim))
-        return ([goal], last[1]) if last else ([goal], Cause("no behaviour makes it so"))
+        return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
 
     def causes(self, claim: Claim) -> list[Cause]:
-        """Return what is in the way of each behaviour that could make a claim false, the simplest first."""
+        """Return why each behaviour that could make a claim false can't, the simplest cause first."""
         fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):
@@ -188,16 +191,16 @@ class _Causes:
             stays = self.certificate.always.get(symbol)
             return [Cause(f"{symbol.arguments[0]} {situation} is always {stays}" if stays else self.bounds_of(symbol))]
         if not found:
-            what = "gives it another value" if kept else "makes it so"
+            what = "gives it another value" if kept else "has this effect"
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
     def direction(self, fact: Fact) -> str:
-        """Return whether more of an amount is wanted, or less."""
+        """Return whether the goal requires more of an amount, or less."""
         return towards(self.problem.initial.get(fact.symbol), fact.value)
 
     def towards(self, effect: Effect, given: dict[str, str], fact: Fact) -> bool:
-        """Whether an effect may bring an amount nearer to what is wanted of it, or out of where it is claimed to be."""
+        """Whether an effect may move an amount towards its goal, or out of its claimed bounds."""
         if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
             return True
         reading, _ = self.reading()
@@ -208,14 +211,14 @@ class _Causes:
         return by.high > 0 if more else by.low < 0
 
     def bounds_of(self, symbol: Symbol) -> str:
-        """Return between which bounds an amount stays, in words."""
+        """Return the bounds of an amount in words."""
         allowed, words = self.claims.allowed(symbol), f"{symbol.arguments[0]} {symbol.situation}"
         least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
         most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
         return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words
 
     def too_few(self, rule: Rule, given: dict[str, str]) -> Cause | None:
-        """Return how many individuals a rule asks for and how many there can be, where these are fewer."""
+        """Return a cause if a rule requires more individuals than there can be."""
         for condition in rule.conditions:
             many, kind, own = counted(substituted(condition, given))
             if many < 2:
@@ -226,18 +229,21 @@ class _Causes:
                      for env in reading.solutions(own, {ONE: one}, kinds)}  # fmt: skip
             if len(there) < many:
                 each = " and ".join(said(substituted(c, {ONE: "each"})) for c in own)
-                text = f"{rule.situation} asks for {WORDS[many]} {kind}, {each}; there can be {WORDS[len(there)]}"
+                text = f"{rule.situation} requires {WORDS[many]} {kind}, {each}; there can be only {WORDS[len(there)]}"
                 return Cause(text, (rule.situation, kind))
         return None
 
     def lacking(
         self, claim: Claim, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]
     ) -> Cause:
-        """Return what of the conditions for making a claim false can't be: as few as can be, unchanging ones before others."""
+        """Return a smallest set of conditions that can't hold together and without which a behaviour would make a claim false.
+
+        Conditions that no behaviour changes are preferred.
+        """
         from confab.reasoner.validation.contradictions import clashing
 
         if clash := clashing(conditions, self.problem, behavior.kinds):
-            text = f"{behavior.name} needs {self._all(clash, given, behavior.kinds)}, and no state has both"
+            text = f"{behavior.name} requires {self._all(clash, given, behavior.kinds)}, and no state satisfies both"
             return Cause(text, (behavior.name,), (), 2)
         core = self.core(conditions, given, behavior)
         if core is None:
@@ -259,14 +265,14 @@ class _Causes:
         )
         claims = [Claim(fact) for fact in view.claimed]
         if claims == [claim]:
-            return Cause(f"{behavior.name} needs that it holds already", (behavior.name, *names), (claim,))
+            return Cause(f"{behavior.name} requires that it holds already", (behavior.name, *names), (claim,))
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
             free = {term for term in (*first.arguments, first.value) if term.startswith("?")}
             if free and free <= kinds.keys():  # of all individuals at once, if that can be
                 of_all = Fact(Symbol(first.situation, first.arguments), first.value)
                 claims.insert(0, Claim(of_all, tuple((term, kinds[term]) for term in sorted(free))))
-        return Cause(f"{text}, which {behavior.name} needs", (behavior.name, *names), tuple(claims), len(opened))
+        return Cause(f"{behavior.name} requires {text}", (behavior.name, *names), tuple(claims), len(opened))
 
     def core(
         self,
@@ -275,7 +281,7 @@ class _Causes:
         behavior: Behavior,
         kinds: dict[str, str] | None = None,
     ) -> list[Condition] | None:
-        """Return as few conditions as can be that can't hold together; None if all can."""
+        """Return a minimal set of conditions that can't hold together; None if all can."""
         kinds = kinds or dict(behavior.kinds)
 
         def can(some: Sequence[Condition]) -> bool:
@@ -293,7 +299,7 @@ class _Causes:
         return core
 
     def out_of_bounds(self, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]) -> Cause:
-        """Return which amount a behaviour would take beyond what is allowed."""
+        """Return the amount that a behaviour would take out of its bounds."""
         reading, _ = self.reading()
         for env in reading.solutions(tuple(conditions), given, behavior.kinds):
             for effect in behavior.amounts:
@@ -302,7 +308,7 @@ class _Causes:
         return Cause("")
 
     def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Yield how an effect would take an amount beyond its bounds."""
+        """Yield how an effect would take an amount out of its bounds."""
         from confab.planner.possibilities import OPERATORS, calculated
 
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
@@ -316,16 +322,16 @@ class _Causes:
         operation = effect.operation  # type: ignore[union-attr]
         new = by if by is None or operation == "assign" else calculated(OPERATORS[operation], old, by)
         if new is None:
-            yield f"make {words} an amount that can't be worked out", terms
+            yield f"make {words} an amount that can't be calculated", terms
         elif quantity.most is not None and new.low > quantity.most and isinstance(new.low, Fraction):
-            yield f"take {words} to {written(new.low)}, more than its most, {written(quantity.most)}", terms
+            yield f"take {words} to {written(new.low)}, more than its maximum, {written(quantity.most)}", terms
         elif quantity.least is not None and new.high < quantity.least and isinstance(new.high, Fraction):
-            yield f"take {words} to {written(new.high)}, less than its least, {written(quantity.least)}", terms
+            yield f"take {words} to {written(new.high)}, less than its minimum, {written(quantity.least)}", terms
         elif quantity.whole and new.low == new.high and isinstance(new.low, Fraction) and new.low.denominator != 1:
             yield f"take {words} to {written(new.low)}, which is no whole number", terms
 
     def words(self, core: Sequence[Condition], given: dict[str, str], kinds: dict[str, str]) -> str:
-        """Return what fails to hold, e.g. ``no Hand canReach location9``."""
+        """Return the conditions that fail, as required: ``a Hand that canReach location9, and there is none``."""
 
         def term(name: str) -> str:
             return given.get(name, f"some {kinds[name]}" if name in kinds else name)
@@ -333,17 +339,17 @@ class _Causes:
         if len(core) == 1:
             condition = substituted(core[0], given)
             if isinstance(condition, ClassCondition) and not condition.negated:
-                return f"{term(condition.term)} is no {condition.kind}"
+                return f"that {term(condition.term)} is {an(condition.kind)}, which it isn't"
             if isinstance(condition, RelationCondition) and not condition.negated and len(condition.arguments) == 2:
                 left, right = condition.arguments
                 if left.startswith("?"):
-                    return f"no {kinds[left]} {condition.relation} {term(right)}"
+                    return f"{an(kinds[left])} that {condition.relation} {term(right)}, and there is none"
                 if right.startswith("?"):
-                    return f"{left} {condition.relation} no {kinds[right]}"
+                    return f"{an(kinds[right])} that {left} {condition.relation}, and there is none"
         all_ = self._all(core, given, kinds)
         if len(core) > 1:
-            return f"nothing satisfies {all_}"
-        return f"{'not' if self.lowest.constant(core[0]) else 'never'} {all_}"
+            return f"{all_}, which nothing satisfies"
+        return f"{all_}, which {'does not hold' if self.lowest.constant(core[0]) else 'never holds'}"
 
     def _all(self, conditions: Sequence[Condition], given: dict[str, str], kinds: Mapping[str, str]) -> str:
         """Return a conjunction in words, variables without a value by their classes."""
@@ -357,7 +363,7 @@ def variables_of(expression: Expression) -> set[str]:
 
 
 def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
-    """Return how many individuals of a class a condition asks for, each told apart from the others, and what of each."""
+    """Return how many different individuals of a class a condition requires, the class, and the conditions on each."""
     before: list[str] = []
     found: tuple[str, tuple[Condition, ...]] = ("", ())
     while isinstance(condition, Witness) and not condition.negated and len(before) < len(WORDS) - 1:
@@ -375,7 +381,7 @@ def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...
 
 @dataclass
 class _Noting(View):
-    """A case that notes the claims that were asked for and denied."""
+    """A view of a case that records the claims by which it denied a fact."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import count
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
 from confab.reasoner.symbols import (
@@ -23,11 +24,26 @@ from confab.reasoner.symbols import (
 )
 
 Words = Callable[[Fact | str], str]
-"""How a fact, or the name of an individual, a class or a relation, is written."""
-MARK = "\ue000"
-"""Stands in a sentence for the individual that a witness looks for."""
-DENIALS = {"is": "isn't", "has": "doesn't have", "can": "can't", "holds": "doesn't hold", "carries": "doesn't carry"}
-"""What says the opposite, by the first word that says what is so."""
+"""Writes a fact, or the name of an individual, a class or a relation."""
+REGULAR = (
+    "balance come connect contain face fit get hang hold join know "
+    "lead lie live need own rest sit stand stay suit want wear wish work"
+)
+DENIALS = {
+    **{
+        "is": "isn't",
+        "are": "aren't",
+        "was": "wasn't",
+        "has": "doesn't have",
+        "can": "can't",
+        "carries": "doesn't carry",
+    },
+    **{"reaches": "doesn't reach", "passes": "doesn't pass", "goes": "doesn't go"},
+    **{f"{verb}s": f"doesn't {verb}" for verb in REGULAR.split()},
+}
+"""Verbs in the third person with their negations."""
+SIGNS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "=": "exactly"}
+"""Signs of a comparison in words."""
 
 
 def said(condition: Condition, words: Words = str) -> str:
@@ -60,47 +76,60 @@ def said(condition: Condition, words: Words = str) -> str:
             either = " or ".join(" and ".join(said(inner, words) for inner in group) for group in alternatives)
             return f"{'not ' if negated else ''}({either})"
         case Comparison(left, sign, right, negated):
-            return ("not " if negated else "") + f"{counted(left, words)} {sign} {counted(right, words)}"
+            sign = SIGNS[sign] if isinstance(left, Amount) and words is not str else sign
+            sentence = f"{counted(left, words)} {sign} {counted(right, words)}"
+            return denied(sentence) if negated else sentence
 
 
 def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
-    """Return that some individual of a class is as conditions say, or none is, or every one is as the last denies."""
+    """Return that some, no, or every individual of a class satisfies conditions.
+
+    "Every" is the negation of a witness whose last condition is negated.
+    """
     but = [c for c in conditions if isinstance(c, EqualityCondition) and c.negated and variable in (c.left, c.right)]
     asked = sorted((c for c in conditions if c not in but), key=lambda c: c.negated)
     which = "no" if negated else "some"
     if asked and negated and isinstance(asked[-1], ValueCondition | RelationCondition) and asked[-1].negated:
-        which = "every"  # none isn't: all are
+        which = "every"
         asked[-1] = replace(asked[-1], negated=False)
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
-    clauses = [said(substituted(c, {variable: MARK}), words) for c in asked]
+    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
+    clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
     if not clauses:
         return f"there is {whole}"
+    if (
+        which != "every"
+    ):  # the order of the clauses is free: the last is the predicate, best one with the individual as its subject
+        clauses.sort(key=lambda clause: clause.startswith(f"{mark} "))
     *before, last = clauses
-    if which != "every" and not last.startswith(f"{MARK} "):  # any of them may come last
-        before.sort(key=lambda clause: clause.startswith(f"{MARK} "))
-        if before and before[-1].startswith(f"{MARK} "):
-            before, last = [*before[:-1], last], before[-1]
-    if not before and last.endswith(f" {MARK}") and which != "every":
-        return last.replace(MARK, whole)
-    if which == "some" and all(clause.startswith(f"{MARK} ") for clause in clauses):
-        return f"{whole} {' and '.join(clause.removeprefix(f'{MARK} ') for clause in clauses)}"
-    relative = [_relative(clause) for clause in before]
-    if not last.startswith(f"{MARK} ") or None in relative:
-        such = " and ".join(clause.replace(MARK, "it") for clause in before)
-        end = last.replace(MARK, "it")
-        if which == "every" and such:
-            return f"for {whole} such that {such}, {end}"
-        return f"{whole} is such that {' and '.join(filter(None, (such, end)))}"
-    return " ".join((whole, " and ".join(filter(None, relative)), last.removeprefix(f"{MARK} "))).replace("  ", " ")
+    if not before and last.endswith(f" {mark}") and last.count(mark) == 1 and which != "every":
+        return last.replace(mark, whole)
+    if which == "some" and all(_is_subject(mark, clause) for clause in clauses):
+        return f"{whole} {' and '.join(clause.removeprefix(f'{mark} ') for clause in clauses)}"
+    relative = [_relative(mark, clause) for clause in before]
+    if _is_subject(mark, last) and None not in relative:
+        return " ".join(
+            (whole, *([" and ".join(filter(None, relative))] if before else []), last.removeprefix(f"{mark} "))
+        )
+    it = f"the {kind.partition(' of ')[0]}"
+    such = " and ".join(clause.replace(mark, it) for clause in (before if which == "every" else clauses))
+    if which == "every":
+        return f"for {whole}{f' such that {such}' if such else ''}, {last.replace(mark, it)}"
+    return f"there is {whole} such that {such}"
 
 
-def _relative(clause: str) -> str | None:
-    """Return a clause about the individual that is looked for as a relative clause; None if it is none in its place."""
-    if clause.startswith(f"{MARK} ") and clause.count(MARK) == 1:
-        return f"that {clause.removeprefix(f'{MARK} ')}"
-    if clause.endswith(f" {MARK}") and clause.count(MARK) == 1:
-        return f"that {clause.removesuffix(f' {MARK}')}"
+def _is_subject(mark: str, clause: str) -> bool:
+    """Whether the individual that a mark stands for is the subject of a clause and occurs nowhere else in it."""
+    return clause.startswith(f"{mark} ") and clause.count(mark) == 1
+
+
+def _relative(mark: str, clause: str) -> str | None:
+    """Return a clause as a relative clause about the individual that a mark stands for; None if it can't be one."""
+    if _is_subject(mark, clause):
+        return f"that {clause.removeprefix(f'{mark} ')}"
+    if clause.endswith(f" {mark}") and clause.count(mark) == 1 and " and " not in clause:
+        return f"that {clause.removesuffix(f' {mark}')}"
     return None
 
 
@@ -131,7 +160,7 @@ def an(noun: str) -> str:
 
 
 def counted(expression: Expression, words: Words = str) -> str:
-    """Return an amount as people write it.
+    """Return an amount in words.
 
     >>> from fractions import Fraction
     >>> counted(Calculation("-", Amount("SERVINGS", ("bottle1",)), Fraction(1, 2)))
@@ -141,7 +170,12 @@ def counted(expression: Expression, words: Words = str) -> str:
         case Amount(situation, arguments):
             return words(Fact(Symbol(situation, arguments), "")).strip()
         case Measure(relation, arguments):
-            return " ".join(map(words, (*arguments[:1], relation, *arguments[1:])))
+            if words is str:
+                return " ".join((*arguments[:1], relation, *arguments[1:]))
+            name, of = words(relation), " and ".join(map(words, arguments))
+            return (
+                f"the {name} {of}" if name.split(" ")[-1] in ("between", "from", "of", "to") else f"the {name} of {of}"
+            )
         case Calculation(sign, left, right):
             return f"({counted(left, words)} {sign} {counted(right, words)})"
         case number:

@@ -46,7 +46,7 @@ def test_every_block_of_figures_says_its_command_commit_and_date_and_stale_ones_
 
 
 def test_every_block_that_begins_ends_before_the_next() -> None:
-    for path in [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md"))]:
+    for path in [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").rglob("*.md"))]:
         text = path.read_text("utf-8")
         assert len(figures.BLOCK.findall(text)) == text.count("<!-- figures "), path.name
         assert not any("<!-- figures " in block["text"] for block in figures.BLOCK.finditer(text)), path.name

@@ -17,7 +17,8 @@ import confab
 from confab.planner.plan import Outcome, Plan, Step
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
 VOID = {"area", "br", "col", "hr", "img", "input", "link", "meta", "source", "wbr"}
 CAN_BUILD = find_spec("mkdocs") is not None and find_spec("material") is not None
 Shown = tuple[str, str]
@@ -154,7 +155,7 @@ needs_mkdocs = pytest.mark.skipif(not CAN_BUILD, reason="needs the extra docs")
 def test_every_page_of_the_site_has_the_blocks_of_its_source(site: Path) -> None:
     for page in PAGES:
         source = list(written(page.read_text(encoding="utf-8")))
-        shown = rendered(site / f"{page.stem}.html").shown()
+        shown = rendered((site / page.relative_to(DOCS)).with_suffix(".html")).shown()
         if page.stem == "reference":  # the docstrings add blocks of their own
             shown = [block for block in shown if block in source]
         assert shown == source, page.name
@@ -163,7 +164,7 @@ def test_every_page_of_the_site_has_the_blocks_of_its_source(site: Path) -> None
 @needs_mkdocs
 def test_no_paragraph_of_the_site_holds_markup(site: Path) -> None:
     for page in PAGES:
-        for text in rendered(site / f"{page.stem}.html").paragraphs:
+        for text in rendered((site / page.relative_to(DOCS)).with_suffix(".html")).paragraphs:
             assert not re.search(r"^\s*(```|\||#+ |[-*] |:::)|\]\(|`", text, re.MULTILINE), f"{page.name}: {text}"
 
 

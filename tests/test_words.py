@@ -21,7 +21,7 @@ def pronouns(file: Path) -> int:
 
 def test_the_pronouns_that_stand_for_a_missing_noun_become_fewer() -> None:
     code = [file for room in ("reasoner", "planner", "sim", "confab") for file in sorted((ROOT / room).rglob("*.py"))]
-    found = {file.relative_to(ROOT).as_posix(): pronouns(file) for file in (*code, *(ROOT / "docs").glob("*.md"))}
+    found = {file.relative_to(ROOT).as_posix(): pronouns(file) for file in (*code, *(ROOT / "docs").rglob("*.md"))}
     rewritten = tuple(f"{folder}/" for folder in WITHOUT) + tuple(f"docs/{page}.md" for page in PAGES)
     assert {file: count for file, count in found.items() if count and file.startswith(rewritten)} == {}
     left = sum(count for file, count in found.items() if not file.startswith(rewritten))

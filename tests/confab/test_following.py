@@ -15,20 +15,20 @@ def needs(scene: str | Path, step: str) -> list[str]:
 
 def test_a_goal_that_is_defined_needs_what_it_follows_from() -> None:
     assert needs("packing-small", "L1#3") == [
-        "it is wanted that ring is stored away: that follows since chest lies in vault"
+        "the goal requires that ring is stored away, which follows from: chest lies in vault"
     ]
     assert needs("packing-small", "L1#1") == [
-        "it is wanted that ring is inside casket: that follows since ring lies in casket",
-        "it is wanted that ring is stored away: that follows since ring lies in casket",
+        "the goal requires that ring is inside casket, which follows from: ring lies in casket",
+        "the goal requires that ring is stored away, which follows from: ring lies in casket",
     ]
 
 
 def test_a_condition_that_is_defined_is_told_with_what_changed_it() -> None:
-    asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; before: chest is shut"
+    asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; before this step, chest is shut"
     assert asks in needs("packing-small", "L1#0")
 
 
 def test_a_condition_on_all_of_a_class_says_so() -> None:
     asked = needs(THEATRE, "unload cloud")
-    assert asked[0] == "it is wanted that cloud isn't stowed: that follows since cart doesn't carry cloud"
+    assert asked[0] == "the goal requires that cloud isn't stowed, which follows from: cart doesn't carry cloud"
     assert re.match(r"“switch (back|front) on” \(L1#15\) requires that no prop is stowed", asked[1])

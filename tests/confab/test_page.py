@@ -89,7 +89,7 @@ def test_a_page_loads_nothing_and_its_text_is_data(pages: dict[str, PageData]) -
 def test_steps_are_told_in_labels_with_their_reasons_and_names(pages: dict[str, PageData]) -> None:
     first = pages["plan"]["steps"][0]
     assert (first["what"], first["number"], first["name"]) == ("move cup 1 to location 7", "L1#0", "B1_MOVE #22")
-    assert first["needs"] == ["it is wanted that cup 1 is at location 7"]
+    assert first["needs"] == ["the goal requires that cup 1 is at location 7"]
     assert "left hand holds cup 1 (before: nothing)" in pages["plan"]["steps"][1]["gives"]
 
 

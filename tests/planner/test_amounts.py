@@ -91,7 +91,13 @@ def test_who_gives_up_says_which_amount_was_in_the_way() -> None:
         ("2", 2, "0.5", {"jug": ">=1.5"}, "TEA of jug: 2 servings are there, 2.5 are wanted, and nothing gives more"),
         ("2", 0, "1", {"jug": ">=3"}, "jug TEA >=3 can't be reached: no behaviour of level 2 gives more"),
         ("2", 0, "1", {"jug": ">2"}, "jug TEA >2 can't be reached: no behaviour of level 2 gives more"),
-        ("2", 0, "1", {"jug": "<1"}, "jug TEA <1 can't be reached: never some Cup DRINK empty, which POUR needs"),
+        (
+            "2",
+            0,
+            "1",
+            {"jug": "<1"},
+            "jug TEA <1 can't be reached: POUR requires some Cup DRINK empty, which never holds",
+        ),
     ],
 )
 def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted: dict[str, str], said: str) -> None:

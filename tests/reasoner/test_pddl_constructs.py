@@ -471,9 +471,9 @@ def test_a_cost_with_many_values_is_one_price() -> None:
     [
         (
             "(or (q a) (q b))",
-            "the_world GOAL_REACHED true can't be reached: never (a Q true or b Q true), which REACH_GOAL needs",
+            "the_world GOAL_REACHED true can't be reached: REACH_GOAL requires (a Q true or b Q true), which never holds",
         ),
-        ("(q a)", "a Q true can't be reached: never a P false, which F needs"),
+        ("(q a)", "a Q true can't be reached: F requires a P false, which never holds"),
     ],
 )
 def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> None:
