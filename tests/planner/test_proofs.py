@@ -262,13 +262,13 @@ def reason(conditions: Iterable[object], terms: str = "?c:Cup ?p:Place ?h:Hand")
 def test_what_fails_to_hold_is_said_as_people_would() -> None:
     assert reason([ClassCondition("?c", "Tray")]) == "that cup2 is a Tray, which it isn't"
     assert reason([RelationCondition("canReach", ("?h", "?p"))]) == "a Hand that canReach sink"
-    assert reason([RelationCondition("fits", ("?c", "?q"))], "?c:Cup ?p:Place ?q:Place") == "cup2 fits no Place"
+    assert reason([RelationCondition("fits", ("?c", "?q"))], "?c:Cup ?p:Place ?q:Place") == "a Place that cup2 fits"
     assert reason([RelationCondition("fits", ("?c", "?p"))]) == "cup2 fits sink, which does not hold"
     both = [RelationCondition("canReach", ("?h", "?p")), RelationCondition("fits", ("?c", "?p"))]
     assert reason(both) in ("a Hand that canReach sink", "cup2 fits sink, which does not hold")
     pair = [RelationCondition("canReach", ("?h", "?q")), RelationCondition("fits", ("cup1", "?q"))]
     assert reason(pair, "?c:Cup ?p:Place ?h:Hand ?q:Place") == (
-        "nothing satisfies some Hand canReach some Place and cup1 fits some Place"
+        "some Hand canReach some Place and cup1 fits some Place, which nothing satisfies"
     )
 
 
