@@ -1,12 +1,12 @@
-"""What each step of a plan is for: the causal links to the goal, to the step above it, or to the later step that needs it.
+"""The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A step is needed by a later one of its level if that one can't be done, or doesn't do what is needed of it, in the same state
-but for one fact that the earlier step gave, which is put back to what it was before. So a link is found whatever kind of
-condition makes it ("nobody stands there" as well as "the hand holds it"), and `confab.planner.validation` rejects the rest of
-the plan without it. Each level has its own order of steps; where a plan leaves a level, the steps below stand in it.
+A later step of the same level needs an earlier one if, in the same state but with one fact that the earlier step gave restored to
+its previous value, it isn't applicable or no longer has the effects that are needed. So a link is found for any kind of condition
+("no object stands there" as well as "the hand holds it"), and `confab.planner.validation` rejects the rest of the plan without the
+earlier step. Each level has its own sequence of steps; where a plan leaves a level, the steps below take their place.
 
-What a step is asked to look at is noted while it looks, so that only facts that it read are put back: the effort grows with
-what the plan's steps read and not with the square of its length.
+The facts that a step reads are recorded, and only these are restored: the effort grows with what the steps of the plan read, and
+not with the square of its length.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ Path = tuple[int, ...]
 
 
 class Kind(Enum):
-    """What needs a fact."""
+    """The kind of a need for a fact."""
 
-    GOAL = "goal"  # it is wanted in the end
-    ABOVE = "above"  # the step above brings it about, or leaves it as it was
-    REST = "rest"  # it is the rest value of what was touched
-    LATER = "later"  # a later step of the same level asks for it, or does what it does because of it
+    GOAL = "goal"  # a goal
+    ABOVE = "above"  # an effect, or an unchanged fact, of the step above
+    REST = "rest"  # the rest value of a symbol that was changed
+    LATER = "later"  # a precondition of a later step of the same level, or a fact on which its effects depend
 
 
 @dataclass(frozen=True)
 class Change:
-    """A fact that a step makes true, and the value that the symbol had before."""
+    """A fact that a step makes true, with the symbol's previous value."""
 
     fact: Fact
     before: str
@@ -45,11 +45,11 @@ class Change:
 
 @dataclass(frozen=True)
 class Need:
-    """What would break without some of what a step gives.
+    """A need for some of the facts that a step gives.
 
-    `gives` are the facts at issue; `by` is the path of the step that needs them, empty for the goal and for what is at rest in the
-    end of the whole plan. `conditions` are the preconditions of a later step that fail without them, with individuals put in; none
-    where it could be done all the same and would do something else. Of the goal, they are what follows from the facts.
+    `gives` are these facts. `by` is the path of the step that needs them; it is empty for the goal and for rest values at the end
+    of the plan. `conditions` are the preconditions of a later step that fail without them, with individuals; empty if the step
+    would be applicable and have other effects. For a goal, they are the defined goals that follow from the facts.
     """
 
     kind: Kind
@@ -60,7 +60,10 @@ class Need:
 
 @dataclass(frozen=True)
 class Purpose:
-    """What a step gives, as its level says it, and what needs it: the nearest first. No need: the goal is reached without it."""
+    """The facts that a step gives, as its level sees them, and their needs, nearest first.
+
+    Without a need, the goal is reached without it.
+    """
 
     gives: tuple[Change, ...]
     needs: tuple[Need, ...]
@@ -87,7 +90,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
 
 
 def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
-    """Return the order of a step's needs: the goal, those beside it, the step above, those elsewhere, what is at rest."""
+    """Return the order of a step's needs: the goal, steps of the same refinement, the step above, other steps, rest values."""
     order = {Kind.GOAL: 0, Kind.ABOVE: 2, Kind.REST: 4}
 
     def key(need: Need) -> tuple[int, Path]:
@@ -98,7 +101,7 @@ def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
 
 
 def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
-    """Yield the steps of a level in order; where it is left or ends, those that stand in its place."""
+    """Yield the steps of a level in order; where the plan leaves the level, the steps in their place."""
     for step in steps:
         if step.level >= level or not step.steps:
             yield step
@@ -108,14 +111,14 @@ def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
 
 @dataclass
 class _Written:
-    """Who gave a cell its value, and what it was before."""
+    """The step that gave a cell its value, and the value before."""
 
     by: int
     before: str
 
 
 class _Noting(Facts):
-    """Facts that note which cells they are asked for, and which holders of which value."""
+    """Facts that record which cells are read, and which holders of which value."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -132,7 +135,7 @@ class _Noting(Facts):
 
 
 class _Course:
-    """The steps of one level, carried out in their order."""
+    """The steps of one level, executed in order."""
 
     def __init__(self, problem: Problem, plan: Plan, level: int) -> None:
         self.problem, self.level = problem, level
@@ -177,13 +180,13 @@ class _Course:
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return what a step says it changes now; None if it can't be done."""
+        """Return the changes of a step in the present state; None if it isn't applicable."""
         behavior = self.problem.domain.behaviors[step.behavior]
         found = self.rules.changes(behavior, step.arguments, self.facts)
         return None if found is None else {(situation, key): value for situation, key, value in found}
 
     def asked(self, step: Step) -> Iterator[tuple[int, tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]]]:
-        """Yield who gave what a step needs, the conditions that fail without it, or the cells that it would leave otherwise."""
+        """Yield the givers of what a step needs, with the conditions that fail without them or the cells that would differ."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
@@ -210,7 +213,7 @@ class _Course:
     def without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]] | None:
-        """Return what breaks for a step if cells have the values that they had before they were written; None if nothing does."""
+        """Return what fails for a step if cells have their previous values; None if nothing does."""
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
         now = {cell: str(facts.value(*cell)) for cell in cells}
@@ -236,7 +239,7 @@ class _Course:
         return (changes, (), differs) if differs else None
 
     def goes_on(self, cell: Cell, before: str) -> _Written | None:
-        """Return who gave an amount of which something was used up: it would have been so much less without that one, too."""
+        """Return the givers of an amount that was consumed: without any of them it would have been less."""
         if cell not in self.written or not self.counted(cell):
             return None
         less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
@@ -244,11 +247,11 @@ class _Course:
         return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
 
     def counted(self, cell: Cell) -> bool:
-        """Whether a cell has an amount: a step that changes one goes on from what it was."""
+        """Whether a cell has an amount: a step that changes an amount depends on the amount before."""
         return self.problem.domain.situations[cell[0]].quantity is not None
 
     def done(self, number: int, step: Step) -> None:
-        """Carry a step out, with all below it, and note what it gave."""
+        """Execute a step with all steps below it, and record what it gave."""
         mark = len(self.facts.log)
         for primitive in Plan((step,)).primitives:
             for cell, value in (self.changes(primitive) or {}).items():
@@ -264,7 +267,7 @@ class _Course:
     def left(
         self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
     ) -> Iterator[tuple[Path, Need]]:
-        """Yield what a group of steps, of the step above or of the whole plan (level 0), has to leave, with who gave it."""
+        """Yield the facts that steps have to leave for the step above (or the plan, if level is 0), with their givers."""
         touched = dict[Cell, str]()
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)
@@ -285,7 +288,10 @@ class _Course:
             yield self.steps[written.by].path, Need(why, (Change(Fact(symbol, value), written.before),), path)
 
     def followed(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
-        """Yield who gave what a goal follows from that is defined: what it read, without which it wouldn't be as it is wanted."""
+        """Yield the givers of the facts from which a defined goal follows.
+
+        Those that it read and without which it wouldn't hold.
+        """
         if cell[0] not in self.problem.domain.rules:
             return
         facts = self.facts
@@ -306,7 +312,7 @@ class _Course:
                 yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
 
     def otherwise(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[Change, ...]:
-        """Return what some cells were changed by, if what is defined would be otherwise without that; else nothing."""
+        """Return the changes of some cells if a defined situation would differ without them; otherwise nothing."""
         facts, mark = self.facts, len(self.facts.log)
         now = {other: str(facts.value(*other)) for other in cells}
         for other in cells:
@@ -324,5 +330,5 @@ class _Course:
 
 
 def _least(steps: Sequence[Step]) -> int:
-    """Return the most abstract level that steps beside each other have."""
+    """Return the most abstract level of steps of the same parent."""
     return min((step.level for step in steps), default=0)

@@ -1,13 +1,13 @@
-"""Does a certificate prove that a task has no plan? A checker that shares no code with any search.
+"""Does a certificate prove that a task has no plan? This checker shares no code with any search.
 
-It works on the whole task and on its lowest level: what an upper level can't do proves nothing. With behaviours and conditions as
-they are written (`confab.planner.possibilities`) it verifies that the certificate's set of states
+It checks the whole task on its lowest level, since what an upper level can't do proves nothing. It reads behaviours and conditions
+as they are written (`confab.planner.possibilities`) and verifies that the certificate's set of states
 
-1. contains the state in which the task begins;
-2. is left by no behaviour of the lowest level: each case is taken up and whatever can be done in it is done;
-3. contains no state in which the goal holds and what has a rest value is at rest, or as it was in the beginning.
+1. contains the initial state;
+2. is closed: no behaviour of the lowest level leads out of it. Each case is expanded with all applicable behaviours;
+3. contains no state in which the goal holds and each symbol with a rest value has that value, or its initial one.
 
-A plan of several levels, carried out, is a sequence of behaviours of the lowest level that ends in such a state (docs/levels.md).
+A plan of several levels is a sequence of behaviours of the lowest level that ends in such a state (docs/levels.md).
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 OTHER, ANY, KEPT = "", "?", "="
-"""In a case: none of the values told apart; whichever value; in what comes after it: the value of before."""
+"""Entries of a case: none of the distinguished values; any value; in a successor: the value before."""
 WORK = 3_000_000
-"""How much a check may do: tests of conditions, and behaviours tried in a case."""
+"""Maximum work of a check: tests of conditions, and behaviours tried in a case."""
 MOST_CASES = 200_000
 
 T = TypeVar("T")
 Case: TypeAlias = "tuple[str, ...]"
 Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
-"""What a behaviour makes of a case: the entries that change, each with what it may become, or None if it can't be done; and what
-it breaks of that which never or always holds."""
+"""The result of a behaviour in a case: the entries that change, each with its possible values, or None if the behaviour isn't
+applicable; and the claim "never" or "always" that it violates."""
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
-    """Return why a certificate proves nothing of a problem; None if it proves that there is no plan."""
+    """Return why a certificate doesn't prove that a problem has no plan; None if it does."""
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
@@ -65,7 +65,7 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
 
 
 class Decisions(Generic[T]):
-    """What came of cases, by the entries that it depends on, one asked for after the other."""
+    """A trie of results, indexed by the entries of the case on which they depend."""
 
     def __init__(self) -> None:
         self.at: int | None = None
@@ -73,14 +73,14 @@ class Decisions(Generic[T]):
         self.below: dict[str, Decisions[T]] = {}
 
     def find(self, case: Case) -> T | None:
-        """Return what is known to come of a case."""
+        """Return the known result for a case."""
         node: Decisions[T] | None = self
         while node is not None and node.at is not None:
             node = node.below.get(case[node.at])
         return None if node is None else node.found
 
     def learn(self, case: Case, reads: Iterable[int], found: T) -> None:
-        """Remember what came of a case, by the entries that were asked for."""
+        """Store a result under the entries that were read."""
         node = self
         for at in dict.fromkeys(reads):
             node.at = at
@@ -90,7 +90,7 @@ class Decisions(Generic[T]):
 
 @dataclass
 class View:
-    """What is known in one case; `reads` are the entries that were asked for, in order, and `unknown` what nothing is known of."""
+    """Knowledge about one case; `reads` lists the entries that were read, `unknown` the symbols without an entry."""
 
     claims: Claims
     case: Case
@@ -144,7 +144,7 @@ class View:
         return True
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol has in the case."""
+        """Return the range of amounts of a symbol in the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -158,7 +158,7 @@ class View:
 
 
 class Claims:
-    """A certificate made ready to be asked: places of what is told apart, bounds of amounts."""
+    """A certificate prepared for queries: positions of distinguished symbols, bounds of amounts."""
 
     def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
         self.lowest, self.certificate = lowest, certificate
@@ -168,11 +168,11 @@ class Claims:
         self._ranges: dict[Symbol, Range] = {}
 
     def entry(self, at: int, value: str) -> str:
-        """Return how a case has a value."""
+        """Return the entry of a case for a value."""
         return value if not self.apart[at] or value in self.apart[at] else OTHER
 
     def range(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol may have in any case."""
+        """Return the range of amounts of a symbol in all cases."""
         if symbol not in self._ranges:
             found = self.allowed(symbol)
             always = self.certificate.always.get(symbol)
@@ -186,21 +186,21 @@ class Claims:
         return self._ranges[symbol]
 
     def allowed(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol's situation type allows, with the one of the beginning."""
+        """Return the range that the situation type of a symbol allows, with the initial amount."""
         quantity, first = self.lowest.quantity(symbol.situation), number(self.lowest.initial(symbol))
         low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
         high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
         return Range(min(low, first), max(high, first))
 
     def broken(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol that gets this value breaks what never or always holds."""
+        """Whether a symbol with this value violates a claim "never" or "always"."""
         always = self.certificate.always.get(symbol)
         return (always is not None and always != value) or Fact(symbol, value) in self.certificate.never
 
 
 @dataclass
 class Try:
-    """A behaviour with its individuals, and what is known of what it makes of cases."""
+    """A behaviour with its individuals, and its known results."""
 
     behavior: Behavior
     env: Mapping[str, str]
@@ -208,9 +208,11 @@ class Try:
 
 
 class Cases:
-    """All cases of a certificate, from the first one on: `came_from` has each with the one before and the behaviour that led there.
+    """All cases of a certificate, from the initial one on.
 
-    `fault` says what breaks the certificate, `reached` is a case in which the goal may hold.
+    `came_from` maps each case to its predecessor and the behaviour between them.
+
+    `fault` says what invalidates the certificate; `reached` is a case in which the goal may hold.
     """
 
     def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
@@ -224,7 +226,7 @@ class Cases:
     # ---------------------------------------------------------------------------------------------------- beginning
 
     def first(self) -> Case | None:
-        """Return the case in which the task begins; None, with the fault, if some claim doesn't hold there."""
+        """Return the initial case; None, with `fault` set, if some claim doesn't hold there."""
         lowest, certificate = self.lowest, self.certificate
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
             if not lowest.exists(symbol.situation, symbol.arguments):
@@ -258,14 +260,14 @@ class Cases:
     # ------------------------------------------------------------------------------------------------------- search
 
     def explore(self) -> None:
-        """Take up all cases, breadth first. Stop at a fault, or where the goal may hold."""
+        """Expand all cases, breadth first. Stop at a fault, or at a case in which the goal may hold."""
         first = self.first()
         if first is None:
             return
         tries = list(self.tries())
         self.came_from[first] = (first, None)
         queue = [first]
-        for case in queue:  # which grows
+        for case in queue:  # the queue grows
             if self.ends_here(case):
                 self.reached = case
                 return
@@ -296,7 +298,7 @@ class Cases:
             yield tuple(following)
 
     def tries(self) -> Iterator[Try]:
-        """Yield the behaviours, with individuals, that may change what is told apart, or break what never or always holds."""
+        """Yield the behaviours, with individuals, that may change a distinguished value or violate a claim."""
         known = Reading(self.lowest, View(self.claims, (ANY,) * len(self.claims.symbols)))
         seen: set[tuple[str, tuple[tuple[str, str], ...]]] = set()
         wanted: dict[str, dict[tuple[Symbol, str | None], None]] = {}
@@ -323,7 +325,7 @@ class Cases:
     # -------------------------------------------------------------------------------------------- one try in one case
 
     def after(self, one: Try, case: Case) -> Leaf:
-        """Return what a behaviour makes of a case; remembered by the entries that this depends on."""
+        """Return the result of a behaviour in a case; stored by the entries on which it depends."""
         known = one.known.find(case)
         if known is None:
             view = View(self.claims, case)
@@ -332,7 +334,7 @@ class Cases:
         return known
 
     def effects(self, reading: Reading, one: Try) -> Leaf:
-        """Return what a behaviour may change, as far as the certificate speaks of it."""
+        """Return the possible changes of a behaviour, as far as the certificate concerns them."""
         behavior, env, claims = one.behavior, one.env, self.claims
         if not all(reading.holds(condition, env, behavior.kinds) for condition in behavior.preconditions):
             return None, ""
@@ -373,7 +375,7 @@ class Cases:
         return tuple((at, tuple(dict.fromkeys(entries))) for at, entries in sorted(changes.items())), ""
 
     def _overruled(self, behavior: Behavior, env: Mapping[str, str], symbol: Symbol) -> bool:
-        """Whether an effect without condition gives a symbol a value after all others that is the one it always has."""
+        """Whether an unconditional effect certainly gives a symbol the value that it always has."""
         last = [
             env.get(effect.value, effect.value)
             for effect in behavior.effects
@@ -385,7 +387,7 @@ class Cases:
         return bool(last) and not others and not self.claims.broken(symbol, last[-1])
 
     def ends_here(self, case: Case) -> bool:
-        """Whether in some state of a case the goal holds, and what is to be at rest is."""
+        """Whether the goal and the rest values hold in some state of a case."""
         known = self._ends.find(case)
         if known is None:
             view = View(self.claims, case)
@@ -395,7 +397,7 @@ class Cases:
         return known
 
     def met(self, reading: Reading, fact: Fact) -> bool:
-        """Whether a fact that is wanted in the end may hold; what isn't at rest in the beginning may stay so."""
+        """Whether a fact of the final state may hold; a symbol not at rest initially may keep its value."""
         symbol, wanted = fact.symbol, fact.value
         if reading.goal(symbol, wanted):
             return True
@@ -403,7 +405,7 @@ class Cases:
 
 
 def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
-    """Whether a fact is a goal, or a rest value that a plan has to leave if it touches the symbol."""
+    """Whether a fact is a goal, or a rest value that a plan has to restore if it changes the symbol."""
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
@@ -412,7 +414,7 @@ def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
 
 
 def own_variables(behavior: Behavior) -> frozenset[str]:
-    """Return the parameters of a behaviour, and the variables that its preconditions determine."""
+    """Return the parameters of a behaviour and the variables that its preconditions determine."""
     found = {parameter.name for parameter in behavior.parameters}
     return frozenset(found.union(*(variables(condition) for condition in behavior.preconditions)))
 
@@ -424,9 +426,11 @@ def unified(
     terms: tuple[str | None, ...],
     words: tuple[str | None, ...],
 ) -> dict[str, str] | None:
-    """Return which of a behaviour's own variables stand for what if an effect's terms are these words; None if they can't be.
+    """Return the bindings of a behaviour's own variables with which the terms of an effect equal some words.
 
-    No word is whichever.
+    None if there are none.
+
+    None in the place of a word matches any term.
     """
     found: dict[str, str] = {}
     for term, word in zip(terms, words, strict=True):
@@ -442,5 +446,5 @@ def unified(
 
 
 def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield the individuals for a behaviour's own variables with which it may be done, some of them given."""
+    """Yield the bindings of a behaviour's own variables with which it may be applicable, given some of them."""
     yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

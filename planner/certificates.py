@@ -1,8 +1,10 @@
-"""What proves that a task has no plan: a set of states that the task never leaves and in which the goal doesn't hold.
+"""A certificate proves that a task has no plan.
 
-The set is described in three ways, which go together. Some facts *never* hold. Some symbols *always* keep their value, or an
-amount stays within bounds. And of some symbols the values are *told apart*: of all combinations of these values only some are
-reached, and those are counted. With nothing told apart there is one combination; with everything told apart, each is a state.
+A set of states that contains the initial state, is closed, and violates the goal.
+
+Three kinds of claims describe the set. Some facts *never* hold. Some symbols *always* keep their value, or an amount stays within
+bounds. The values of some symbols are *told apart* (distinguished): only some combinations of these values, the cases, are
+reachable, and their number is stated. If no value is distinguished there is one case; if all are, each case is a state.
 
 `confab.planner.certificate_checks` verifies a certificate, `confab.planner.certifying` finds one.
 """
@@ -44,14 +46,14 @@ class Certificate:
 
     @property
     def kind(self) -> str:
-        """What kind of description it is, in a word or two."""
+        """The kind of the description, in a word or two."""
         if not self.told_apart:
             return "facts"
         return "pair" if len(self.told_apart) == 2 and all(map(len, self.told_apart.values())) else "cases"
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """Return a certificate as JSON, facts as lists: situation type, arguments, value."""
+    """Return a certificate as JSON data; a fact is a list of situation type, arguments and value."""
     return {
         "format": FORMAT,
         "never": [_listed(fact) for fact in sorted(certificate.never)],

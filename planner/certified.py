@@ -1,4 +1,4 @@
-"""The door through which an "unsolvable" leaves: with a certificate that an independent checker accepts, or as given up."""
+"""Every "unsolvable" passes this module: with a certificate that an independent checker accepts, or changed to "gave up"."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from confab.planner.certificates import Certificate
 
 ADDED_UP = 200_000
-"""Maximum rows of a join that is made to find out by how much an amount falls short."""
+"""Maximum number of rows of a join that determines by how much an amount falls short."""
 
 
 def certified(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return an outcome; "unsolvable" with a certificate that the checker accepts, or as given up where there is none.
+    """Return an outcome: "unsolvable" only with a certificate that the checker accepts, otherwise "gave up".
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
 
 def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
-    """Return by how much an amount falls short, which says more than the combinations in which it does."""
+    """Return by how much an amount falls short, which is more specific than the combinations in which it does."""
     if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
         return None
     from confab.planner.grounded.grounding import ground

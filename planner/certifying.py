@@ -1,12 +1,14 @@
 """Find a certificate that a task has no plan.
 
-First: what can be brought about at all, if nothing that was brought about ever ceased to hold? That is asked backwards from the
-goal, so that only what could matter is looked at; what is needed and can't be brought about never holds.
+First step: relaxed reachability. Assume that no fact ceases to hold; which facts can become true? The question is asked backwards
+from the goal, so that only relevant facts are considered. A required fact that can't become true never holds.
 
-Where the goal could be brought about in this way, few values are told apart, at first the goal's, and the cases are searched. A way
-to the goal through the cases is tried out on the task itself; the values on which it fails there are told apart, too, until there
-is no way left, or the way succeeds: then there is a plan. Last, all values are told apart: the cases are then the states. The
-number of cases may be infinite in one of these ways and small in another; so each is given little work first, and then more.
+Second step, if the goal is reachable in this way: distinguish few values, at first those of the goal, and search the cases, the
+combinations of these values. A path through the cases to the goal is executed on the task itself. The values on which it fails are
+distinguished too, until no path is left, or a path succeeds: then there is a plan.
+
+Last step: distinguish all values; a case is then a state. One way may have infinitely many cases and another few, so each way is
+tried with a small limit of work first, and then with a larger one.
 """
 
 from __future__ import annotations
@@ -37,21 +39,21 @@ from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
-"""How much may be done to find a certificate: tests of conditions, and behaviours tried in a case."""
+"""Maximum work to find a certificate: tests of conditions, and behaviours tried in a case."""
 LITTLE = 2_000, 20_000
-"""So many tests for each goal by itself, and then so many, before all of them are looked into to the end."""
+"""Maximum number of tests per goal in the first and in the second round, before all goals are examined to the end."""
 PAIR, SHARE = 100_000, 0.5
 """Maximum number of tests for each pair of goals; each way to tell cases apart may take this share of the tests that are left."""
 FEW = 3
-"""If more values of a symbol are to be told apart, all are."""
+"""Maximum number of distinguished values of a symbol; beyond it, all its values are distinguished."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
-"""What may be impossible: that a symbol comes to have a value (`GETS`), comes to have another one (`LEAVES`; of an amount: by how
-much), or that something wanted in the end holds (`ENDS`)."""
+"""Kinds of questions about reachability: whether a symbol can get a value (`GETS`), can lose its value (`LEAVES`; for an amount,
+by how much), or whether a condition on the final state can hold (`ENDS`)."""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
 
 
 def certify(problem: Problem, most: float = WORK) -> Certificate | None:
-    """Return a certificate that a task has no plan; None if none is found with so much work, or there is a plan."""
+    """Return a certificate that a task has no plan; None if the allowed work doesn't find one, or if there is a plan."""
     if not problem.domain.levels:
         return None
     lowest = Lowest(problem, most)
@@ -69,7 +71,7 @@ def certify(problem: Problem, most: float = WORK) -> Certificate | None:
 
 
 def _at_once(lowest: Lowest, little: int) -> Certificate | None:
-    """Return a certificate for a goal of which little has to be asked; each is asked for by itself, with so much work."""
+    """Return a certificate for a single goal, each goal tried by itself with a small limit of work."""
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         alone = {symbol: wanted}
         if (found := _with_little(lowest, little, partial(Relaxed(lowest).certificate, alone))) is not None:
@@ -80,7 +82,7 @@ def _at_once(lowest: Lowest, little: int) -> Certificate | None:
 
 
 def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
-    """Return the certificate that is found with so much work; None if there is none or it takes more."""
+    """Return the certificate that the allowed work finds; None if there is none or it takes more."""
     most = lowest.most
     try:
         lowest.most = min(most, lowest.work + little)
@@ -92,7 +94,7 @@ def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate |
 
 
 def _contested(lowest: Lowest) -> Certificate | None:
-    """Return a certificate for two goals that want one value which only one symbol has at a time."""
+    """Return a certificate for two goals that require a value which only one symbol has at a time."""
     wanting: dict[tuple[str, str], list[Symbol]] = {}
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         kind = lowest.problem.domain.situations[symbol.situation]
@@ -108,16 +110,17 @@ def _contested(lowest: Lowest) -> Certificate | None:
 
 
 class Relaxed:
-    """What can be brought about if nothing that was brought about ever ceases to hold; found out backwards from what is asked.
+    """Relaxed reachability, computed backwards from what is asked.
 
-    What is asked for the first time counts as impossible until a way to it is found; then all that relied on it is asked again.
+    A question that is asked for the first time counts as impossible until a way to it is found; then all answers that depend on it
+    are computed again.
     """
 
     def __init__(self, lowest: Lowest) -> None:
         self.lowest, self.problem = lowest, lowest.problem
         self.possible: set[Key] = set()
         self.ranges: dict[Symbol, Range] = {}
-        self.reads: dict[Key, None] = {}  # what was asked while one key was looked into
+        self.reads: dict[Key, None] = {}  # the questions asked while one question is examined
         self._readers: dict[Key, dict[Key, None]] = {}
         self._waiting: dict[Key, None] = {}
         self._asking: Key | None = None
@@ -125,13 +128,13 @@ class Relaxed:
     # ------------------------------------------------------------------------------------------- what is known, so far
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol can come to have a value."""
+        """Whether a symbol can get a value."""
         if self.lowest.initial(symbol) == value:
             return True
         return value in self.lowest.given[symbol.situation] and self._ask((GETS, symbol, value))
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol can come to have another value."""
+        """Whether a symbol can get another value."""
         if self.lowest.initial(symbol) != value:
             return True
         if self.problem.domain.situations[symbol.situation].boolean:
@@ -139,7 +142,7 @@ class Relaxed:
         return self._ask((LEAVES, symbol, value))
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol can come to have."""
+        """Return the amounts that a symbol can get."""
         first = self.lowest.initial(symbol)
         self._ask((LEAVES, symbol, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))
@@ -156,7 +159,7 @@ class Relaxed:
     # ------------------------------------------------------------------------------------------------------ finding out
 
     def reachable(self, key: Key) -> bool:
-        """Find out whether something can be brought about."""
+        """Determine whether the answer to a question is yes."""
         self._asking = None
         self._ask(key)
         while self._waiting and key not in self.possible:
@@ -167,12 +170,12 @@ class Relaxed:
         return key in self.possible
 
     def look(self, key: Key) -> Reading:
-        """Return what conditions are read with while something is looked into; `reads` will have what is asked."""
+        """Return the reader of conditions for one question; `reads` records the questions that it asks."""
         self._asking, self.reads = key, {}
         return Reading(self.lowest, self)
 
     def _news(self, key: Key) -> bool:
-        """Look into something again; whether it is possible only now, or the range of an amount wider than before."""
+        """Examine a question again; return whether its answer has changed: now possible, or a wider range of an amount."""
         kind, symbol, _ = key
         reading = self.look(key)
         if kind == LEAVES and self.lowest.quantity(symbol.situation) is not None:
@@ -183,14 +186,14 @@ class Relaxed:
         return True
 
     def brought_about(self, reading: Reading, key: Key) -> bool:
-        """Whether there is a way to something, as far as is known."""
+        """Whether the answer to a question is yes, as far as is known."""
         kind, symbol, value = key
         if kind == ENDS:
             return reading.goal(symbol, value)
         return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
 
     def possible_ways(self, reading: Reading, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
-        """Yield the behaviours, with individuals, that may give a symbol a value, or another one than that."""
+        """Yield the behaviours, with individuals, that may give a symbol a value, or a value other than that."""
         for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
             words = (*symbol.arguments, None if other else value)
             for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
@@ -206,7 +209,7 @@ class Relaxed:
         terms: tuple[str, ...],
         words: tuple[str | None, ...],
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals with which a behaviour may be done so that the terms of an effect become some words."""
+        """Yield the individuals for a behaviour's variables with which the terms of an effect become the given words."""
         own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
         given = unified(self.problem, behavior, own, terms, words)
         if given is None:
@@ -239,7 +242,7 @@ class Relaxed:
     # ------------------------------------------------------------------------------------------------------ certificate
 
     def certificate(self, goal: State) -> Certificate | None:
-        """Return a certificate if something of a goal can't be brought about."""
+        """Return a certificate if some part of a goal isn't reachable."""
         for symbol, wanted in sorted(goal.items()):
             key = ENDS, symbol, wanted
             if not self.reachable(key):
@@ -248,7 +251,7 @@ class Relaxed:
         return None
 
     def claims(self, keys: Iterable[Key]) -> tuple[set[Fact], dict[Symbol, str]]:
-        """Return all that never or always holds and that some impossible things rest on."""
+        """Return all claims "never" and "always" on which some impossible facts depend."""
         never, always = set[Fact](), dict[Symbol, str]()
         seen, waiting = set[Key](), list(keys)
         while waiting:
@@ -299,7 +302,7 @@ def _number(effect: AmountEffect) -> bool:
 
 
 def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate by cases of two goals, of all goals, or by all states, whichever takes the least work."""
+    """Return a certificate by cases: of two goals, of all goals, or of all states, whichever takes the least work."""
     for little in (LITTLE[1], lowest.most):
         for find in (
             partial(_by_pairs, lowest, relaxed),
@@ -312,7 +315,7 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate for two goals about the same individual that can't hold together, with what has to be at rest."""
+    """Return a certificate for two goals about the same individual that can't hold together, rest values included."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
         if a in other.arguments or b in one.arguments:  # one is about the value of the other: these come first
@@ -328,7 +331,7 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
-    """Tell values apart, one after the other, until no case is left in which the goal, or some of it, could hold."""
+    """Distinguish one value after the other until the goal, or part of it, holds in no case."""
     certificate = Certificate(cases=0)
     while True:
         cases = Cases(lowest, certificate)
@@ -344,7 +347,7 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | No
 
 
 def _by_states(lowest: Lowest) -> Certificate | None:
-    """Tell all values apart; each case is then a state, and in none of them the goal holds and what was touched is at rest."""
+    """Distinguish all values; each case is a state, and none of them satisfies the goal and all rest values."""
     problem = lowest.problem
     told_apart: dict[Symbol, tuple[str, ...]] = {}
     for name in sorted(lowest.changing):
@@ -366,7 +369,7 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without the symbols that needn't be told apart, as far as little work shows it for each."""
+    """Return a certificate without the symbols that needn't be distinguished, as far as little work shows it for each."""
     for symbol in sorted(found.told_apart):
         fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
         work = min(LITTLE[1], SHARE * (lowest.most - lowest.work))
@@ -375,20 +378,20 @@ def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
 
 
 def _closed(lowest: Lowest, certificate: Certificate) -> Cases | None:
-    """Return the cases of a certificate if the goal holds in none that can be reached."""
+    """Return the cases of a certificate if the goal holds in none of the reachable ones."""
     cases = Cases(lowest, certificate)
     cases.explore()
     return None if cases.fault or cases.reached is not None else cases
 
 
 def _counted(lowest: Lowest, certificate: Certificate) -> Certificate | None:
-    """Return a certificate with the number of its cases, if it is one."""
+    """Return a certificate with the number of its cases, if it is valid."""
     cases = _closed(lowest, certificate)
     return None if cases is None else replace(certificate, cases=len(cases.came_from))
 
 
 def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
-    """Return a few facts of which one at least is unmet in each case."""
+    """Return a few facts of which at least one is unmet in each case."""
     failing = {
         fact: {case for case in cases.came_from if not cases.met(Reading(cases.lowest, View(cases.claims, case)), fact)}
         for fact in unmet
@@ -402,7 +405,10 @@ def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
 
 
 def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certificate | None:
-    """Return a certificate that tells apart what a way through the cases fails on; None if it succeeds."""
+    """Return a certificate that also distinguishes the values on which a path through the cases fails.
+
+    None if the path succeeds.
+    """
     lowest, problem = cases.lowest, cases.problem
     path: list[tuple[Case, Try, Case]] = []
     while True:
@@ -438,7 +444,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
 
 
 def _wrong(view: View, facts: Facts) -> list[tuple[Symbol, str, bool]]:
-    """Return what was taken for possible in a case and isn't so in the state that one is really in."""
+    """Return the facts that a case assumes and the actual state doesn't have."""
     found = []
     for symbol, value, has in view.unknown or ():
         now = facts.value(symbol.situation, symbol.arguments)
@@ -448,7 +454,7 @@ def _wrong(view: View, facts: Facts) -> list[tuple[Symbol, str, bool]]:
 
 
 def _is(cases: Cases, facts: Facts, case: Case, exactly: bool) -> bool:
-    """Whether a state is one of a case."""
+    """Whether a state belongs to a case."""
     for at, symbol in enumerate(cases.claims.symbols):
         now = facts.value(symbol.situation, symbol.arguments) or FALSE
         if (case[at] == ANY and exactly) or (case[at] != ANY and cases.claims.entry(at, now) != case[at]):
@@ -461,7 +467,7 @@ def _met(problem: Problem, facts: Facts, fact: Fact) -> bool:
 
 
 def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
-    """Return what would have to be at rest in a state, or as in the beginning, and isn't."""
+    """Return the facts about rest values, or initial values, that a state would need and doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):
         rest = problem.domain.situations[symbol.situation].rest
@@ -473,7 +479,7 @@ def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
 
 
 def _told_apart(cases: Cases, relaxed: Relaxed, wrong: Iterable[tuple[Symbol, str, bool]]) -> Certificate | None:
-    """Return a certificate that says of what was taken for possible that it never holds, or tells it apart."""
+    """Return a certificate that claims of an assumed fact that it never holds, or distinguishes it."""
     certificate, lowest = cases.certificate, cases.lowest
     apart = dict(certificate.told_apart)
     impossible = []

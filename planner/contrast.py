@@ -19,21 +19,21 @@ from confab.planner.validation import Facts, Rules, successor, validate
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]
-"""Plans: `confab.planner.solve.solve` with whatever mode and limits."""
+"""A planning function: `confab.planner.solve.solve` with some mode and limits."""
 
 
 class NoChoiceError(ValueError):
-    """The choice that is asked for isn't there to be made; the message says why."""
+    """The requested choice doesn't exist; the message says why."""
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """What became of an alternative.
+    """The result of asking for an alternative.
 
-    `behavior` and `arguments` are the step that was asked for (where one was), `instead` the step in whose place it is done. With
-    `lacks`, it can't be done: these conditions fail there. With `plan`, that is what follows from the beginning to the end, and
-    `cost` and `before` are what it and the plan that it is compared with cost. With `reason`, no plan follows. With none of
-    these, `instead` is that very step: the plan has it.
+    `behavior` and `arguments` are the requested step, if one was; `instead` is the step that it replaces. `lacks`: the step isn't
+    applicable, these conditions fail. `plan`: the complete plan with the alternative; `cost` and `before` are its cost and that of
+    the plan that it is compared with. `reason`: no plan with the alternative was found. With none of these, the plan already has
+    the step, `instead`.
     """
 
     before: float
@@ -95,7 +95,7 @@ def instead_of(
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask) -> Contrast:
-    """Return what follows if an individual takes part wherever it could in what changes a symbol.
+    """Return the result if an individual takes part wherever it can in changes of a symbol.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) -> Behavior:
-    """Return a behaviour that changes a symbol only with an individual in one of its parts, if it has a part for it."""
+    """Return a behaviour that changes a symbol only with an individual in one of its roles, if it has such a role."""
     parts = [name for name, kind in behavior.kinds.items() if who in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip
@@ -128,7 +128,7 @@ def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) ->
             continue
         taken = tuple((EqualityCondition(part, who),) for part in parts)
         inner = tuple(substituted(condition, dict(pairs)) for condition in effect.when)
-        if inner:  # the change is made only where this holds, which may be what determines the terms
+        if inner:  # the change is made only under these conditions, which may determine the terms
             asks.append(AnyOf((*taken, (AnyOf((inner,), negated=True),))))
         else:
             asks.append(AnyOf((*taken, *((EqualityCondition(term, name, negated=True),) for term, name in pairs))))
@@ -153,14 +153,14 @@ def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
 
 
 def _alike(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
-    """Return how much a step is like another: by what takes part in both, then by what is done."""
+    """Return how similar two steps are: first by common individuals, then by the behaviour."""
     return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
 
 
 def _lacking(
     rules: Rules, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
 ) -> Contrast:
-    """Return where a behaviour lacks the fewest conditions, and which."""
+    """Return the position where a behaviour lacks the fewest conditions, and these conditions."""
     best: Contrast | None = None
     for step, facts in places:
         found, lacks = lacking(rules, behavior.preconditions, given, behavior.kinds, (facts,))
@@ -174,7 +174,7 @@ def _lacking(
 def _refined(
     problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
 ) -> tuple[Step | None, Reason | None]:
-    """Return a step with its refinement from a state, or why there is none."""
+    """Return a step with its refinement from a state, or the reason why there is none."""
     step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
     after = successor(problem, behavior, arguments, state)
     if behavior.level == problem.domain.levels[-1] or after is None or after == state:
@@ -191,7 +191,7 @@ def _refined(
 
 
 def _from(problem: Problem, level: int, state: State) -> Problem:
-    """Return what is left to be done from a state between two steps of a level, by behaviours of that level and those below."""
+    """Return the plan from a state between two steps of a level, by behaviours of that level and those below."""
     behaviors = {b.name: b for b in problem.domain.behaviors.values() if b.level >= level}
     goal = problem.goal_on(level)
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors), initial=state, goal=goal)

@@ -1,11 +1,11 @@
-"""What a plan gives up where it leaves a level (docs/levels.md).
+"""Conditions that a plan violates where it leaves a level (docs/levels.md).
 
-Where no plan of a level can be refined, steps of the level below stand in its place. They keep the conditions of their own level;
-what only the level above asks ("a filled cup isn't moved") they may break. Here that is said in the ontology's terms.
+If no plan of a level can be refined, steps of the level below take the place of its steps. They satisfy the conditions of their
+own level; they may violate conditions of the level above ("a filled cup isn't moved"). This module lists these violations.
 
-A level that is left is imagined to watch: it sees a change where a symbol that it knows comes to another value that it knows. What
-is between two such values (a cup in a hand) is nothing to it. For each change that it sees and that stays, some behaviour of that
-level should have been applicable that makes this change, maybe together with those just before it.
+An abandoned level is treated as an observer: it sees a change when a symbol that it knows gets another value that it knows. It
+doesn't see what happens in between (a cup in a hand). For each change that it sees and that persists, some behaviour of that level
+should have been applicable that makes this change, possibly together with the changes just before it.
 """
 
 from __future__ import annotations
@@ -30,31 +30,33 @@ from confab.reasoner.symbols import (
 )
 
 MOST_LACKING = 4
-"""Conditions that are left out together where it is asked which of them a behaviour lacks."""
+"""Maximum number of conditions that are left out together to find those that a behaviour lacks."""
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return where a valid plan leaves a level, and which conditions that only stand on that level are broken there.
+    """Return where a valid plan leaves a level, and which conditions of that level it violates there.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        One that `confab.planner.validation.validate` finds nothing wrong with.
+        `confab.planner.validation.validate` has to accept it.
     """
     return list(_Watch(problem).carried_out(plan.steps, 0))
 
 
 class _Watch:
-    """A plan being carried out, as each level sees it."""
+    """A plan under execution, as each level sees it."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.rules = Rules(problem)
         self.facts = Facts(problem, problem.initial)
         self.views = {level: Facts(problem, _seen(problem, level)) for level in problem.domain.levels}
-        self.left: dict[int, list[Broken]] = {}  # for each level that is left just now, what is broken so far
-        self.history: dict[int, list[tuple[Cell, str | None]]] = {}  # and what it saw change, with the values before
+        self.left: dict[int, list[Broken]] = {}  # for each abandoned level, the violations so far
+        self.history: dict[
+            int, list[tuple[Cell, str | None]]
+        ] = {}  # and the changes that it saw, with the values before
 
     def carried_out(self, steps: Sequence[Step], above: int) -> Iterator[Left]:
         level = next((level for level in self.problem.domain.levels if level > above), above)
@@ -69,7 +71,7 @@ class _Watch:
                 self.step(part[0])
 
     def broken(self, level: int) -> Iterator[Broken]:
-        """Yield what a stretch that is over has broken; what it changed and changed back doesn't count."""
+        """Yield the violations of a finished stretch; a change that was undone doesn't count."""
         before: dict[Cell, str | None] = {}
         for cell, old in self.history.pop(level):
             before.setdefault(cell, old)
@@ -96,7 +98,7 @@ class _Watch:
                     view.put(situation, arguments, value)
 
     def judged(self, level: int, step: Step, change: Fact) -> Iterator[Broken]:
-        """Yield what a change breaks, if no behaviour of the level could make it now."""
+        """Yield the violation of a change, if no behaviour of the level could make it now."""
         best: Broken | None = None
         for behavior in self.problem.domain.at_level(level):
             for effect in behavior.every_effect:
@@ -113,12 +115,12 @@ class _Watch:
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
 
     def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
-        """Return what the terms of an effect stand for if it is this change."""
+        """Return the bindings of an effect's terms if the effect is this change."""
         kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None
         said, is_ = effect.arguments, change.symbol.arguments
-        if isinstance(effect, ValueEffect):  # what comes of an amount is found out by doing it
+        if isinstance(effect, ValueEffect):  # the result of an amount is known only after execution
             said, is_ = (*said, effect.value), (*is_, change.value)
         for term, given in zip(said, is_, strict=True):
             if terms.setdefault(term, given) != given or (term not in kinds and term != given):
@@ -130,7 +132,7 @@ class _Watch:
     def could(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
     ) -> bool:
-        """Whether a behaviour could make a change, alone or together with others of its effects made just before."""
+        """Whether a behaviour could make a change, alone or together with the changes just before it."""
         view = self.views[level]
         conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         if self.rules.satisfied(conditions, terms, kinds, view) is not None:
@@ -157,7 +159,7 @@ class _Watch:
         return possible
 
     def mixed(self, level: int, symbol: Symbol) -> Facts:
-        """Return what holds now, but for the one symbol, which has the value that the level saw last."""
+        """Return the present state, except that one symbol has the value that the level saw last."""
         values = self.facts.state()
         seen = self.views[level].value(symbol.situation, symbol.arguments)
         return Facts(self.problem, values if seen is None else {**values, symbol: seen})
@@ -165,7 +167,7 @@ class _Watch:
     def nearest(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, symbol: Symbol
     ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
+        """Return the fewest conditions without which a behaviour would be applicable, with individuals."""
         conditions = (*behavior.preconditions, *effect.when)
         return lacking(self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level]))
 
@@ -173,13 +175,13 @@ class _Watch:
 def lacking(
     rules: Rules, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
 ) -> tuple[Bindings, tuple[Condition, ...]]:
-    """Return the fewest conditions without which the others hold in one of some states, with individuals put in.
+    """Return the fewest conditions without which the others hold in one of some states, with individuals.
 
-    Also returns with which individuals the others hold. More than `MOST_LACKING` are looked for one by one.
+    Also return the bindings with which the others hold. More than `MOST_LACKING` conditions are tested one by one.
     """
 
     def gives(number: int) -> bool:
-        """Whether a condition gives a variable its value: without it the others hold of what isn't there."""
+        """Whether a condition determines a variable; without it, the others would hold for individuals that don't exist."""
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 

@@ -190,7 +190,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why there is no plan: a sentence, and the facts or terms that it names."""
+    """Why there is no plan: a sentence, and the facts or terms in it."""
 
     text: str
     terms: tuple[str, ...] = ()
@@ -201,10 +201,12 @@ OUT_OF_MEMORY = Reason("there isn't enough memory to go on")
 
 @dataclass(frozen=True)
 class Broken:
-    """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.
+    """A change for which a condition of the level above fails.
 
-    `step` is the path of the primitive that makes the change. No behaviour: the level has none that could make this change.
-    `text` says it, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
+    `behavior` is the behaviour of that level that fails the fewest `conditions`.
+
+    `step` is the path of the primitive that makes the change. Without a behaviour: none of that level can make the change. `text`
+    is a sentence, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
     """
 
     step: tuple[int, ...]
@@ -221,7 +223,7 @@ class Broken:
 
 @dataclass(frozen=True)
 class Left:
-    """A stretch of a plan below a level, from the path of its first step to that of its last, and what it breaks."""
+    """A stretch of a plan below a level: the paths of its first and last steps, and the conditions that it violates."""
 
     level: int
     first: tuple[int, ...]
@@ -261,10 +263,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a planning call stops: seconds for the whole call (None: no limit), expansions, and work.
+    """Limits of a planning call: seconds for the whole call (None: no limit), expansions, and work.
 
-    Expansions are of each search in the paper's mode; in the default one of all before the last resort, and as many for that.
-    So is work, there alone, in states times operators (a microsecond each, about); once there is a plan it is no limit.
+    Expansions count per search in the paper's mode; in the default mode they count all searches before the last resort, and again
+    as many for the last resort. Work applies to the last resort only, in states times operators (about a microsecond each), and
+    only until there is a plan.
     """
 
     expansions: int = 200_000
@@ -274,8 +277,7 @@ class Limits:
     def end(self, share: float = 1.0) -> float | None:
         """Return when a share of the time from now on is over, on the clock of `perf_counter`; None: never.
 
-        The time ends with the seconds of these limits, or with the deadline that holds here (`confab.reasoner.limits`) if that
-        is earlier.
+        The time ends with the seconds of these limits, or with the current deadline (`confab.reasoner.limits`) if that is earlier.
         """
         left = min((seconds for seconds in (self.seconds, current().left) if seconds is not None), default=None)
         return None if left is None else perf_counter() + share * left
@@ -286,14 +288,14 @@ class Limits:
 
 
 class Planner(Protocol):
-    """Plans from scratch within limits."""
+    """A planning function within limits."""
 
     def __call__(self, problem: Problem, /, *, limits: Limits) -> Outcome:
-        """Return a plan, or why there is none."""
+        """Return a plan, or the reason why there is none."""
 
 
 class UnsolvableError(Exception):
-    """A proof that there is no plan came up: the reason, and the certificate if there is one already."""
+    """A proof that there is no plan was found: the reason, and the certificate if there is one already."""
 
     def __init__(self, reason: Reason, certificate: Certificate | None = None) -> None:
         super().__init__(reason.text)
@@ -306,7 +308,7 @@ class UngroundableError(Exception):
 
 @contextmanager
 def paused_collection() -> Iterator[None]:
-    """Pause the garbage collector: reading and planning make no cycles, and going through all of it took a third of the time."""
+    """Pause the garbage collector: reading and planning make no cycles, and collecting took a third of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:

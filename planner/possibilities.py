@@ -1,8 +1,8 @@
-"""What may hold, and what must, in a set of states of which only some values are known.
+"""Possible and necessary facts of a set of states of which only some values are known.
 
-Conditions are read as they are written, with two bounds: `may` is true unless the condition is false in all of the states, `must`
-is true only if it holds in all of them. For a single state of which everything is known both are what
-`confab.planner.validation` says. The checker of certificates rests on this; no search does.
+Conditions are evaluated with two bounds: `may` is true unless the condition is false in all of the states; `must` is true only if
+the condition holds in all of them. For a single, completely known state both agree with `confab.planner.validation`. The checker
+of certificates depends on this module; no search does.
 """
 
 from __future__ import annotations
@@ -40,44 +40,44 @@ Bound: TypeAlias = "Fraction | float"
 
 
 class WorkLimitError(Exception):
-    """A proof or a check needs more work than it is allowed."""
+    """A proof or a check needs more than the allowed work."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """The amounts that an expression may come to; if `partial`, it may also come to nothing."""
+    """The range of amounts of an expression; if `partial`, the expression may also have no value."""
 
     low: Bound
     high: Bound
     partial: bool = False
 
     def hull(self, other: Range) -> Range:
-        """Return the smallest range with both."""
+        """Return the smallest range that contains both."""
         return Range(min(self.low, other.low), max(self.high, other.high), self.partial or other.partial)
 
 
 LOOKS = 4_096
-"""After so many tests one looks at the clock."""
+"""Number of tests between two looks at the clock."""
 ANYTHING = Range(-math.inf, math.inf, True)
 
 
 class Knowledge(Protocol):
-    """What is known of the symbols that exist and that behaviours change."""
+    """Knowledge about the symbols that exist and that behaviours change."""
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has a value in some state."""
+        """Whether a symbol may have a value, that is, in some state."""
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has another value in some state."""
+        """Whether a symbol may have another value, that is, in some state."""
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol may have."""
+        """Return the range of amounts of a symbol."""
 
 
 class Lowest:
-    """A problem's lowest level, indexed by what its behaviours change.
+    """The lowest level of a problem, indexed by the symbols that its behaviours change.
 
-    `work` counts what was tested; above `most`, or after the deadline that holds here, it is given up.
+    `work` counts tests. `WorkLimitError` is raised when it exceeds `most`, or when the current deadline has passed.
     """
 
     def __init__(self, problem: Problem, most: float = math.inf) -> None:
@@ -105,10 +105,10 @@ class Lowest:
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
         self._inner: dict[int, tuple[Condition, ...]] = {}
         self._asked: dict[tuple[int, int], tuple[Condition, ...]] = {}
-        self._kept: list[object] = []  # so that no id is given twice
+        self._kept: list[object] = []  # keeps objects alive, so that no id is given twice
 
     def spend(self, work: int = 1) -> None:
-        """Count work; raise `WorkLimitError` where it is too much."""
+        """Count work; raise `WorkLimitError` if it exceeds the limit."""
         self.work += work
         if self.work > self.most:
             raise WorkLimitError(f"more than {self.most:.0f} tests")
@@ -116,7 +116,7 @@ class Lowest:
             raise WorkLimitError("more time than there is")
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
-        """Whether there is such a symbol: it is stated, or boolean and about individuals of the right classes."""
+        """Whether a symbol exists: it is stated, or it is boolean and its arguments are of the right classes."""
         if Symbol(situation, arguments) in self.problem.initial:
             return True
         kind = self.problem.domain.situations[situation]
@@ -128,15 +128,15 @@ class Lowest:
         )
 
     def initial(self, symbol: Symbol) -> str:
-        """Return the value that a symbol that exists has in the beginning."""
+        """Return the initial value of an existing symbol."""
         return self.problem.initial.get(symbol, FALSE)
 
     def quantity(self, situation: str) -> Quantity | None:
-        """Return what the amounts of a situation type are; None if its values aren't amounts."""
+        """Return the quantity of a situation type; None if its values aren't amounts."""
         return self.problem.domain.situations[situation].quantity
 
     def rows(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
-        """Return the tuples of a relation, by what stands at a position."""
+        """Return the tuples of a relation, indexed by the individual at a position."""
         if (relation, position) not in self._rows:
             found: dict[str, list[tuple[str, ...]]] = {}
             for row in sorted(self.problem.relations.get(relation, ())):
@@ -145,7 +145,7 @@ class Lowest:
         return self._rows[relation, position]
 
     def constant(self, condition: Condition) -> bool:
-        """Whether a condition that isn't nested is the same in all states."""
+        """Whether a condition without nested conditions has the same value in all states."""
         if isinstance(condition, ValueCondition):
             return condition.situation not in self.changing and condition.situation not in self.problem.domain.rules
         if isinstance(condition, Comparison):
@@ -153,7 +153,7 @@ class Lowest:
         return isinstance(condition, RelationCondition | ClassCondition | EqualityCondition)
 
     def steps(self, conditions: Sequence[Condition], bound: frozenset[str]) -> list[tuple[Condition, tuple[str, ...]]]:
-        """Return conditions in the order in which they are looked at, each with the variables that it finds values for."""
+        """Return conditions in the order of their evaluation, each with the variables that it binds."""
         key = id(conditions), bound
         if key not in self._steps:
             self._kept.append(conditions)
@@ -184,7 +184,10 @@ class Lowest:
         return 5 + len(unknown)
 
     def asked(self, behavior: Behavior, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
-        """Return a behaviour's preconditions with those of an effect; parameters are bound before nested ones are read."""
+        """Return the preconditions of a behaviour and the conditions of an effect.
+
+        Parameters are bound before nested conditions.
+        """
         key = id(behavior), id(when)
         if key not in self._asked:
             self._kept += [behavior, when]
@@ -193,7 +196,7 @@ class Lowest:
         return self._asked[key]
 
     def inside(self, witness: Witness) -> tuple[Condition, ...]:
-        """Return the conditions of a witness, its class among them."""
+        """Return the conditions of a witness, including its class."""
         if id(witness) not in self._inner:
             self._kept.append(witness)
             self._inner[id(witness)] = (ClassCondition(witness.variable, witness.kind), *witness.conditions)
@@ -201,7 +204,7 @@ class Lowest:
 
 
 class Reading:
-    """Conditions and effects of the lowest level, read by what is known of a set of states, which stays as it is meanwhile."""
+    """Evaluates conditions and effects of the lowest level on a set of states, which it doesn't change."""
 
     def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
         self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
@@ -210,7 +213,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------- values
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
-        """Whether a symbol may have a value, or must."""
+        """Whether a symbol may, or must, have a value."""
         lowest = self.lowest
         lowest.spend()
         if not lowest.exists(situation, arguments):
@@ -241,7 +244,7 @@ class Reading:
         return False
 
     def between(self, situation: str, arguments: tuple[str, ...]) -> Range | None:
-        """Return the amounts that a symbol may have; None if there is no such symbol."""
+        """Return the range of amounts of a symbol; None if the symbol doesn't exist."""
         if not self.lowest.exists(situation, arguments):
             return None
         symbol = Symbol(situation, arguments)
@@ -251,7 +254,7 @@ class Reading:
         return self.knowledge.between(symbol)
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """Whether an amount may be, or must be, as wanted: a number, or bounds."""
+        """Whether an amount may, or must, satisfy a goal: a number, or bounds."""
         found = self.between(symbol.situation, symbol.arguments)
         try:
             limits = bounds(wanted)
@@ -260,7 +263,7 @@ class Reading:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """Whether a goal may hold, or must; a symbol that doesn't exist counts as false."""
+        """Whether a goal may, or must, hold; a symbol that doesn't exist counts as false."""
         if not self.lowest.exists(symbol.situation, symbol.arguments):
             return wanted == FALSE
         if self.lowest.quantity(symbol.situation) is not None:
@@ -270,7 +273,7 @@ class Reading:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """Whether a condition may hold, or must, with these individuals for its variables."""
+        """Whether a condition may, or must, hold with the given individuals for its variables."""
         found: bool
         match condition:
             case ValueCondition(situation, arguments, value, negated):
@@ -302,7 +305,7 @@ class Reading:
     def solutions(
         self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals for the variables of conditions with which all of them may hold, or must."""
+        """Yield the bindings with which all conditions may, or must, hold."""
         yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
 
     def _extended(
@@ -330,7 +333,7 @@ class Reading:
     def _candidates(
         self, condition: Condition, unknown: Sequence[str], env: dict[str, str], kinds: Mapping[str, str]
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals, put in for unknown variables, with which a condition might hold."""
+        """Yield the bindings of unknown variables with which a condition may hold."""
         lowest, members = self.lowest, self.problem.members
         rows: Sequence[tuple[str, ...]] | None = None
         terms: tuple[str, ...] = ()
@@ -380,7 +383,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------ amounts
 
     def expression(self, expression: Expression, env: Env) -> Range | None:
-        """Return what an expression may come to; None if it comes to nothing."""
+        """Return the range of an expression; None if it has no value."""
         match expression:
             case Amount(situation, arguments):
                 return self.between(situation, tuple(env.get(a, a) for a in arguments))
@@ -398,9 +401,9 @@ class Reading:
                 return Range(number, number)
 
     def amounts(self, behavior: Behavior, env: Env) -> dict[Symbol, tuple[Range, bool]] | None:
-        """Return what a behaviour may make of the amounts that it changes, and whether it surely changes them.
+        """Return the ranges of the amounts that a behaviour changes, and whether it certainly changes them.
 
-        None if it can't be done since some amount would come to one that isn't allowed.
+        None if the behaviour isn't applicable because some amount would violate its bounds.
         """
         after: dict[Symbol, tuple[Range, bool]] = {}
         for effect in behavior.amounts:
@@ -445,7 +448,7 @@ OPERATORS = {"scale": "*", "increase": "+", "decrease": "-"}
 
 
 def variables(condition: Condition) -> set[str]:
-    """Return the variables of a condition that isn't nested."""
+    """Return the variables of a condition without nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms: set[str] = {*arguments, value}
@@ -463,7 +466,7 @@ def variables(condition: Condition) -> set[str]:
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """Whether an amount of one range compares with one of another as a sign says, for some of them or for all."""
+    """Whether a comparison holds for some pairs, or for all pairs, of amounts from two ranges."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):
@@ -477,7 +480,7 @@ def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
 
 
 def calculated(sign: str, one: Range, other: Range) -> Range | None:
-    """Return what comes of two ranges of amounts; None if nothing does."""
+    """Return the range of an arithmetic operation on two ranges; None if it has no result."""
     partial = one.partial or other.partial
     if sign == "+":
         return Range(one.low + other.low, one.high + other.high, partial)

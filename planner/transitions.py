@@ -1,15 +1,15 @@
-"""One state: a table that is changed in place, and conditions and effects as Python that is generated for it.
+"""One state, as a table that is changed in place, and conditions and effects as Python that is generated for it.
 
-now    situation type → key → value. The key is the individual, or the tuple of individuals where a type has several arguments
-who    situation type → value → the keys that have it, in the order in which they came to it; not kept for `FALSE`
-trail  what was overwritten, oldest first; `undo` takes it back to a mark
-age    how often anything was changed, undoing included: what was read off the table at this age still holds
+now    situation type → key → value. The key is the individual, or the tuple of individuals if the type has several arguments
+who    situation type → value → the keys that have it, in the order in which they got it; not kept for `FALSE`
+trail  the overwritten values, oldest first; `undo` restores them down to a mark
+age    number of changes, undoing included; what was derived from the table at this age is still valid
 
-What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`confab.planner.derived_facts`).
+The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
 
-Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world. A condition becomes
-one Python expression over `now` and `who`, a behaviour a function ``forward(arguments)`` that returns the individuals of its
-variables and its changes, or None if it isn't applicable now. A new kind of condition gets its case in `Writer.expression`.
+Copying a state would take time in the size of the world; a change and its undoing take a microsecond in any world. A condition
+becomes one Python expression over `now` and `who`. A behaviour becomes a function ``forward(arguments)`` that returns the values
+of its variables and its changes, or None if it isn't applicable. A new kind of condition gets its case in `Writer.expression`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Key: TypeAlias = "str | tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Key]"
 """A symbol as the table addresses it: situation type and key."""
 Change: TypeAlias = "tuple[str, Key, str]"
-"""A cell and its value."""
+"""A changed cell with the values before and after."""
 Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
 """What is changed: the values before and after it."""
 Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
@@ -83,7 +83,7 @@ class Table:
                 self.who[symbol.situation].setdefault(value, {})[key] = None
 
     def put(self, situation: str, key: Key, value: str) -> None:
-        """Give a symbol a value, and remember the old one."""
+        """Give a symbol a value, and record the old one."""
         self.age += 1
         cells = self.now[situation]
         old = cells.get(key, FALSE)
@@ -105,7 +105,7 @@ class Table:
             self.put(situation, key, value)
 
     def undo(self, mark: int) -> None:
-        """Take back all changes since the trail had the length `mark`."""
+        """Undo all changes since the trail had the length `mark`."""
         trail = self.trail
         while len(trail) > mark:
             situation, key, old = trail.pop()
@@ -113,7 +113,7 @@ class Table:
             trail.pop()
 
     def before(self, mark: int) -> dict[Cell, str]:
-        """Return what was touched since a mark, with the values of then."""
+        """Return the cells touched since a mark, with their values at the mark."""
         found: dict[Cell, str] = {}
         for situation, key, old in self.trail[mark:]:
             found.setdefault((situation, key), old)
@@ -125,12 +125,12 @@ class Table:
         return {cell: now[cell[0]][cell[1]] for cell, old in self.before(mark).items() if now[cell[0]][cell[1]] != old}
 
     def changes(self, mark: int) -> Changes:
-        """Return the net changes since a mark, with the values of then and with the present ones."""
+        """Return the net changes since a mark, with the values at the mark and the present ones."""
         before, after = self.before(mark), self.since(mark)
         return {cell: before[cell] for cell in after}, after
 
     def state(self) -> dict[Symbol, str]:
-        """Return the state as a value for those outside of the search."""
+        """Return the state as a value, for callers outside of the search."""
         return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
 
 
@@ -140,7 +140,7 @@ class Writer:
     Parameters
     ----------
     problem : Problem
-        Its initial state and goal aren't looked at.
+        Its initial state and goal aren't used.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -153,7 +153,7 @@ class Writer:
         }
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
-        """Return a function of a table's `now` and `who` (and what else is given) that runs lines and returns a result."""
+        """Return a function of a table's `now` and `who` (and further given names) that runs lines and returns a result."""
         body = [f"    {line}" for line in (*lines, f"return {result}")]
         text = "\n".join(body)
         names = [f"    {name} = {table}" for name, table in self._tables.items() if name in text]
@@ -161,7 +161,7 @@ class Writer:
         return self.constants.pop("bind")  # type: ignore[return-value]
 
     def forward(self, behavior: Behavior) -> Iterator[str]:
-        """Yield the lines that put the function of a behaviour into `forward`."""
+        """Yield the lines that define the function of a behaviour and put it into `forward`."""
         kinds = behavior.kinds
         parameters = [p.name for p in behavior.parameters]
         bound = set(parameters)
@@ -199,7 +199,7 @@ class Writer:
         yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
 
     def priced(self, behavior: Behavior) -> Iterator[str]:
-        """Yield the line that puts the function of what a behaviour costs into `prices`; its variables follow its parameters."""
+        """Yield the line that puts the cost function of a behaviour into `prices`; its variables follow its parameters."""
         if behavior.price is not None:
             terms = [*(p.name for p in behavior.parameters), *(f"?{name}" for name in self.variables[behavior.name])]
             price = amount(behavior.price, self.problem.relations, self.constant)
@@ -208,7 +208,7 @@ class Writer:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
     ) -> list[str]:
-        """Return the conditions as expressions, in an order that binds before it uses; `bound` grows."""
+        """Return the conditions as expressions, in an order that binds each variable before its use; `bound` grows."""
         waiting, found = list(conditions), []
         while waiting:
             ready = ready_condition(waiting, bound, where)
@@ -217,7 +217,7 @@ class Writer:
         return found
 
     def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
-        """Return a condition as a Python expression; a variable that it determines is assigned in it."""
+        """Return a condition as a Python expression; the expression assigns the variable that the condition determines."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 look = self.look(condition)
@@ -248,7 +248,7 @@ class Writer:
     def satisfying(
         self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
     ) -> tuple[str, list[str]]:
-        """Return an iterable expression for the individuals that a witness could be, and tests that remain on each."""
+        """Return an iterable expression of the candidates for a witness, and the tests that each candidate has to pass."""
         term, kind = condition.variable, condition.kind
         inner = {**kinds, term: kind}
         candidates = self.problem.classes.get(kind, ())
@@ -276,17 +276,20 @@ class Writer:
         return source, tests
 
     def listed(self, situation: str, value: str) -> bool:
-        """Whether the table lists who has a value: not what is defined, nor what is false, and a variable could be that."""
+        """Whether the table lists the holders of a value.
+
+        Not of defined situations, and not of false if a variable could be that.
+        """
         domain = self.problem.domain
         return situation not in domain.rules and (value == TRUE or not domain.situations[situation].boolean)
 
     def look(self, condition: ValueCondition) -> str:
-        """Return the expression for the value that a condition asks about."""
+        """Return the expression for the value that a condition refers to."""
         default = f", {FALSE!r}" if self.problem.domain.situations[condition.situation].boolean else ""
         return f"{identifier('now', condition.situation)}.get({key_written(condition.arguments)}{default})"
 
     def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
-        """Return tests that the symbol exists, where the terms' classes don't already say so."""
+        """Return tests that the symbol exists, as far as the classes of the terms don't guarantee it."""
         return [
             self.member(term, wanted)
             for term, wanted in zip(arguments, self.problem.domain.situations[situation].arguments, strict=True)
@@ -300,9 +303,9 @@ class Writer:
     def adjacent(
         self, relation: str, arguments: Sequence[str], term: str, unbound: AbstractSet[str] = frozenset()
     ) -> tuple[str, float]:
-        """Return an iterable expression for those that stand in a relation to the other arguments, and how many these are.
+        """Return an iterable expression of the individuals that a relation relates to the other arguments, and their number.
 
-        Of the others those that are unbound may be any.
+        Unbound arguments match anything.
         """
         position = list(arguments).index(term)
         known = [i for i, other in enumerate(arguments) if i != position and other not in unbound]
@@ -320,7 +323,7 @@ class Writer:
         return self.constant(("kind", kind), self.problem.members(kind))
 
     def constant(self, what: tuple[str, str], value: object) -> str:
-        """Return the name under which a value is known to what is generated."""
+        """Return the name of a value in generated code."""
         name = identifier(*what)
         self.constants[name] = value
         return name
@@ -338,7 +341,7 @@ _COST: Mapping[type[Condition], int] = {
 
 
 def ready_condition(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
-    """Return the cheapest condition to test of those whose variables are bound."""
+    """Return the cheapest condition to test among those whose variables are bound."""
     ready = [condition for condition in waiting if not needs(condition) - bound]
     if not ready:
         raise nothing_determines(where, waiting, bound)

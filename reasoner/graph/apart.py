@@ -1,7 +1,7 @@
-"""Queries that people write, answered in a process of its own: what they cost, and how they end, can't harm this one.
+"""Queries of users, answered in a process of their own, so that their costs and failures don't affect this one.
 
-A query can ask for more rows than there are atoms, and one that is nested deeply enough brings the SPARQL parser down. The queries
-of the planner itself are asked of the store directly.
+A query can produce more rows than memory holds, and a deeply nested one crashes the SPARQL parser. The planner's own queries go to
+the store directly.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ TEXTS = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'(?:[^\\]|\\.)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""What may hold any word: texts, IRIs and comments."""
+"""Tokens that may contain any word: texts, IRIs and comments."""
 WORDS = re.compile(
     rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
 )
-"""Texts, which hold no names, and prefixed names."""
+"""Texts, which contain no names, and prefixed names."""
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
-"""More that could stand there than helps anybody."""
+"""Maximum number of suggestions."""
 NAMESPACES = re.compile(r"\bPREFIX\s+([\w-]*):\s*<([^<>]*)>", re.IGNORECASE)
 PLACE = re.compile(r"error at (\d+):(\d+): ")
 FROM = re.compile(
@@ -54,18 +54,18 @@ FROM = re.compile(
     r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
     re.DOTALL | re.IGNORECASE,
 )
-"""Texts, which hold no clauses, and clauses that name a graph of a query's dataset."""
+"""Texts, which contain no clauses, and clauses that name a graph of the query's dataset."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
 """The graphs whose union is the default graph, and those that ``GRAPH`` sees; None for all."""
 Answer: TypeAlias = "tuple[str, list[str], Any]"
-"""What a query gives: ``rows``, ``triples`` or ``truth``; the columns; and which."""
+"""An answer: ``rows``, ``triples`` or ``truth``; the columns; the content."""
 
 
 @dataclass(frozen=True)
 class QueryLimits:
-    """What a query may take; with `service` it may ask other endpoints as well."""
+    """Limits of a query; with `service` it may ask other endpoints."""
 
     seconds: float = SECONDS
     rows: int = ROWS
@@ -74,7 +74,7 @@ class QueryLimits:
 
 
 def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> Answer:
-    """Return what a query answers on the union of the graphs: ``rows``, ``triples`` or ``truth``, the columns, and which.
+    """Return the answer to a query on the union of the graphs.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
 
 
 class _Checked(BytesIO):
-    """What a store is written into piece by piece, so that it can be stopped at a deadline."""
+    """A byte sink that a store is written to in pieces, so that writing stops at a deadline."""
 
     def write(self, content: Buffer, /) -> int:
         """Take the next bytes, or raise `LimitError`."""
@@ -108,8 +108,8 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 class QueryWorker:
     """A process that answers queries about a graph as it is when the process starts, one after the other.
 
-    It starts with the first query and ends with the ``with`` block or with this process, however that ends. A query that is
-    interrupted, or that exceeds its limits, ends alone.
+    It starts with the first query and ends with the ``with`` block or with this process, even if that is killed. A query that is
+    interrupted or exceeds its limits ends alone.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class QueryWorker:
         self._sending = Lock()
 
     def __enter__(self) -> QueryWorker:
-        """Return it."""
+        """Return this object."""
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
@@ -134,7 +134,7 @@ class QueryWorker:
         self.close()
 
     def close(self) -> None:
-        """End the process, if it has started; a query that it answers ends, too."""
+        """End the process if it has started, and with it a running query."""
         if self._process is not None:
             end(self._process)
             self._process = None
@@ -145,13 +145,13 @@ class QueryWorker:
             self.ask("ASK {}")
 
     def interrupt(self) -> None:
-        """End the query of another thread, in which `ask` raises `LimitError`; do nothing while the process starts."""
+        """End the query of another thread, whose `ask` raises `LimitError`; does nothing while the process starts."""
         if self._sending.acquire(blocking=False):
             self._send(None)
             self._sending.release()
 
     def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
-        """Return what a query answers on a dataset; by default its own one (``FROM``), or the union of all graphs.
+        """Return the answer to a query on a dataset; by default the query's own (``FROM``), or the union of all graphs.
 
         Errors are those of the function `ask`; a graph that doesn't exist is one, too.
         """
@@ -218,7 +218,7 @@ class QueryWorker:
                 self._process.stdin.flush()
 
     def _why(self, status: int, said: str, late: bool) -> Exception:
-        """Return what to raise for a query that ended without an answer."""
+        """Return the error for a query that ended without an answer."""
         if late or status == -signal.SIGXCPU:
             return LimitError(
                 f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
@@ -235,7 +235,7 @@ class QueryWorker:
 
 
 def allowed(query: str, limits: QueryLimits) -> str:
-    """Return a query; raise `KnowledgeError` if it asks other endpoints and may not."""
+    """Return a query; raise `KnowledgeError` if it asks other endpoints without permission."""
     if not limits.service and SERVICE.search(TEXTS.sub(" ", query)):
         raise KnowledgeError(
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"
@@ -268,7 +268,7 @@ def _existing(graph: KnowledgeGraph, dataset: Dataset) -> Dataset:
 
 
 def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answer) -> Answer:
-    """Return an answer; raise what it says went wrong."""
+    """Return an answer; raise the error that it reports."""
     if found[0] == "too many":
         raise LimitError(
             f"gave up: more than {limits.rows:,} rows, or very long ones; add a LIMIT to the query, or allow more (--rows)"
@@ -279,7 +279,7 @@ def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answ
 
 
 def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
-    """Return in one line what is wrong with a query, with what stands there, and an unknown prefix by its name."""
+    """Return what is wrong with a query in one line, with the text at that place and the name of an unknown prefix."""
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
     used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]
@@ -311,7 +311,7 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
 
 
 def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the prefixed names in a query of which the graph doesn't speak, each with where such a name is."""
+    """Return the prefixed names in a query that the graph doesn't contain, each with a place of such a name."""
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
     found = []
     for match in WORDS.finditer(core_names(graph, query)):
@@ -333,7 +333,7 @@ def _speaks_of(graph: KnowledgeGraph, iri: str) -> bool:
 
 
 def standing_alone(graph: KnowledgeGraph, query: str) -> str:
-    """Return a query of ours with PREFIX lines for what it uses, so that any endpoint understands it."""
+    """Return one of our queries with PREFIX lines for its prefixes, so that any endpoint understands it."""
     used = {m["prefix"] or "" for m in WORDS.finditer(query) if m["text"] is None and "?" not in m[0]}
     lines = [f"PREFIX {prefix}: <{graph.prefixes[prefix]}>" for prefix in sorted(used) if prefix in graph.prefixes]
     return "\n".join([*lines, query])

@@ -1,7 +1,7 @@
-"""The process that answers queries for `confab.reasoner.graph.apart`. It needs nothing else of this project.
+"""The process that answers queries for `confab.reasoner.graph.apart`. It imports nothing else of this project.
 
-It keeps a graph, and forks for each query: the fork gives up what it doesn't need (more memory and time than it is allowed, and new
-files, which connections are, too) and ends with its answer. The next message, or the end of the asking process, ends it before.
+It keeps a graph and forks for each query. The fork limits its own memory, time and files (hence connections, too) and ends with
+its answer; the next message, or the end of the parent process, ends it early.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import pyoxigraph as ox
 
 
 def main() -> None:
-    """Answer each query by ``(kind, columns, rows)`` with the kinds of `answer`, or by ``("ended", status, what it said)``."""
+    """Answer each query by ``(kind, columns, rows)`` with the kinds of `answer`, or by ``("ended", status, output)``."""
     setup = received()
     os.nice(setup["nice"])
     limit(resource.RLIMIT_CORE, 0)
@@ -40,7 +40,7 @@ def received() -> Any:
 
 
 def read(size: int) -> bytes:
-    """Return bytes from stdin, and never more than these, so that `select` tells of the next message."""
+    """Return exactly so many bytes from stdin, so that `select` reports the next message."""
     found = bytearray()
     while len(found) < size:
         part = os.read(0, min(size - len(found), 1 << 20))
@@ -51,7 +51,7 @@ def read(size: int) -> bytes:
 
 
 def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) -> bytes:
-    """Return the pickled answer of a fork, or how it ended without one."""
+    """Return the pickled answer of a fork, or how the fork ended without one."""
     ours, theirs = os.pipe()
     child = os.fork()
     if child == 0:
@@ -90,16 +90,18 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
 
 
 def limit(what: int, value: int) -> None:
-    """Set a limit of this process for good."""
+    """Set a limit of this process permanently."""
     resource.setrlimit(what, (value, value))
 
 
 def answer(
     store: ox.Store, query: str, default: Sequence[str], named: Sequence[str] | None, setup: dict[str, Any]
 ) -> tuple[str, object, object]:
-    """Return what one query gives: ``rows``, ``triples``, ``truth``, ``too many`` or ``error``, the columns, and which.
+    """Return the result of one query.
 
-    It sees the union of some graphs and, in ``GRAPH``, some or all of the named ones.
+    ``rows``, ``triples``, ``truth``, ``too many`` or ``error``, the columns, and the content.
+
+    The query sees the union of some graphs and, in ``GRAPH``, some or all of the named ones.
     """
     try:
         found = store.query(

@@ -1,4 +1,4 @@
-"""What a CONSTRUCT query gives, written as an ontology that imports the scene which was asked."""
+"""The result of a CONSTRUCT query, written as an ontology that imports the queried scene."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from confab.reasoner.vocabulary import OWL, RDF
 
 
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
-    """Write the triples of a CONSTRUCT query into a Turtle file and return how many they are.
+    """Write the triples of a CONSTRUCT query into a Turtle file and return their number.
 
-    The file is an ontology called like it, beside the scene's IRI, and imports the scene: it can be planned in itself.
+    The file is an ontology named after it, beside the scene's IRI, and imports the scene, so that it can be planned in.
 
     Raises
     ------

@@ -1,8 +1,7 @@
-"""Documents as they are handed to a parser: RDF/XML without the part of a DTD that reads other files or grows.
+"""Documents as a parser receives them: RDF/XML without the parts of a DTD that read other files or grow.
 
-A document type is read by expat, which is made for XML, and written anew with nothing in it but plain entities, as Protégé 4
-abbreviates namespaces by them. So the parser behind sees no prolog but that, whatever comments, instructions and declarations
-stood there.
+expat, which is made for XML, reads the document type. It is then written anew with plain entities only, which Protégé 4 uses to
+abbreviate namespaces. The RDF parser sees no other prolog, whatever comments, instructions and declarations the file has.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ FORMATS = {
     ".nq": ox.RdfFormat.N_QUADS,
 }
 SYNTAXES = {".ofn": "functional syntax", ".omn": "Manchester syntax", ".owx": "OWL/XML", ".obo": "OBO"}
-"""What no library here reads as it is meant."""
+"""Formats that no library here reads correctly."""
 SIGNS = (
     (rb"(@prefix|@base|PREFIX|BASE)\s", ox.RdfFormat.TURTLE),
     (rb"[{\[]", ox.RdfFormat.JSON_LD),
@@ -42,12 +41,12 @@ SIGNS = (
     (rb"(<\?xml[^>]*>\s*)?(<!DOCTYPE\s+Ontology|<Ontology\s)", SYNTAXES[".owx"]),
     (rb"format-version:", SYNTAXES[".obo"]),
 )
-"""How files begin that are called .owl, or .rdf, and hold something else."""
+"""First bytes of files named .owl or .rdf that have another format."""
 REMOTE = re.compile(rb'"@context"\s*:\s*(\[\s*)?"')
 SECONDS, MEGABYTES = 60.0, 1_000
-"""CPU time and memory of parsing a document in a process of its own."""
+"""Maximum CPU seconds and megabytes for parsing a document in a process of its own."""
 MOST_EXPANDED = 50_000_000
-"""Bytes that all references to entities of a document may stand for."""
+"""Maximum number of bytes that all entity references of a document may expand to."""
 PLAIN = re.compile(r"[^\s<>&%\"']*")
 REFERENCE = re.compile(rb"&([^\s&;#]+);")
 DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
@@ -59,7 +58,7 @@ class DocumentError(ValueError):
 
 
 def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
-    """Return a file of RDF as its parser may see it, and its format.
+    """Return the content of an RDF file for its parser, and its format.
 
     Raises
     ------
@@ -89,10 +88,10 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
 
 
 def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFormat]:
-    """Return a document, and its format, that a parser reads in time and memory in proportion to its size.
+    """Return a document, and its format, that a parser reads in time and memory proportional to its size.
 
-    What is nested too deeply is refused in every format. JSON-LD, in which each level may repeat all that its context says, is
-    parsed in a process of its own and returned as TriG.
+    Deep nesting is refused in every format. JSON-LD, in which each level may repeat its context, is parsed in a process of its own
+    and returned as TriG.
 
     Raises
     ------
@@ -168,7 +167,7 @@ def plain_xml(content: bytes) -> bytes:
 
 
 class _Prolog:
-    """What stands before the first element: the document type's name, and its entities."""
+    """Reads the prolog before the first element: the name of the document type, and its entities."""
 
     def __init__(self) -> None:
         self.name: bytes | None = None
@@ -176,7 +175,7 @@ class _Prolog:
         self.end = -1
 
     def read(self, content: bytes) -> None:
-        """Read up to the first element. The document is taken as UTF-8, as the parser behind takes it."""
+        """Read up to the first element. The document is read as UTF-8, as the RDF parser reads it."""
         parser = expat.ParserCreate("utf-8")
         parser.StartDoctypeDeclHandler = self._doctype
         parser.EntityDeclHandler = self._entity
@@ -207,4 +206,4 @@ class _Prolog:
 
 
 class _PrologIsReadError(Exception):
-    """Nothing more is to be read."""
+    """The prolog is complete."""

@@ -1,7 +1,7 @@
-"""Fetching an ontology from the web, which happens only where somebody asks for it: it becomes a file, and the catalog names it.
+"""Fetching an ontology from the web, only on request: it becomes a file, and the catalog names it.
 
-Loading stays offline. What comes in is read before it is kept: plain RDF of a bounded size, without entities that read other files
-or grow, without imports by file path, and an ontology of the IRI that was asked for.
+Loading stays offline. A document is checked before it is kept: plain RDF of a bounded size, without entities that read other files
+or grow, without imports by file path, and an ontology with the requested IRI.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from confab.reasoner.vocabulary import OWL
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0
-"""For the whole document; a connection has to be there after a fifth of it."""
+"""Seconds for the whole document; the connection has to be established within a fifth of them."""
 REDIRECTS = 5
 ACCEPT = "text/turtle, application/n-triples;q=0.9, application/rdf+xml;q=0.8, */*;q=0.1"
 SUFFIX = {
@@ -46,7 +46,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 
 @dataclass(frozen=True)
 class Fetched:
-    """An ontology that was fetched: its file, the catalog that names it, and what it imports itself."""
+    """A fetched ontology: its file, the catalog that names it, and its own imports."""
 
     file: Path
     catalog: Path
@@ -130,7 +130,7 @@ def _download(url: str) -> tuple[bytes, str]:
 
 
 def _guessed(url: str, content: bytes) -> str:
-    """Return the kind of a document whose media type doesn't tell it."""
+    """Return the kind of a document whose media type doesn't say it."""
     suffix = Path(urlsplit(url).path).suffix.lower()
     if suffix in FORM:
         return suffix
@@ -138,7 +138,7 @@ def _guessed(url: str, content: bytes) -> str:
 
 
 def _declared(url: str, said: str, triples: Sequence[ox.Triple]) -> str:
-    """Return the IRI of the ontology, if it is the one that was asked for."""
+    """Return the IRI of the ontology, if it is the requested one."""
     kind = ox.NamedNode(OWL + "Ontology")
     found = [t.subject.value for t in triples if t.object == kind and isinstance(t.subject, ox.NamedNode)]
     if len(found) != 1:

@@ -22,7 +22,7 @@ from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
 GIVEN = ("asserted", "reach")
 WORLD = {CORE + name for name in ("Object", "Robot", "Hand")}
-"""The core's classes of things; its others describe behaviours, of which nothing is to be concluded."""
+"""The core's classes of things; its other classes describe behaviours, which are exempt from inference."""
 
 NEEDED = """
 ASK {
@@ -51,14 +51,14 @@ SELECT DISTINCT ?individual ?class WHERE {
 
 
 def needed(graph: KnowledgeGraph) -> bool:
-    """Tell whether more follows from the ontology than what subclasses say."""
+    """Return whether the ontology implies more than its subclass axioms do."""
     return bool(graph.query(NEEDED, GIVEN))
 
 
 def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
-    """Write what follows by OWL 2 RL into the graph `inferred`, and return how many triples that are.
+    """Write the conclusions of OWL 2 RL into the graph `inferred`, and return the number of triples.
 
-    Kept are types, subclasses and tuples of static relations that aren't stated already.
+    Only new types, subclasses and tuples of static relations are kept.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def _iris(graph: KnowledgeGraph, query: str) -> set[str]:
 
 
 def _static(graph: KnowledgeGraph, changing: set[str]) -> Iterator[ox.Triple]:
-    """Yield what the reasoner sees: no texts, nothing inside behaviours, no facts that may change."""
+    """Yield the triples that the reasoner sees: no texts, nothing inside behaviours, no facts that may change."""
     for name in GIVEN:
         for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name)):
             predicate = quad.predicate.value

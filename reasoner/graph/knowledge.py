@@ -1,7 +1,7 @@
-"""The knowledge graph: ontology files with all that they import, in one SPARQL store.
+"""The knowledge graph: ontology files with all their imports, in one SPARQL store.
 
-Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read, never written here. Nothing is
-fetched from the network (`confab.reasoner.graph.fetching` does, if asked): an import is looked up in the catalog beside the
+Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read and never written here. Nothing is
+fetched from the network (`confab.reasoner.graph.fetching` does that on request): an import is looked up in the catalog beside the
 file, then in the shipped one.
 """
 
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 DERIVED = "derived"
-"""What follows in the initial state from definitions, for queries alone: planning works it out in every state."""
+"""Graph of the facts that follow from definitions in the initial state. For queries only; planning derives them in each state."""
 SCENE = ("asserted", "inferred", "reach")
-"""The graphs that a planning call starts from."""
+"""Graphs that a planning call begins with."""
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
-"""What a file has in it that speaks of triples, in one of the three notations."""
+"""Marks of triples about triples in a file, in one of the three notations."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
 NO_ROWS = "wanted a SELECT query, whose answer is rows"
 
@@ -49,19 +49,19 @@ Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
 
 
 class Remote(Protocol):
-    """A store elsewhere that answers SPARQL 1.1, as `confab.reasoner.graph.stores.Endpoint` is."""
+    """A remote store that answers SPARQL 1.1, such as `confab.reasoner.graph.stores.Endpoint`."""
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
-        """Return what a query answers; `confirm` asks it again if it is noted."""
+        """Return the answer to a query; with `confirm`, the query is recorded and asked again later."""
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if what was noted is answered otherwise now."""
+        """Raise `KnowledgeError` if a recorded query has another answer now."""
 
 
 class KnowledgeError(ValueError):
-    """The knowledge that was given can't be used; the message says what, where, and what to do.
+    """The given knowledge can't be used; the message says what, where, and what to do.
 
-    `node` is the IRI of what is at fault, where the message has another name of it.
+    `node` is the IRI of the faulty node, if the message names it otherwise.
     """
 
     def __init__(self, message: str = "", node: str = "") -> None:
@@ -111,22 +111,22 @@ class KnowledgeGraph:
     round_trips: int = 0
 
     def __getstate__(self) -> dict[str, object]:
-        """Return what pickling and copying keep: the store as N-Quads."""
+        """Return the state for pickling and copying: the store as N-Quads."""
         return {**self.__dict__, "store": self.store.dump(format=ox.RdfFormat.N_QUADS) or b""}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Fill a store of its own, blank nodes under their names."""
+        """Fill a new store, keeping the names of blank nodes."""
         store = ox.Store()
         store.bulk_extend(ox.parse(state["store"], format=ox.RdfFormat.N_QUADS, rename_blank_nodes=False))
         self.__dict__.update(state, store=store)
 
     @property
     def spoken(self) -> dict[str, str]:
-        """The prefixes of people's queries: the scene's, as its file declares them, before ours."""
+        """The prefixes of users' queries: those of the scene's file, then ours."""
         return {"confab": CORE, **self.prefixes, **self.declared}
 
     def require_whole(self) -> None:
-        """Raise `KnowledgeError` if something is missing that planning would need."""
+        """Raise `KnowledgeError` if something that planning needs is missing."""
         if self.faults:
             raise KnowledgeError(self.faults[0])
 
@@ -146,14 +146,14 @@ class KnowledgeGraph:
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
-        """Return what `select` returns one row after the other, for those who read very many; errors as there."""
+        """Return the rows of `select` one after the other, for callers that read very many; same errors."""
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError(NO_ROWS)
         return answer
 
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
-        """Return the triples of some graphs as N-Triples; of a remote store, all that it shows."""
+        """Return the triples of some graphs as N-Triples; of a remote store, all visible triples."""
         if self.remote:
             answer = self.query("CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }")
             return (
@@ -167,7 +167,7 @@ class KnowledgeGraph:
         return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
-        """Return what any SPARQL 1.1 query answers on the union of some graphs; a remote store decides itself on which."""
+        """Return the answer to any SPARQL 1.1 query on the union of some graphs; a remote store chooses its own dataset."""
         check("asking the knowledge graph")
         self.round_trips += 1
         if self.remote:
@@ -183,7 +183,7 @@ class KnowledgeGraph:
             raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if a remote store says something else now than when it was read."""
+        """Raise `KnowledgeError` if the data of a remote store have changed since they were read."""
         if self.remote:
             check("asking the knowledge graph again")
             self.remote.confirm()
@@ -202,7 +202,7 @@ class KnowledgeGraph:
 
     @property
     def folders(self) -> list[Path]:
-        """Where other files that the ontologies name are looked for: the shipped ones, and beside each that was read."""
+        """Folders in which other files of the ontologies are looked for: the shipped ones, and that of each file read."""
         own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
@@ -247,7 +247,7 @@ def load(
 
 
 def write_out(graph: KnowledgeGraph) -> list[Fault]:
-    """Add to a graph as individuals what its behaviours say as SPARQL updates; return what can't be read of it."""
+    """Add the individuals of behaviours that are written as SPARQL updates; return the updates that can't be read."""
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []
@@ -261,7 +261,7 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
 
 
 def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
-    """Return for each behaviour that is written as an update the prefixes of the file that does so."""
+    """Return for each behaviour that is written as an update the prefixes of its file."""
     prefixes: dict[str, dict[str, str]] = {}
     for file in graph.files.values():
         with readable(file) as (content, form):
@@ -275,7 +275,7 @@ def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
 
 
 def _scene_first(files: Sequence[Path]) -> list[Path]:
-    """Return files with the scene before the others: the first that none of the others imports."""
+    """Return files with the scene first: the first file that none of the others imports."""
     if not files:
         raise KnowledgeError("no file is given; wanted the name of a shipped scene, or files of RDF")
     if len(files) == 1:
@@ -293,7 +293,7 @@ def _scene_first(files: Sequence[Path]) -> list[Path]:
 
 
 def _said(file: Path, what: str) -> set[str]:
-    """Return the IRIs of the ontologies that a file declares, or imports."""
+    """Return the IRIs of the ontologies that a file declares or imports."""
     with readable(file) as (content, form):
         quads = list(ox.parse(content, format=form, base_iri=file.resolve().as_uri()))
     if what == "imports":
@@ -339,7 +339,7 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
 
 
 def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
-    """Take out of a scene's reach what was refuted about things that the scene has no more (`confab.reasoner.refutations`)."""
+    """Remove from a scene's reach the refutations about things that the scene no longer has (`confab.reasoner.refutations`)."""
     store, reach, asserted = graph.store, ox.NamedNode(BASE + "reach"), ox.NamedNode(BASE + "asserted")
     refuted = list(store.quads_for_pattern(None, ox.NamedNode(CORE + "precondition"), None, reach))
     quads = list(store.quads_for_pattern(None, None, None, reach)) if refuted else []
@@ -355,7 +355,7 @@ def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
 
 
 def scene_file(source: str | Path) -> Path:
-    """Return the file that a scene's name or path stands for."""
+    """Return the file of a scene, given by name or path."""
     shipped = ontology.scenes()
     if str(source) in shipped:
         return shipped[str(source)]
@@ -373,7 +373,7 @@ def scene_file(source: str | Path) -> Path:
 
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
-    """Read one file into a named graph of the store, and its prefixes into the graph's."""
+    """Read one file into a named graph of the store, and its prefixes into the graph."""
     check(f"reading {file}")
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
@@ -389,7 +389,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
 
 
 class _Timed(BytesIO):
-    """What a parser reads piece by piece, so that it can be stopped at a deadline."""
+    """A byte source that a parser reads in pieces, so that reading stops at a deadline."""
 
     def __init__(self, content: bytes, doing: str) -> None:
         super().__init__(content)
@@ -403,7 +403,7 @@ class _Timed(BytesIO):
 
 @contextmanager
 def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
-    """Give a file of RDF as its parser may see it, and its format; what is wrong with it becomes a `KnowledgeError`."""
+    """Provide the content of an RDF file for its parser, and its format; errors become a `KnowledgeError`."""
     try:
         yield document(file)
     except SyntaxError as error:
@@ -415,7 +415,7 @@ def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
 
 
 def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
-    """Read the prefixes at the top of a file into the graph's; the empty one is that of the first file."""
+    """Read the prefixes at the top of a file; the empty prefix is that of the first file."""
     first = not graph.declared
     with readable(file) as (content, form):
         parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())

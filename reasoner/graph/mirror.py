@@ -1,7 +1,7 @@
-"""An owlready2 world in step with a knowledge graph, for users who think in classes.
+"""An owlready2 world that is synchronised with a knowledge graph, for users who think in classes.
 
-The world is made from the scene's triples. What is added to it or removed from it is brought over to the graph by `pull`, which
-the front desk calls before every query. The world isn't written to files: Turtle files belong to the people who edit them.
+The world is made from the scene's triples. `pull` transfers statements that were added to it or removed from it to the graph; it
+is called before every query. The world isn't written to files: Turtle files belong to their authors.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from confab.reasoner.validation.hermit import world_of
 
 
 class Mirror:
-    """An owlready2 world and the statements of it that the graph has seen.
+    """An owlready2 world and the statements of it that the graph knows.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Mirror:
         self._seen = self._lines()
 
     def pull(self) -> int:
-        """Bring what changed in the world over to the graph `asserted`; return how many statements that are."""
+        """Transfer changes of the world to the graph `asserted`; return their number."""
         now = self._lines()
         added, removed = now - self._seen, self._seen - now
         name = ox.NamedNode(BASE + "asserted")

@@ -1,4 +1,4 @@
-"""A knowledge graph as an rdflib graph for those who know rdflib: what is added to it or removed from it is so in both at once."""
+"""A knowledge graph as an rdflib graph: what is added to one of them or removed from it changes both at once."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, Knowle
 
 
 def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Graph:
-    """Return the triples of a knowledge graph; `edited` is called whenever somebody has changed them.
+    """Return the triples of a knowledge graph as an rdflib graph; `edited` is called after each change.
 
-    What is added goes into the graph `asserted`; what is removed leaves every graph. Conclusions are as they were before.
+    Added triples go into the graph `asserted`; removed ones are removed from every graph. Conclusions aren't updated.
     """
     store = _WriteThrough(graph, edited)
     found = rdflib.Graph(store)
@@ -27,7 +27,7 @@ def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Gr
 
 
 class _SameNames(dict[str, str]):
-    """Blank nodes keep the names that the knowledge graph has for them."""
+    """Keeps the names of the knowledge graph's blank nodes."""
 
     def get(self, name: str, default: object = None) -> str:
         """Return the name itself."""
@@ -35,14 +35,14 @@ class _SameNames(dict[str, str]):
 
 
 class _WriteThrough(Memory):
-    """rdflib's own store in memory, which hands every change on."""
+    """rdflib's store in memory, which forwards every change."""
 
     def __init__(self, graph: KnowledgeGraph, edited: Callable[[], None]) -> None:
         super().__init__()
         self.graph, self.edited, self.writes = graph, edited, False
 
     def add(self, triple: Any, context: Any, quoted: bool = False) -> None:
-        """Add a triple here and in the knowledge graph; raises `KnowledgeError` if that can't hold it."""
+        """Add a triple here and in the knowledge graph; raise `KnowledgeError` if that can't hold it."""
         if self.writes:
             quad = _quad(self.graph, triple, "asserted")
             self.graph.store.add(quad)
@@ -50,7 +50,7 @@ class _WriteThrough(Memory):
         super().add(triple, context, quoted)
 
     def remove(self, triple_pattern: Any, context: Any = None) -> None:
-        """Remove what fits a pattern here and in the knowledge graph."""
+        """Remove the triples that match a pattern, here and in the knowledge graph."""
         gone = [triple for triple, _ in self.triples(triple_pattern, context)] if self.writes else []
         for triple in gone:
             for name in GRAPHS:

@@ -1,7 +1,7 @@
-"""Where a scene's triples may lie besides memory: on disk in Oxigraph, or behind any SPARQL 1.1 endpoint.
+"""Stores of a scene's triples besides memory: Oxigraph on disk, and any SPARQL 1.1 endpoint.
 
-On disk, the files are loaded once and again whenever one of them has changed. An endpoint is only read, by few and large
-queries. It shows either one default graph with everything in it, or a named graph per ontology, called like it.
+On disk, the files are loaded once, and again after one of them has changed. An endpoint is only read, by few and large queries. It
+offers either one default graph with everything in it, or a named graph per ontology, named by its IRI.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ BACKOFF = 0.2
 BUSY = (429, 502, 503, 504)
 RESULTS = "application/sparql-results+json"
 LARGEST = 2_000_000_000
-"""Bytes of an answer; of a table of 20,000 objects the whole scene has 20 million."""
+"""Maximum number of bytes of an answer; a whole scene of 20,000 objects has 20 million."""
 CHUNK = 1 << 16
 FORM = re.compile(r"\b(SELECT|ASK|CONSTRUCT|DESCRIBE)\b", re.IGNORECASE)
 PROLOGUE = re.compile(r"#[^\n]*|\bPREFIX\s+\S*\s*<[^>]*>|\bBASE\s*<[^>]*>", re.IGNORECASE)
@@ -61,7 +61,7 @@ SELECT DISTINCT ?graph ?ontology ?import WHERE {
 
 @dataclass
 class Endpoint:
-    """A SPARQL 1.1 endpoint, asked by POST.
+    """A SPARQL 1.1 endpoint, queried by POST.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class Endpoint:
         return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
 
     def confirm(self) -> None:
-        """Ask again what was read so far, so that no two versions of the data get into one plan.
+        """Ask all recorded queries again, so that no two versions of the data get into one plan.
 
         Raises
         ------
@@ -205,7 +205,7 @@ class Endpoint:
 
 
 def _digest(answer: bytes) -> bytes:
-    """Return what two answers have in common that say the same: neither the order of rows nor the names of blank nodes count."""
+    """Return a canonical form of an answer: without the order of rows and the names of blank nodes."""
     try:
         said = json.loads(answer)
         rows = said["results"]["bindings"]
@@ -221,7 +221,7 @@ def _digest(answer: bytes) -> bytes:
 
 
 def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, retries: int = RETRIES) -> KnowledgeGraph:
-    """Return the scene that a SPARQL 1.1 endpoint holds, with all that it imports there.
+    """Return the scene at a SPARQL 1.1 endpoint, with all its imports there.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
 
 
 def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
-    """Return the scene that was asked for, or the only ontology that no other imports."""
+    """Return the requested scene, or the only ontology that no other imports."""
     if scene is not None:
         if scene not in imports:
             raise KnowledgeError(
@@ -272,7 +272,7 @@ def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
 
 
 def _complete(query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> str:
-    """Return a query that needs nothing else: with its prefixes before it and its bindings behind it."""
+    """Return a self-contained query: with its prefixes before it and its bindings behind it."""
     head = "\n".join(f"PREFIX {prefix}: {ox.NamedNode(namespace)}" for prefix, namespace in prefixes.items())
     values = f"\nVALUES ({' '.join(f'?{name}' for name in bindings)}) {{ ({_iris(bindings)}) }}" if bindings else ""
     return f"{head}\n{query}{values}"
@@ -347,7 +347,7 @@ def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
 
 
 def _stamp(file: Path) -> str:
-    """Return path, size and time of change of a file: what tells that it is another one."""
+    """Return path, size and time of change of a file, which identify its version."""
     if not file.is_file():
         return f"{file}\t0\t0"
     state = file.stat()

@@ -1,4 +1,4 @@
-"""What an export keeps up to date so that an action can ask whether nothing has a value: "free", or one contrary per object."""
+"""Predicates of an export for "no individual has this value": one predicate "free" per value, or one contrary per object."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition
 
 
 class Kept:
-    """Predicates of the export that say what isn't so.
+    """Predicates of an export for negative conditions.
 
-    `contrary` has the situation types whose contrary is kept, with the values of which it is; `free` has a class and a situation
-    type for which no two individuals can have the same value, with the values that are asked about.
+    `contrary` maps the situation types with contrary predicates to the values that have one. `free` maps a class and a situation
+    type to the values that conditions mention, if no two individuals of the class can have the same value.
     """
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
@@ -37,18 +37,18 @@ class Kept:
         return None
 
     def keep(self, behavior: Behavior, kind: str, situation: str, value: str) -> None:
-        """Note what has to be kept up to date so that a behaviour can ask whether nothing has a value."""
+        """Record the predicates that a negative condition of a behaviour needs."""
         if (kind, situation) not in self.free and self.exclusive(kind, situation):
             self.free[kind, situation] = self.asked(kind, situation)
         if (kind, situation) not in self.free:
             self.contrary.setdefault(situation, set()).update(self.members(behavior, value))
 
     def members(self, behavior: Behavior, term: str) -> frozenset[str]:
-        """Return what a term of a behaviour can stand for."""
+        """Return the individuals that a term of a behaviour can denote."""
         return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
 
     def asked(self, kind: str, situation: str) -> frozenset[str]:
-        """Return the values of which behaviours ask whether no individual of a class has them."""
+        """Return the values that conditions of the form "no individual of the class has it" mention."""
         found = frozenset[str]()
         for behavior in self.behaviors:
             for absent in map(self.absent, behavior.preconditions):
@@ -57,7 +57,7 @@ class Kept:
         return found
 
     def exclusive(self, kind: str, situation: str) -> bool:
-        """Return whether no two individuals of a class can come to have the same value, of those asked about."""
+        """Return whether no two individuals of a class can get the same of the mentioned values."""
         asked, its = self.asked(kind, situation), self.problem.members(kind)
         held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
         held = [value for value in held if value in asked]
@@ -77,18 +77,18 @@ class Kept:
         return True
 
     def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
-        """Return that a symbol doesn't have a value, as a predicate of its own."""
+        """Return "a symbol doesn't have a value" as an atom of a predicate of its own."""
         words = self.words
         name = words.name("predicate", f"not {situation}", f"not_{situation}")
         return words.atom(name, (*words.about(situation, terms), value))
 
     def nobody(self, kind: str, situation: str, value: Term) -> Atom:
-        """Return that no individual of a class has a value, as a predicate of its own."""
+        """Return "no individual of a class has a value" as an atom of a predicate of its own."""
         name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
         return self.words.atom(name, (value,))
 
     def facts(self) -> Iterator[Atom]:
-        """Yield what holds at first of what is kept up to date."""
+        """Yield the initial atoms of these predicates."""
         state = self.problem.initial
         for situation, values in sorted(self.contrary.items()):
             for symbol, has in state.items():

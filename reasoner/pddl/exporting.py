@@ -1,7 +1,8 @@
-"""A level of a scene written as PDDL, as plainly as it can be said, for planners that know little more than STRIPS.
+"""Export of one level of a scene to PDDL, as close to STRIPS as possible, for planners that support little more.
 
-A class is a type, or a predicate of one argument if it cuts across others; an individual is an object, also as a value; a
-situation type is a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering` says the rest.
+A class becomes a type, or a unary predicate if it overlaps others. An individual becomes an object, also where it is a value. A
+situation type becomes a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering` describes
+the rest.
 """
 
 from __future__ import annotations
@@ -41,9 +42,10 @@ LINE = "\n    "
 
 @dataclass(frozen=True)
 class Exported:
-    """A domain and a problem in PDDL, and what leads from a plan of theirs back to behaviours.
+    """A domain and a problem in PDDL, and the mapping of actions back to behaviours.
 
-    `actions` maps an action's name to its behaviour, and the places of the behaviour's parameters among the action's.
+    `actions` maps the name of an action to its behaviour and to the positions of the behaviour's parameters among those of the
+    action.
     """
 
     domain: str
@@ -103,7 +105,7 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
 
 
 class _Export:
-    """One level of a problem, as it is written."""
+    """One level of a problem during its export."""
 
     def __init__(self, problem: Problem, level: int) -> None:
         self.problem, self.words = problem, Vocabulary(problem)
@@ -149,7 +151,7 @@ class _Export:
             yield from (term for call in calls(action.cost) for term in call.terms)
 
     def requirements(self) -> str:
-        """Return what a planner has to know."""
+        """Return the PDDL requirements."""
         parts = [part for formula in (*self.formulas, self.goal) for part in inside(formula)]
         parts += [part for change in self.changes for part in inside(change.when)]
         numeric = any(isinstance(part, Compare) for part in parts)

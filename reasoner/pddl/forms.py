@@ -1,4 +1,4 @@
-"""Conditions and effects of PDDL as lists of words: what is in them, flat."""
+"""Conditions and effects of PDDL as nested lists of words: functions that flatten and inspect them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from confab.reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
 Atom = tuple[str, ...]
 """A predicate and its terms."""
 MOST_CONJUNCTS = 10_000
-"""Objects for each of which a goal that is wanted for all is one of its own, at most."""
+"""Maximum number of objects for which a universally quantified goal becomes one goal each."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class NumericEffect:
 
 
 Change: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
-"""What is changed, with its conditions and the variables that it is made for."""
+"""A change with its conditions and the variables over which it is quantified."""
 
 
 def typed_in(form: Form) -> list[Typed]:
-    """Return the variables of a quantifier, which have been checked before."""
+    """Return the variables of a quantifier that was checked before."""
     found: list[Typed] = []
     waiting: list[Word] = []
     items = iter(form.items)
@@ -73,7 +73,7 @@ def words_in(*forms: Form | None) -> Iterator[Atom]:
 
 
 def conjuncts(form: Form | None) -> Iterator[Form]:
-    """Yield what a conjunction consists of."""
+    """Yield the conjuncts of a conjunction."""
     if form is None:
         return
     if form.head == "and":
@@ -85,7 +85,9 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
 
 
 def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[[Atom], bool | None]) -> Iterator[Form]:
-    """Yield what a conjunction consists of, one conjunct for all objects with one for each, without what always holds.
+    """Yield the conjuncts of a formula.
+
+    A universal one becomes one for each object, and conjuncts that always hold are left out.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
 
 
 def _with(form: Form, terms: Mapping[str, str]) -> Form:
-    """Return a form with terms in the places of variables, but for those that it quantifies again."""
+    """Return a form with terms in the places of its free variables."""
     if form.head in ("exists", "forall"):
         assert isinstance(form.items[1], Form)
         own = {one.name for one in typed_in(form.items[1])}
@@ -130,7 +132,7 @@ def _with(form: Form, terms: Mapping[str, str]) -> Form:
 
 
 def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
-    """Return whether a condition without variables holds, or None where that may change."""
+    """Return whether a condition without variables holds; None if its truth may change."""
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head in ("and", "or"):
         found = {_known(item, holds) for item in rest}
@@ -163,7 +165,7 @@ def numeric_of(form: Form | None) -> Iterator[NumericEffect]:
 
 
 def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Change]:
-    """Yield the single changes of an effect, each with its conditions and the variables that it is made for."""
+    """Yield the single changes of an effect, each with its conditions and quantified variables."""
     if form is None or not form.items:
         return
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
@@ -179,7 +181,7 @@ def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Ty
 
 
 def functions_read(form: Form | None) -> Iterator[str]:
-    """Yield the heads of all lists in a form, but for the functions that an effect changes."""
+    """Yield the heads of all lists in a form, except the functions that an effect changes."""
     if form is None:
         return
     for item in form.items[2 if form.head in CHANGES else 0 :]:

@@ -1,7 +1,7 @@
 """Formulas and effects of PDDL as values, each with its text.
 
-What is known to hold or not to hold is simplified away where a formula is built, so that none is written that a reader may not
-know, like ``(or)``.
+Subformulas that are known to be true or false are simplified when a formula is built, so that no unusual form such as ``(or)`` is
+written.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import TypeAlias
 from confab.reasoner.amounts import written
 
 DIGITS = 30
-"""Decimal places of a number that has no end, where it can't be written as a quotient."""
+"""Number of decimal places of an infinite decimal fraction where no quotient can be written."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """A variable or an object: `name` as PDDL writes it, its type, and the individuals that it can stand for."""
+    """A variable or an object: its `name` in PDDL, its type, and the individuals that it can denote."""
 
     name: str
     type: str = field(default="object", compare=False)
@@ -41,7 +41,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Operation:
-    """Two numbers, calculated with."""
+    """An arithmetic operation on two numbers."""
 
     sign: str
     left: Number
@@ -53,7 +53,7 @@ Number: TypeAlias = "Fraction | Call | Operation"
 
 @dataclass(frozen=True)
 class Atom:
-    """A predicate holds."""
+    """An atom."""
 
     predicate: str
     terms: tuple[Term, ...]
@@ -61,7 +61,7 @@ class Atom:
 
 @dataclass(frozen=True)
 class Same:
-    """Two terms are the same object."""
+    """An equality of two terms."""
 
     left: Term
     right: Term
@@ -69,7 +69,7 @@ class Same:
 
 @dataclass(frozen=True)
 class Compare:
-    """Two numbers compare."""
+    """A comparison of two numbers."""
 
     sign: str
     left: Number
@@ -78,28 +78,28 @@ class Compare:
 
 @dataclass(frozen=True)
 class Not:
-    """A formula doesn't hold."""
+    """A negation."""
 
     inner: Formula
 
 
 @dataclass(frozen=True)
 class And:
-    """All of some formulas hold."""
+    """A conjunction."""
 
     parts: tuple[Formula, ...]
 
 
 @dataclass(frozen=True)
 class Or:
-    """One of some formulas holds."""
+    """A disjunction."""
 
     parts: tuple[Formula, ...]
 
 
 @dataclass(frozen=True)
 class Exists:
-    """A formula holds for some objects in place of its variables."""
+    """An existential or universal quantification."""
 
     variables: tuple[Term, ...]
     inner: Formula
@@ -121,7 +121,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class Change:
-    """Something comes to hold, or not to hold, or a number changes, for all variables with which a formula held before."""
+    """An effect: an atom becomes true or false, or a number changes, for all bindings of a formula that held before."""
 
     what: Atom | Not | Assignment
     when: Formula = TRUE
@@ -132,7 +132,7 @@ class Change:
 
 
 def both(parts: Iterable[Formula]) -> Formula:
-    """Return that all of some formulas hold."""
+    """Return the conjunction of some formulas."""
     flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, And) else (part,)))
     if FALSE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
         return FALSE
@@ -140,7 +140,7 @@ def both(parts: Iterable[Formula]) -> Formula:
 
 
 def either(parts: Iterable[Formula]) -> Formula:
-    """Return that one of some formulas holds."""
+    """Return the disjunction of some formulas."""
     flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, Or) else (part,)))
     if TRUE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
         return TRUE
@@ -148,7 +148,7 @@ def either(parts: Iterable[Formula]) -> Formula:
 
 
 def no(formula: Formula, yes: bool = True) -> Formula:
-    """Return that a formula doesn't hold; with `yes` being False, the formula."""
+    """Return the negation of a formula; with `yes` False, the formula itself."""
     if not yes:
         return formula
     if formula in (TRUE, FALSE):
@@ -157,7 +157,7 @@ def no(formula: Formula, yes: bool = True) -> Formula:
 
 
 def some(variables: Iterable[Term], formula: Formula) -> Formula:
-    """Return that a formula holds for some objects."""
+    """Return a quantification of a formula over some objects."""
     variables = tuple(variables)
     if formula == FALSE or not all(one.members for one in variables):
         return FALSE
@@ -167,14 +167,14 @@ def some(variables: Iterable[Term], formula: Formula) -> Formula:
 
 
 def same(left: Term, right: Term) -> Formula:
-    """Return that two terms are the same object."""
+    """Return the equality of two terms."""
     if left == right:
         return TRUE
     return Same(left, right) if left.members & right.members else FALSE
 
 
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
-    """Return the formulas of which one is the conjunction."""
+    """Return the conjuncts of a formula."""
     return formula.parts if isinstance(formula, And) else (formula,)
 
 
@@ -268,7 +268,7 @@ def change_text(change: Change) -> str:
 
 
 def number_text(number: Number) -> str:
-    """Return a number as PDDL; one without end as a quotient."""
+    """Return a number as PDDL; an infinite decimal fraction as a quotient."""
     match number:
         case Call(function, its):
             return f"({' '.join([function, *(term.name for term in its)])})"
@@ -280,6 +280,6 @@ def number_text(number: Number) -> str:
 
 
 def decimal(number: Fraction) -> str:
-    """Return a number without a calculation, cut off behind `DIGITS` places if it has no end."""
+    """Return a number without an operation, an infinite decimal fraction rounded down after `DIGITS` places."""
     text = written(number)
     return text if "/" not in text else written(Fraction(round(number * 10**DIGITS), 10**DIGITS))

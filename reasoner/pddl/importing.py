@@ -82,7 +82,7 @@ BASE = "https://w3id.org/confab/pddl/"
 
 @dataclass(frozen=True)
 class Place:
-    """How a predicate is said here: a situation type with a value of its own, or with the value in some argument."""
+    """The translation of a predicate: a situation type with a value of its own, or with the value in one of the arguments."""
 
     situation: str
     part: Part | None = None
@@ -91,13 +91,13 @@ class Place:
 
 @dataclass(frozen=True)
 class Imported:
-    """A problem, and what its names were in PDDL: a behaviour's action, an individual's object, and so on."""
+    """A problem with its names in PDDL: the action of a behaviour, the object of an individual, and so on."""
 
     problem: Problem
     said: Mapping[str, str]
 
     def line(self, behavior: str, arguments: Sequence[str]) -> str:
-        """Return a step as plans are written in PDDL; nothing for the step that only says that the goal is reached."""
+        """Return a step as PDDL plans write it; an empty text for the step that only states that the goal is reached."""
         action = self.said.get(behavior, behavior)
         return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
 
@@ -153,7 +153,7 @@ class _Import:
     # -------------------------------------------------------------------------------------------------- names
 
     def name(self, kind: str, pddl_name: str, wanted: str | None = None) -> str:
-        """Return our name for a PDDL name of a kind; no two are the same."""
+        """Return our name for a PDDL name of some kind; different names stay different."""
         if (kind, pddl_name) not in self.names:
             text = re.sub(r"[^0-9A-Za-z_]", "_", wanted or pddl_name)
             while text in self.taken:
@@ -247,7 +247,7 @@ class _Import:
     def situations(
         self, classes: dict[str, tuple[str, ...]], parents: dict[str, tuple[str, ...]]
     ) -> dict[str, SituationType]:
-        """Return the situation types, invariants first, and say in `places` where each predicate went."""
+        """Return the situation types, invariants first, and record in `places` the translation of each predicate."""
         found: dict[str, SituationType] = {}
         candidates = frozenset(self.changing - self.derived)
         for parts in Invariants(self.pddl, self.effects, candidates, frozenset(self.changing), self.sets).found():
@@ -288,7 +288,7 @@ class _Import:
         return found
 
     def common(self, kinds: Sequence[str]) -> str:
-        """Return the lowest type above all of some."""
+        """Return the lowest common supertype of some types."""
         return next(kind for kind in self.pddl.above(kinds[0]) if all(kind in self.pddl.above(k) for k in kinds))
 
     def initial(
@@ -311,7 +311,10 @@ class _Import:
         return found
 
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal, and the behaviour that reaches what of it is no fact: none if all of it is, or it always holds."""
+        """Return the goal, and the behaviour for those parts of it that are no facts.
+
+        None if there are none, or they always hold.
+        """
         found: dict[Symbol, str] = {}
         parts = list(conjuncts(self.pddl.goal))
         single = [one for part in parts for one in spread(part, self.pddl.of_type, self.holds)]
@@ -330,7 +333,7 @@ class _Import:
         return goal, reach
 
     def holds(self, atom: Atom) -> bool | None:
-        """Return whether an atom holds, or None where that may change."""
+        """Return whether an atom holds; None if its truth may change."""
         if atom[0] == "=":
             return atom[1] == atom[2]
         known = atom[0] in self.pddl.predicates and atom[0] not in self.changing
@@ -378,7 +381,7 @@ class _Import:
     # ---------------------------------------------------------------------------------------------- behaviours
 
     def atom(self, atom: Atom) -> ValueCondition:
-        """Return the value condition that a changing atom is."""
+        """Return the value condition for an atom that may change."""
         place, terms = self.places[atom[0]], [self.term(t) for t in atom[1:]]
         if place.part is None:
             return ValueCondition(place.situation, tuple(terms) or (THE_WORLD,), TRUE)
@@ -386,7 +389,7 @@ class _Import:
         return ValueCondition(place.situation, (terms[place.part.key],), value)
 
     def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
-        """Return a conjunction without what always holds, or None if it never holds."""
+        """Return a conjunction without conjuncts that always hold; None if it never holds."""
         found: list[Condition] = []
         for condition in conditions:
             holds: bool | None = None
@@ -415,7 +418,7 @@ class _Import:
         return any(self.sets[theirs] for (of, theirs), ours in self.names.items() if of == "type" and ours == kind)
 
     def behavior(self, name: str) -> Behavior | None:
-        """Return the behaviour of an action; None if it can never be done."""
+        """Return the behaviour of an action; None if the action is never applicable."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
         found = self.simplified(c for form in conjuncts(action.precondition) for c in variables.condition(form))
@@ -437,7 +440,7 @@ class _Import:
         return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
 
     def price(self, name: str) -> Expression | None:
-        """Return what an action adds to what is minimised: what it increases, times its weight there; None if it is nothing."""
+        """Return the cost of an action in the metric: its increases, times their weights; None if it has none."""
         found: Expression | None = None
         for effect in self.numeric[name]:
             if effect.function.head not in self.weights or effect.when or effect.variables:
@@ -452,7 +455,7 @@ class _Import:
         return found
 
     def costing(self, changed: set[str]) -> dict[str, Fraction]:
-        """Return the functions that what is minimised adds up, with their factors: whoever increases one costs that."""
+        """Return the functions in the metric with their weights: an action that increases one of them costs that much."""
         found: dict[str, Fraction] = {"total-cost": Fraction(1)} if "total-cost" in changed else {}
         waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
         while waiting:
@@ -468,7 +471,7 @@ class _Import:
         return found
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
-        """Return what a number, a function or a calculation is here."""
+        """Return the translation of a number, a function or a calculation."""
         if isinstance(item, Word):
             return Fraction(item.text)
         if item.head in ("+", "-", "*", "/"):
@@ -509,14 +512,14 @@ class _Import:
         return tuple(found)
 
     def everywhere(self, function: str) -> bool:
-        """Return whether a function has a first value for all objects."""
+        """Return whether a function has an initial value for all objects."""
         things = prod(len(self.pddl.of_type(one.type)) for one in self.pddl.functions[function])
         return sum(words[0] == function for words in self.pddl.numbers) == things
 
     def value_effects(
         self, name: str, variables: _Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
-        """Return an action's effects, those that end something first."""
+        """Return an action's effects, deletions first."""
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
         effects = self.effects[name]
@@ -541,13 +544,13 @@ class _Import:
         return tuple(dict.fromkeys((*ends, *begins)))
 
     def instances(self, effect: Effect | NumericEffect) -> Iterator[dict[str, str]]:
-        """Yield each way to put individuals in for the variables that an effect is quantified over."""
+        """Yield the bindings of an effect's quantified variables."""
         names = [self.term(v.name) for v in effect.variables]
         things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether another effect gives the same symbol a new value whenever this one ends its value."""
+        """Return whether, whenever this effect ends a value, another effect gives the same symbol a new one."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol
@@ -558,7 +561,7 @@ class _Import:
 
 @dataclass
 class _Variables:
-    """The variables of one behaviour that aren't its parameters, each with a name of its own."""
+    """The variables of one behaviour that aren't parameters, each with a unique name."""
 
     table: _Import
     kinds: dict[str, str] = field(default_factory=dict)
@@ -576,7 +579,7 @@ class _Variables:
     def condition(
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
-        """Yield the conditions whose conjunction a formula is."""
+        """Yield conditions whose conjunction is equivalent to a formula."""
         named = named or {}
         head, rest = form.head, [item for item in form.items[1:] if isinstance(item, Form)]
         if head == "not":
@@ -611,9 +614,9 @@ class _Variables:
     def nested(
         self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
     ) -> tuple[Condition, ...]:
-        """Return that some individuals satisfy all pieces, each of which has its words: each is looked for as far inside as can be.
+        """Return that some individuals satisfy all given pieces; each individual is quantified as far inside as possible.
 
-        So "there are a car and a place such that …" doesn't look at all pairs where the two have nothing to do with each other.
+        "There are a car and a place such that …" then doesn't enumerate all pairs if the two occur in different pieces.
         """
         left = dict(typed)
         while left:

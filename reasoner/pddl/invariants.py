@@ -1,7 +1,9 @@
-"""Invariants of a PDDL domain: predicates of which at most one fact holds for an object, so that together they are a value of it.
+"""Invariants of a PDDL domain.
 
-An invariant is guessed from predicates that change, proved by what each action adds and deletes, and widened by what it deletes
-where the proof fails: *at* becomes *at or in*.
+Sets of predicates of which at most one fact holds for an object, so that they form one variable.
+
+An invariant is guessed from changing predicates and proved from what each action adds and deletes. If the proof fails, the
+invariant is extended by what the action deletes: *at* becomes *at or in*.
 """
 
 from __future__ import annotations
@@ -16,12 +18,15 @@ from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_
 from confab.reasoner.pddl.syntax import Action, Form, Pddl
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
-"""For a predicate's number of arguments, which one may be the object and which one the value."""
+"""For each arity, the possible positions of the object and of the value."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A predicate in an invariant: which of its arguments is the object, and which one counts (none: a value by itself)."""
+    """A predicate in an invariant, with the position of the object and that of the counted argument (none.
+
+    The predicate is the value).
+    """
 
     predicate: str
     key: int
@@ -30,7 +35,7 @@ class Part:
 
 @dataclass
 class Invariants:
-    """Looks for invariants among predicates.
+    """Searches for invariants among predicates.
 
     Parameters
     ----------
@@ -50,7 +55,7 @@ class Invariants:
     sets: Mapping[str, frozenset[str]]
 
     def found(self) -> list[tuple[Part, ...]]:
-        """Return disjoint invariants: tuples of parts, of which at most one fact holds for an object."""
+        """Return disjoint invariants: tuples of parts."""
         candidates: list[tuple[Part, ...]] = [
             (Part(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
@@ -88,7 +93,7 @@ class Invariants:
         return all(number == 1 for number in count.values())
 
     def distinguishable(self, parts: Sequence[Part]) -> bool:
-        """Return whether object and value together tell which predicate they belong to, wherever one is mentioned."""
+        """Return whether an object and a value together determine their predicate, wherever both occur."""
         counted = [p for p in parts if p.counted is not None]
         of = {p.predicate: p for p in counted}
         for predicate, domains in self.mentioned:
@@ -103,7 +108,7 @@ class Invariants:
 
     @cached_property
     def possible(self) -> dict[str, list[frozenset[str]]]:
-        """For each argument of a predicate, the objects with which it may ever hold."""
+        """For each argument of a predicate, the objects for which it may ever hold."""
         found = {name: [set[str]() for _ in signature] for name, signature in self.pddl.predicates.items()}
         for fact in self.pddl.initial:
             for position, thing in enumerate(fact[1:]):
@@ -117,7 +122,7 @@ class Invariants:
 
     @cached_property
     def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
-        """Every atom in a condition, an effect or the goal: its predicate, and the objects each term may stand for."""
+        """Every atom in a condition, an effect or the goal: its predicate, and the objects that each term may denote."""
         found = []
         for _name, action in self.pddl.actions.items():
             forms = [form for form in (action.precondition, action.effect) if form]
@@ -132,7 +137,7 @@ class Invariants:
         return found
 
     def domain_of(self, action: Action, term: str) -> frozenset[str]:
-        """Return the objects that a term of an action may stand for, by its type and static predicates of one argument."""
+        """Return the objects that a term of an action may denote, by its type and static unary predicates."""
         if not term.startswith("?"):
             return frozenset({term})
         kind = next((p.type for p in action.parameters if p.name == term), "object")
@@ -144,7 +149,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action keeps "at most one", else parts that might mend it (none: nothing can)."""
+        """Return None if every action preserves "at most one"; otherwise parts that might repair the invariant."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]
@@ -189,7 +194,7 @@ class Invariants:
         return None
 
     def may_be_one(self, action: Action, one: str, other: str) -> bool:
-        """Return whether two terms of an action may stand for the same object."""
+        """Return whether two terms of an action may denote the same object."""
         if one == other:
             return True
         for form in conjuncts(action.precondition):

@@ -65,12 +65,12 @@ from confab.reasoner.symbols import (
 
 Terms = Mapping[str, Term]
 CASES = 4
-"""An effect whose condition a symbol doesn't meet with at most so many values becomes an action for each of these cases."""
+"""Maximum number of cases into which an effect is split if a symbol's other values are to become actions of their own."""
 
 
 @dataclass(frozen=True)
 class Action:
-    """An action: `places` are those of the behaviour's parameters among its own."""
+    """An action; `places` are the positions of the behaviour's parameters among its own."""
 
     behavior: Behavior
     parameters: tuple[Term, ...]
@@ -82,7 +82,7 @@ class Action:
 
 @dataclass
 class Scope:
-    """The terms of a behaviour or rule: names that are taken, parameters, and the values that symbols are known to have."""
+    """The terms of a behaviour or rule: used names, parameters, and the known values of symbols."""
 
     kinds: Mapping[str, str]
     names: set[str] = field(default_factory=set)
@@ -91,7 +91,7 @@ class Scope:
     needs: list[Formula] = field(default_factory=list)
 
     def fresh(self, wanted: str) -> str:
-        """Return a name for a variable that no other one has."""
+        """Return a new name for a variable."""
         name = "?" + re.sub(r"[^0-9a-z_-]", "_", wanted.removeprefix("?").lower())
         name = name if re.match(r"\?[a-z]", name) else f"?x{name[1:]}"
         while name in self.names:
@@ -102,7 +102,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Cell:
-    """What an effect changes: a symbol, where a formula holds for some variables."""
+    """A change by an effect: a symbol, if a formula holds for some variables."""
 
     own: tuple[Term, ...]
     when: Formula
@@ -111,7 +111,7 @@ class Cell:
 
 
 class Lowering:
-    """Turns conditions and behaviours of one level into formulas and actions."""
+    """Translates conditions and behaviours of one level into formulas and actions."""
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
         self.problem, self.behaviors, self.words = problem, behaviors, words
@@ -122,14 +122,14 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------- conditions
 
     def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> Formula:
-        """Return that a conjunction holds, for some objects in place of what isn't bound yet."""
+        """Return that a conjunction holds, with unbound variables existentially quantified."""
         own, inside = self.bound(conditions, terms, scope)
         parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
         parts += [self.formula(condition, inside, scope) for condition in conditions]
         return some((inside[name] for name in own), both(parts))
 
     def bound(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> tuple[list[str], Terms]:
-        """Return the variables that a conjunction names and that aren't bound yet, and all terms with them."""
+        """Return the unbound variables of a conjunction, and all terms including them."""
         own = sorted(set[str]().union(*map(named, conditions)) - terms.keys())
         fresh = {name: self.words.variable(scope.fresh(name), scope.kinds[name]) for name in own}
         return own, {**terms, **fresh}
@@ -164,7 +164,7 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return that a boolean symbol is true; of one that is defined, when it is, unless its rules need themselves."""
+        """Return that a boolean symbol is true; for a defined one, its definition, unless its rules are recursive."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -176,7 +176,7 @@ class Lowering:
         return either(ways)
 
     def derived(self) -> Iterator[tuple[Atom, tuple[Term, ...], Formula]]:
-        """Yield the rules that need themselves: a predicate, its variables, and when it holds."""
+        """Yield the recursive rules: a predicate, its variables, and the formula."""
         for situation in sorted(self.recursive):
             for rule in self.rules[situation]:
                 scope = Scope(rule.behavior.kinds)
@@ -192,9 +192,9 @@ class Lowering:
     # ---------------------------------------------------------------------------------------------------- actions
 
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
-        """Yield a behaviour for each case of its effects under conditions, as far as these are few: without such effects.
+        """Yield a behaviour for each case of its conditional effects, if the cases are few; no case has conditional effects.
 
-        One value of one symbol is such a condition: either the symbol has it, or it has one of at most `CASES` others.
+        The condition has to be one value of one symbol: either the symbol has it, or it has one of at most `CASES` others.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -222,12 +222,12 @@ class Lowering:
         yield behavior
 
     def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
-        """Return whether there is a symbol of a situation type for all that some terms of a behaviour can stand for."""
+        """Return whether a symbol exists for all individuals that some terms of a behaviour can denote."""
         terms = [Term(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
         return self.words.total(situation, terms)
 
     def action(self, behavior: Behavior) -> Action | None:
-        """Return a behaviour as an action; nothing for one that can never be done, or that changes nothing."""
+        """Return a behaviour as an action; None if it is never applicable or changes nothing."""
         scope, terms = Scope(behavior.kinds), dict[str, Term]()
         used = set[str]().union(*map(named, behavior.preconditions), terms_of(behavior.price or Fraction(0)))
         for one in (*behavior.parameters, *(v for v in behavior.variables if v.name in used)):
@@ -253,13 +253,13 @@ class Lowering:
         return Action(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
 
     def parameter(self, wanted: str, members: Iterable[str], scope: Scope) -> Term:
-        """Return a new parameter of an action, for what a condition of it determines."""
+        """Return a new parameter of an action for a variable that a condition determines."""
         term = Term(scope.fresh(wanted), "object", frozenset(members))
         scope.parameters.append(term)
         return term
 
     def known(self, situation: str, its: tuple[Term, ...], wanted: str, scope: Scope) -> Term:
-        """Return the value of a symbol; if no condition names it, a new parameter."""
+        """Return the value of a symbol; a new parameter if no condition names it."""
         if (situation, its) not in scope.values:
             value = self.parameter(wanted, self.range_of(situation), scope)
             scope.values[situation, its] = value
@@ -305,9 +305,9 @@ class Lowering:
         scope.needs.append(self.formula(condition, terms, scope))
 
     def cost(self, behavior: Behavior, terms: Terms, scope: Scope) -> Number:
-        """Return what an action costs; where that is no number, or less than nothing, it can't be done.
+        """Return the cost of an action; if it is no number or is negative, the action isn't applicable.
 
-        That there is a number is said by a predicate, since planners that know costs needn't know how to compare numbers.
+        A predicate states that there is a number, since planners that support costs needn't support comparisons.
         """
         if behavior.price is None:
             return Fraction(repr(float(behavior.cost)))
@@ -318,7 +318,7 @@ class Lowering:
         return price
 
     def positive(self, expression: Expression) -> bool:
-        """Return whether a calculation can never be less than nothing."""
+        """Return whether a calculation is never negative."""
         match expression:
             case Measure(relation):
                 return all(Fraction(row[-1]) >= 0 for row in self.problem.relations.get(relation, ()))
@@ -333,7 +333,7 @@ class Lowering:
     # ---------------------------------------------------------------------------------------------------- effects
 
     def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: Scope) -> tuple[Cell, Terms]:
-        """Return what an effect changes, and the terms with which it does so."""
+        """Return the changes of an effect with its terms."""
         own, inside = self.bound(effect.when, terms, scope)
         its = self.words.terms(effect.arguments, inside)
         when = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
@@ -343,7 +343,7 @@ class Lowering:
         return Cell(tuple(inside[name] for name in own), both(when), its, value), inside
 
     def value_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[Change]:
-        """Yield what a behaviour's effects on values change, the later one where two change the same symbol."""
+        """Yield the changes of a behaviour's effects on values; of two effects on one symbol, the later one."""
         cells = [(effect, *self.cell(effect, terms, scope)) for effect in behavior.effects]
         for number, (effect, cell, inside) in enumerate(cells):
             if self.words.situations[effect.situation].boolean:
@@ -361,7 +361,7 @@ class Lowering:
                 yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
 
     def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[Change]:
-        """Yield what changes where a symbol gets a value in place of the one that it has."""
+        """Yield the changes when a symbol gets a value in place of its present one."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
         own, when = cell.own, cell.when
@@ -406,9 +406,12 @@ class Lowering:
                 yield Change(Not(self.kept.nobody(kind, situation, new)), both([when, member]), own)
 
     def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[Change]:
-        """Yield what a behaviour's effects on amounts change; it can't be done where one of them would be no number.
+        """Yield the changes of a behaviour's effects on amounts.
 
-        What is assigned to a symbol or multiplied, and then increased, is one assignment: no planner makes several in a row.
+        If one of them would be no number, the behaviour isn't applicable.
+
+        An assignment or multiplication that is followed by an increase becomes one assignment, since planners don't chain such
+        effects.
         """
         groups: dict[tuple[str, Call, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
@@ -438,7 +441,7 @@ class Lowering:
                 yield Change(Assignment("assign", at, result), when, own)
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
-        """Raise `KnowledgeError` where an effect may give a fraction of an amount of whole numbers: PDDL has only numbers."""
+        """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers: PDDL has only numbers."""
         situations = self.words.situations
         quantity = situations[effect.situation].quantity
         if quantity is None or not quantity.whole:
@@ -463,7 +466,7 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------------- goals
 
     def goal(self, symbol: Symbol, wanted: str) -> Formula:
-        """Return what is wanted of a symbol."""
+        """Return the goal about a symbol."""
         words = self.words
         situation, its = words.situations[symbol.situation], words.terms(symbol.arguments, {})
         if situation.quantity is None:
@@ -474,7 +477,7 @@ class Lowering:
 
 
 def named(condition: Condition) -> set[str]:
-    """Return the variables that a condition itself names: those inside `AnyOf` and `Witness` are looked for there."""
+    """Return the variables in a condition, except those inside `AnyOf` and `Witness`, which are handled there."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms = {*arguments, value}
