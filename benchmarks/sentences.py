@@ -27,10 +27,15 @@ END = re.compile(r"(?<=[.?!:;])\s+(?=[A-Z`*\"])")
 def docstrings(source: str) -> Iterator[str]:
     """Yield all docstrings of a module: those of definitions and those below constants."""
     for node in ast.walk(ast.parse(source)):
-        for statement in getattr(node, "body", ()) if not isinstance(node, ast.Lambda | ast.IfExp) else ():
-            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
-                if isinstance(statement.value.value, str):
-                    yield statement.value.value
+        body = getattr(node, "body", ())
+        for statement in body if isinstance(body, list) else ():
+            text = (
+                statement.value.value
+                if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+                else 0
+            )
+            if isinstance(text, str):
+                yield text
 
 
 def sentences(text: str) -> Iterator[str]:

@@ -34,12 +34,12 @@ SECTIONS = {
 
 
 class PddlError(ValueError):
-    """The PDDL can't be used; one line says file, line and column, what is wrong and what was wanted."""
+    """The PDDL can't be used; one line says file, line and column, what is wrong and what is expected."""
 
 
 @dataclass(frozen=True)
 class Word:
-    """A name or number in lower case, and where it stands."""
+    """A name or number in lower case, with its place."""
 
     text: str
     line: int
@@ -48,7 +48,7 @@ class Word:
 
 @dataclass(frozen=True)
 class Form:
-    """A list in parentheses, and where it begins."""
+    """A list in parentheses, with its place."""
 
     items: tuple[Word | Form, ...]
     line: int
@@ -56,7 +56,7 @@ class Form:
 
     @property
     def head(self) -> str:
-        """The first word, or nothing."""
+        """The first word; empty if there is none."""
         return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
 
 
@@ -71,7 +71,7 @@ class Typed:
 
 @dataclass(frozen=True)
 class Action:
-    """An action as it is written; `precondition` and `effect` are forms whose words have been checked."""
+    """An action as written; the words of `precondition` and `effect` have been checked."""
 
     name: str
     parameters: tuple[Typed, ...]
@@ -82,7 +82,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Axiom:
-    """A derived predicate with variables, and a condition, whose words have been checked, under which it holds."""
+    """A derived predicate with variables and its checked condition."""
 
     predicate: str
     parameters: tuple[Typed, ...]
@@ -107,7 +107,7 @@ class Pddl:
     minimize: Form | None = None  # what is to be as little as can be
 
     def above(self, name: str) -> Sequence[str]:
-        """Return a type and those above it, from the nearest to ``object``."""
+        """Return a type and its supertypes, from the nearest to ``object``."""
         found = {name: None}
         layer = [name]
         while layer:
@@ -167,7 +167,7 @@ def parse(domain: str, problem: str, domain_file: str = "domain", problem_file: 
 
 
 def _form(text: str, file: str) -> Form:
-    """Return the one form that a text consists of."""
+    """Return the only form in a text."""
     stack: list[tuple[list[Word | Form], int, int]] = []
     line, start = 1, 0
     done: Form | None = None
@@ -218,7 +218,7 @@ class _Reader:
         return item
 
     def define(self, form: Form, kind: str) -> Iterator[Form]:
-        """Yield the sections of ``(define (kind name) section …)`` after its name was taken."""
+        """Yield the sections of ``(define (kind name) section …)``, after the name."""
         if form.head != "define" or len(form.items) < 2 or not isinstance(form.items[1], Form):
             raise self.fail(form, f"wanted (define ({kind} …) …)")
         title = form.items[1]
@@ -313,7 +313,7 @@ class _Reader:
         return [*found, *(Typed(name.text, "object", name) for name in waiting)]
 
     def kind(self, item: Word | Form, declaring: bool) -> str:
-        """Return a type's name. What is ``(either a b)`` becomes a type of that name above `a` and `b`."""
+        """Return the name of a type; ``(either a b)`` becomes a supertype of `a` and `b`, named after them."""
         if isinstance(item, Form):
             words = [self.word(one, "a type") for one in item.items[1:]]
             if item.head != "either" or not words:
@@ -331,7 +331,7 @@ class _Reader:
         return item.text
 
     def types(self, items: Sequence[Word | Form]) -> None:
-        """Take types; one that is declared twice, or as ``either``, has several above it."""
+        """Read types; one that is declared twice, or as ``either``, has several supertypes."""
         declared = self.typed(items, declaring=True)
         for one in declared:
             if one.name != "object":
@@ -344,7 +344,7 @@ class _Reader:
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[Word | Form]) -> None:
-        """Take objects; one that is declared twice is of the lower of its types."""
+        """Read objects; one that is declared twice has the lower of its types."""
         for one in self.typed(items):
             known = self.pddl.objects.get(one.name, one.type)
             if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
@@ -398,7 +398,7 @@ class _Reader:
         self.pddl.actions[name.text] = Action(name.text, parameters, given, effect, name)
 
     def axiom(self, form: Form) -> None:
-        """Take ``(:derived (name ?x …) condition)``; a variable without a type has the predicate's."""
+        """Read ``(:derived (name ?x …) condition)``; a variable without a type has the type of the predicate."""
         if len(form.items) != 3 or not isinstance(head := form.items[1], Form) or not isinstance(form.items[2], Form):
             raise self.fail(form, "wanted (:derived (PREDICATE ?x …) CONDITION)")
         if head.head not in self.pddl.predicates:
@@ -416,7 +416,7 @@ class _Reader:
         self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
 
     def stated(self, form: Form, where: str) -> None:
-        """Raise an error if a predicate is one that follows from others."""
+        """Raise an error if a predicate is derived."""
         if form.head in self.derived:
             raise self.fail(
                 form, f"'{form.head}' is derived, so it can't be {where}; change what its (:derived …) reads"
@@ -501,7 +501,7 @@ class _Reader:
             self.atom(form, variables)
 
     def number(self, item: Word | Form, variables: Mapping[str, str]) -> None:
-        """Check a number, a function, or what is calculated from them."""
+        """Check a number, a function, or a calculation."""
         if isinstance(item, Word):
             self.constant(item)
         elif item.head in ("+", "-", "*", "/"):
@@ -549,7 +549,7 @@ class _Reader:
         return (form.head, *(self.word(item, "a term").text for item in got))
 
     def meet(self, kind: str, declared: Typed) -> bool:
-        """Return whether some type lies below two types."""
+        """Return whether some type lies below both types."""
         return any({kind, declared.type} <= set(self.pddl.above(lower)) for lower in self.pddl.types)
 
     def term(self, item: Word | Form, variables: Mapping[str, str]) -> str:
@@ -566,7 +566,7 @@ class _Reader:
         return self.pddl.objects[word.text]
 
     def fact(self, item: Word | Form) -> None:
-        """Take one entry of ``:init``."""
+        """Read one entry of ``:init``."""
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
         if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]):

@@ -54,11 +54,11 @@ HEADER = f"""\
 """
 CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
-"""What a name is called where it comes from: written as its label."""
+"""The origin of a name, written as its label."""
 
 
 def turtle(problem: Problem, title: str, description: str, labels: Said | None = None) -> str:
-    """Return a scene file with everything that a problem says.
+    """Return a scene file that states everything in a problem.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ class _Writer:
 
     @cached_property
     def measures(self) -> frozenset[str]:
-        """The relations that behaviours take for numbers."""
+        """The relations that behaviours use as numbers."""
         return measures(self.problem.domain.behaviors.values())
 
     def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
@@ -266,7 +266,7 @@ class _Writer:
         return self.terms.get(term) or self.iri(term)
 
     def value(self, symbol: Symbol, value: str) -> str:
-        """Return the properties that state a value of a symbol, also one with variables in it."""
+        """Return the properties that state the value of a symbol, which may contain variables."""
         said = [f"c:situationType {self.iri(symbol.situation)}", *self.arguments(symbol.arguments)]
         if not (self.problem.domain.situations[symbol.situation].boolean and value == TRUE):
             said.append(f"c:value {self.put(value)}")
@@ -277,7 +277,7 @@ class _Writer:
         return [f"{name} {self.put(term)}" for name, term in zip(names, terms, strict=False)]
 
     def condition(self, one: Condition) -> str:
-        """Write a condition and those inside it; return its IRI."""
+        """Write a condition with its nested conditions; return its IRI."""
         position = len(self.nodes)
         self.nodes.append("")
         iri = f":{self.where}.condition{position:03}"
@@ -311,7 +311,7 @@ class _Writer:
         return iri
 
     def side(self, name: str, one: Expression) -> str:
-        """Return the property that leads to an amount; a number on the right, and a symbol on the left, needs no node."""
+        """Return the property for an amount; a number on the right and a symbol on the left need no node."""
         if name == "right" and isinstance(one, Fraction) and _ends(one):
             return f"c:amount {decimal(one)}"
         if name == "left" and isinstance(one, Amount | Measure):
@@ -319,7 +319,7 @@ class _Writer:
         return f"c:{name} {self.calculation(one)}"
 
     def calculation(self, one: Expression) -> str:
-        """Write a calculation and those inside it; return its IRI."""
+        """Write a calculation with its nested ones; return its IRI."""
         position = len(self.nodes)
         self.nodes.append("")
         iri = f":{self.where}.amount{position:03}"
@@ -351,7 +351,7 @@ class _Writer:
         return iri
 
     def individuals(self) -> Iterator[str]:
-        """Yield every individual with the lowest of its classes, in the order in which the classes list them."""
+        """Yield every individual with its lowest class, in the order in which the classes list them."""
         classes = self.problem.classes
         order = [name for kind in classes if kind not in CORE_CLASSES for name in classes[kind]]
         names = [name for name in dict.fromkeys(order) if name not in (TRUE, FALSE)]
@@ -431,12 +431,12 @@ class _Writer:
 
 
 def _ends(number: Fraction) -> bool:
-    """Return whether a number can be written as a decimal."""
+    """Return whether a number has a finite decimal form."""
     return "/" not in written(number)
 
 
 def decimal(number: Fraction) -> str:
-    """Return a number as a decimal in Turtle; one without end is cut off behind thirty places."""
+    """Return a number as a decimal in Turtle; an infinite decimal fraction is cut off after thirty places."""
     text = written(number)
     if "/" in text:
         text = written(Fraction(round(number * 10**30), 10**30))

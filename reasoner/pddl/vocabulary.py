@@ -1,4 +1,4 @@
-"""The names that a scene has in PDDL: types, objects, predicates and functions, and what is stated of them at first."""
+"""The names of a scene in PDDL (types, objects, predicates and functions) and their initial facts."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from confab.reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation
 from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
-"""A class whose only individual is what a predicate without arguments is about."""
+"""A class whose only individual is the argument of predicates that have none in PDDL."""
 RESERVED = """
 all always and assign at-end at-most-once at-start constants decrease define derived domain effect either end
 exists forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number
 object objects or over parameters precondition predicates preference problem requirements scale-down scale-up
 sometime sometime-after sometime-before start total-cost total-time types undefined when within
 """
-"""Words that PDDL has a meaning for."""
+"""Reserved words of PDDL."""
 
 
 class Vocabulary:
-    """The names of a problem in PDDL. No two are the same, whatever they name, since some readers have one table for all."""
+    """The names of a problem in PDDL. They are all different, whatever they denote, since some readers use one table for all."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem, domain = problem, problem.domain
@@ -60,7 +60,7 @@ class Vocabulary:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the type of each class that is one, and the type above each: any two are nested or disjoint."""
+        """Return the type of each class that becomes one, and its supertype; any two types are nested or disjoint."""
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
@@ -81,7 +81,7 @@ class Vocabulary:
         return types, above
 
     def above_first(self) -> list[str]:
-        """Return the classes that are types, the larger ones first."""
+        """Return the classes that become types, larger ones first."""
         return sorted(self.types, key=lambda kind: -len(self.problem.members(kind)))
 
     def variable(self, name: str, kind: str) -> Term:
@@ -100,13 +100,13 @@ class Vocabulary:
         return Atom(predicate, tuple(terms))
 
     def about(self, situation: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-        """Return the arguments of a symbol without the one that stands for the world."""
+        """Return the arguments of a symbol without the individual for the world."""
         kinds = self.situations[situation].arguments
         one = len(self.problem.classes.get(WORLD, ())) == 1
         return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
 
     def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
-        """Return that a symbol has a value; without one, that it is true."""
+        """Return that a symbol has a value; without a value, that it is true."""
         self.used[situation] = None
         words = self.about(situation, terms)
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
@@ -121,7 +121,7 @@ class Vocabulary:
         return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
 
     def guard(self, term: Term, kind: str) -> Formula:
-        """Return what a variable of a class has to meet besides its type."""
+        """Return the conditions on a variable of a class besides its type."""
         if kind in self.types:
             return ALWAYS
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
@@ -131,7 +131,7 @@ class Vocabulary:
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
     def differs(self, term: Term, constant: Term) -> Formula:
-        """Return that a term isn't some individual, for planners that don't know equality."""
+        """Return that a term isn't some individual, for planners that don't support equality."""
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
         found = self.static(
             "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)
@@ -139,7 +139,7 @@ class Vocabulary:
         return found if term.members & constant.members else ALWAYS
 
     def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
-        """Return a predicate that holds for some rows and never changes."""
+        """Return a static predicate that holds for some rows."""
         if not rows:
             return NEVER
         if not any(term.variable for term in terms):
@@ -149,7 +149,7 @@ class Vocabulary:
         return self.atom(name, terms)
 
     def total(self, situation: str, terms: Sequence[Term]) -> bool:
-        """Return whether there is a symbol of a situation type for all that some terms can stand for."""
+        """Return whether a symbol of a situation type exists for all individuals that some terms can denote."""
         kind = self.situations[situation]
         within = all(t.members <= self.problem.members(k) for k, t in zip(kind.arguments, terms, strict=True))
         if kind.boolean:
@@ -160,14 +160,14 @@ class Vocabulary:
         return all(row in rows for row in product(*(sorted(term.members) for term in terms)))
 
     def symbols(self, situation: str) -> int:
-        """Return the number of symbols that a situation type would have if all existed."""
+        """Return the number of symbols of a situation type if all of them existed."""
         number = 1
         for kind in self.situations[situation].arguments:
             number *= len(self.problem.classes.get(kind, ()))
         return number
 
     def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
-        """Return that there is a symbol of a situation type for some terms."""
+        """Return that a symbol of a situation type exists for some terms."""
         kind = self.situations[situation]
         if self.total(situation, terms):
             return ALWAYS
@@ -179,13 +179,13 @@ class Vocabulary:
     # -------------------------------------------------------------------------------------------------------- numbers
 
     def amount(self, situation: str, terms: Sequence[Term]) -> Call:
-        """Return the function that an amount is."""
+        """Return the function for an amount."""
         name = self.name("function", situation, situation)
         self.counted[situation] = name
         return self.call(name, self.about(situation, terms))
 
     def measure(self, relation: str, terms: Sequence[Term]) -> Call:
-        """Return the function that gives the number of a relation."""
+        """Return the function for a relation that gives a number."""
         name = self.name("function", f"relation {relation}", relation)
         self.measured[relation] = name
         return self.call(name, terms)
@@ -197,18 +197,18 @@ class Vocabulary:
         return Call(name, tuple(terms))
 
     def common(self, types: Iterable[str]) -> str:
-        """Return the lowest type above some."""
+        """Return the lowest common supertype."""
         chains = [list(self.upwards(one)) for one in sorted(types)]
         return next((one for one in chains[0] if all(one in chain for chain in chains)), "object")
 
     def upwards(self, kind: str) -> Iterator[str]:
-        """Yield a type and all above it."""
+        """Yield a type and its supertypes."""
         while kind != "object":
             yield kind
             kind = self.above[kind]
 
     def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
-        """Return a calculation, whose variables are some terms."""
+        """Return a calculation in PDDL, with terms for its variables."""
         match expression:
             case Amount(situation, arguments):
                 return self.amount(situation, self.terms(arguments, terms))
@@ -220,7 +220,7 @@ class Vocabulary:
                 return expression
 
     def there(self, expression: Expression, terms: Mapping[str, Term]) -> Iterator[Formula]:
-        """Yield what has to hold so that all numbers in a calculation exist."""
+        """Yield the conditions for all numbers in a calculation to exist."""
         match expression:
             case Amount(situation, arguments):
                 yield self.exists(situation, self.terms(arguments, terms))
@@ -236,13 +236,13 @@ class Vocabulary:
                 return
 
     def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
-        """Return the terms that some of our names are."""
+        """Return the PDDL terms for some of our names."""
         return tuple(terms[name] if name in terms else self.object(name) for name in names)
 
     # ---------------------------------------------------------------------------------------------------- statements
 
     def facts(self) -> Iterator[Atom | tuple[Call, Fraction]]:
-        """Yield what is stated at first of all that has been named: atoms, and functions with their numbers."""
+        """Yield the initial atoms and numbers of everything that has been named."""
         for symbol, value in self.problem.initial.items():
             boolean, its = self.situations[symbol.situation].boolean, self.terms(symbol.arguments, {})
             if symbol.situation in self.counted:

@@ -1,4 +1,4 @@
-"""Rules of what behaviours ask and change: what can't be determined, chosen, reached or refined."""
+"""Rules on behaviours: variables that nothing determines, values that nothing reaches, effects that nothing refines."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
 
 EVERY_OTHER = re.compile(r"\?each\d")
-"""Who a class stands for where another one stands for somebody already (`confab.reasoner.reading.parts`)."""
+"""Names for the members of a class that a condition refers to (`confab.reasoner.reading.parts`)."""
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
-    """Find variables that an effect or a negated condition names and that nothing determines."""
+    """Find variables of effects and negated conditions that nothing determines."""
     if case.reading is None:
         return
     domain = case.reading.problem.domain
@@ -55,7 +55,7 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
 
 
 def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
-    """Return the variables that stay free in a conjunction; what it determines is added to `bound`."""
+    """Return the free variables of a conjunction; variables that it determines are added to `bound`."""
     waiting = list(conditions)
     progress = True
     while progress:
@@ -80,7 +80,7 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
-    """Find effects on all of a class whose `when` asks something of all of another one that shares individuals with it."""
+    """Find effects on all members of a class whose `when` refers to all members of an overlapping class."""
     if case.reading is None:
         return
     problem = case.reading.problem
@@ -100,10 +100,10 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
-    """Find values that behaviours or goals ask for, which are neither there at first nor the effect of any behaviour.
+    """Find values that behaviours or goals require and that are neither initial nor the effect of any behaviour.
 
-    What can't be reached only because something else can't be is said with that. Behaviours for which the scene has no objects
-    are of other scenes: nothing is said of these, nor of what needs them.
+    A value that is unreachable only because another one is, is reported with that one. Behaviours without objects in the scene
+    belong to other scenes: neither they nor what depends on them is reported.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -164,7 +164,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
 
 
 def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
-    """Return the values that are there before any behaviour was done, each with its situation type."""
+    """Return the initial values, each with its situation type."""
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
@@ -178,12 +178,12 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
 
 
 def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
-    """Return the values that a behaviour can give, each with its situation type."""
+    """Return the values that a behaviour can produce, each with its situation type."""
     return {(e.situation, value) for e in behavior.effects for value in _individuals(e.value, behavior, problem)}
 
 
 def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
-    """Return the behaviours that one needs, directly or by way of others."""
+    """Return the behaviours that one needs, directly or indirectly."""
     found, left = set[str](), [name]
     while left:
         left += (more := {*needs.get(left.pop(), ())} - found)
@@ -192,7 +192,7 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield the groups of behaviours that need each other and nothing else: what is at fault with the others follows."""
+    """Yield groups of behaviours that need each other and nothing else: the causes of the other findings."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
@@ -217,7 +217,7 @@ def _possible(condition: Condition, behavior: Behavior, problem: Problem, there:
 
 
 def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[str]:
-    """Return what a term can stand for; nothing for one that is bound inside a condition."""
+    """Return the individuals that a term can denote; none for a term that is bound inside a condition."""
     if not term.startswith("?"):
         return (term,)
     kinds = behavior.kinds
@@ -225,13 +225,13 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
 
 
 def _words(condition: Condition, behavior: Behavior) -> str:
-    """Return what a condition asks for, with classes in the place of its terms."""
+    """Return the requirement of a condition, with classes in the place of its terms."""
     kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
     return said(substituted(condition, kinds)).replace("?", "")
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects none of whose values a behaviour of the next level leads to."""
+    """Find effects of which no value is an effect on the next level."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -256,7 +256,7 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
 
 
 def crowded_places(case: Case) -> Iterator[Fault]:
-    """Find things that have one value together at first, though every behaviour that gives it asks for it to be free."""
+    """Find individuals that share an initial value although every behaviour that gives the value requires it to be free."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -288,7 +288,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
 
 
 def _none_has(condition: Condition, effect: ValueEffect) -> str:
-    """Return the class none of which has the value of an effect, if that is what a condition says."""
+    """Return the class of which no member has the value of an effect, if a condition requires that."""
     match condition:
         case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
             same = (situation, about, value) == (effect.situation, variable, effect.value)

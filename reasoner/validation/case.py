@@ -1,4 +1,4 @@
-"""What the rules of validation look at, and what they say."""
+"""The input and output of validation rules."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from confab.reasoner.reading.problem import Reading
 from confab.reasoner.vocabulary import RDF
 
 Fault = tuple[str, str, str, str]
-"""Node, what, why, remedy."""
+"""A finding of a rule: node, what, why, remedy."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What rules look at: the graph, and the problem read from it unless it couldn't be read."""
+    """The input of rules: the graph, and the problem read from it if it could be read."""
 
     graph: KnowledgeGraph
     reading: Reading | None
 
     @cached_property
     def triples(self) -> Sequence[ox.Triple]:
-        """Every triple of the graphs that planning starts from."""
+        """All triples of the graphs that planning begins with."""
         names = [ox.NamedNode(BASE + name) for name in SCENE]
         return [quad.triple for name in names for quad in self.graph.store.quads_for_pattern(None, None, None, name)]
 
     @cached_property
     def types(self) -> dict[str, set[str]]:
-        """The classes that each IRI is stated to have."""
+        """The stated classes of each IRI."""
         found: dict[str, set[str]] = defaultdict(set)
         for triple in self.triples:
             if (
@@ -45,6 +45,6 @@ class Case:
 
     @cached_property
     def relative(self) -> frozenset[str]:
-        """The IRIs that were relative in their files: they begin where the files lie."""
+        """IRIs that were relative in their files; they begin with the folders of the files."""
         parts = (part for triple in self.triples for part in (triple.subject, triple.predicate, triple.object))
         return frozenset(p.value for p in parts if isinstance(p, ox.NamedNode) and p.value.startswith("file:"))

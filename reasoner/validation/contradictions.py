@@ -1,4 +1,4 @@
-"""Rules of conditions that exclude each other, and of conditions that ask what is so, or isn't so, anyway."""
+"""Rules on conditions that exclude each other, and on conditions that are always true or always false."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ Clash = tuple[Condition, Condition]
 
 
 def contradictions(case: Case) -> Iterator[Fault]:
-    """Find behaviours, effects and rules whose conditions exclude each other; those that inherit them aren't named again."""
+    """Find behaviours, effects and rules whose conditions exclude each other.
+
+    Behaviours that inherit them aren't reported again.
+    """
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -62,7 +65,7 @@ def dead(problem: Problem) -> frozenset[str]:
 
 
 def _clashes(behavior: Behavior, problem: Problem) -> Iterator[tuple[Clash, str]]:
-    """Yield conditions that exclude each other, and where they stand, if these aren't the preconditions."""
+    """Yield conditions that exclude each other, with their place if it isn't the preconditions."""
     if clash := clashing(behavior.preconditions, problem, behavior.kinds):
         yield clash, ""
         return
@@ -86,7 +89,7 @@ def _witnesses(condition: Condition) -> Iterator[Witness]:
 
 
 def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[str, str]) -> Clash | None:
-    """Return two conditions of a conjunction that no state satisfies together; None if each two of them can hold.
+    """Return two conditions of a conjunction that no state satisfies together; None if every two of them can hold.
 
     Parameters
     ----------
@@ -105,7 +108,7 @@ def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[s
 
 
 def _conjuncts(conditions: Sequence[Condition], problem: Problem) -> Iterator[Condition]:
-    """Yield what a conjunction requires, each as simply as it can be said."""
+    """Yield the requirements of a conjunction, each in its simplest form."""
     for condition in conditions:
         match condition:
             case AnyOf(((only,),), True):
@@ -146,7 +149,7 @@ def _exclude(one: Condition, other: Condition, problem: Problem, kinds: Mapping[
 
 
 def _may_be_one(one: str, other: str, problem: Problem, kinds: Mapping[str, str]) -> bool:
-    """Return whether two terms may stand for the same value."""
+    """Return whether two terms may denote the same value."""
     if one[:1] != "?" and other[:1] != "?":
         return one == other
     for term, value in ((one, other), (other, one)):
@@ -178,14 +181,14 @@ def _plain(condition: Condition) -> str:
 
 @dataclass(frozen=True)
 class _Inner:
-    """A class condition inside a condition that is negated, about a term from outside."""
+    """A class condition inside a negated condition, about a term from outside."""
 
     term: str
     kind: str
 
 
 def repeated_names(case: Case) -> Iterator[Fault]:
-    """Find negated conditions that give an outer term its class again: a name is used twice, for what should be another one."""
+    """Find negated conditions that restate the class of an outer term: probably one name for two individuals."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -1,4 +1,4 @@
-"""Rules of what follows from other facts: situation types that are defined, and axioms that planning doesn't evaluate."""
+"""Rules on defined situation types, and on axioms that planning doesn't evaluate."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NOT_EVALUATED = {
 
 
 def definitions_without_effect(case: Case) -> Iterator[Fault]:
-    """Find what OWL says of situations and planning doesn't evaluate, and facts stated of what is defined."""
+    """Find axioms about situations that planning doesn't evaluate, and facts about defined situation types."""
     if case.reading is None:
         return
     schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules
@@ -86,7 +86,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
 
 
 def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
-    """Return why an axiom about a value property is none that planning evaluates, unless the effects are at fault."""
+    """Return why planning doesn't evaluate an axiom about a value property, unless the effects are at fault."""
     name, what = local_name(prop), f"that {said} isn't evaluated, since "
     nodes = {**schema.axioms, **schema.expressions}
     into = any(
@@ -117,7 +117,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
 
 
 def defined(case: Case) -> Iterator[Fault]:
-    """Tell of each situation type that is defined whether it is worked out in every state, and from what, or is static."""
+    """Report for each defined situation type whether it is evaluated in every state, and from what, or is static."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -139,7 +139,7 @@ def defined(case: Case) -> Iterator[Fault]:
 
 
 def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
-    """Find rules that conclude something of who can't have it, as where the arguments of a conclusion have changed places."""
+    """Find rules that conclude a situation of an individual that can't have it, for example with swapped arguments."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -160,7 +160,7 @@ def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
 
 
 def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
-    """Yield the classes of which the conditions of a rule ask that a parameter is."""
+    """Yield the classes that the conditions of a rule require of a parameter."""
     yield parameter.kind
     for condition in rule.conditions:
         match condition:
@@ -175,7 +175,7 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
 
 
 def both(case: Case, one: str, other: str) -> bool:
-    """Whether something is in both of two classes, each of which may be any of several, or could be: a class is below both."""
+    """Whether an individual is, or could be, in both of two sets of classes: some class is below both."""
     assert case.reading is not None
     problem = case.reading.problem
     if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
@@ -197,7 +197,7 @@ WATCHED_BY_NOBODY = {
 
 
 def axioms_not_watched(case: Case) -> Iterator[Fault]:
-    """Find what OWL demands of every state, and what it concludes of a class without a definition: planning does neither."""
+    """Find axioms that restrict every state, or that classify without a definition: planning does neither."""
     if case.reading is None:
         return
     known = case.reading.schema.expressions
@@ -243,7 +243,7 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
 
 
 def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -> set[str]:
-    """Return the properties that a class expression speaks of."""
+    """Return the properties in a class expression."""
     found, waiting, seen = set[str](), [node], set[object]()
     while waiting:
         if not isinstance(one := waiting.pop(), ox.BlankNode) or one in seen:
@@ -257,7 +257,7 @@ def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -
 
 
 def _above(case: Case, iri: str) -> set[str]:
-    """Return the classes that a definition names as its parts, with all above these."""
+    """Return the classes in a definition, with their superclasses."""
     assert case.reading is not None
     schema, found = case.reading.schema, {OWL + "Thing"}
     waiting = [iri]

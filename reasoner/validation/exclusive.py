@@ -1,12 +1,12 @@
-"""The rule of exclusive values: what physics gives to one individual at a time, behaviours must not give to two.
+"""The rule of exclusive values: behaviours must not give to two individuals what physics gives to one.
 
-Which values these are is said in the ontology (``e:exclusive`` of a perceiver): one hand at most holds an object. A behaviour that
-gives such a value keeps it exclusive in one of three ways, on each level by itself:
+The ontology declares these values (``e:exclusive`` of a perceiver): at most one hand holds an object. A behaviour that gives such
+a value keeps it exclusive in one of three ways, on each level separately:
 
-- *free*: its preconditions say that no individual has the value;
+- *free*: its preconditions require that no individual has the value;
 - *handed over*: the individual that has the value loses it by the same behaviour;
-- *taken*: the value itself changes from a state in which no individual has it. A cup that stands at a place is in no hand, picking
-  it up takes it from the place, and each behaviour that brings a cup to a place takes it from a hand.
+- *taken*: the value itself leaves a state in which no individual has it. A cup at a place is in no hand; picking it up takes it
+  from the place, and each behaviour that brings a cup to a place takes it from a hand.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class _Taken:
 
 @dataclass(frozen=True)
 class _Exclusive:
-    """A situation type whose values one individual of `kind` at most has, but for those that are `shared`."""
+    """A situation type whose values at most one individual of `kind` has, except the values in `shared`."""
 
     problem: Problem
     situation: str
@@ -70,7 +70,7 @@ class _Exclusive:
     shared: frozenset[str]
 
     def broken(self, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str, str]]:
-        """Yield the behaviours of a level that may give a value to a second individual, what they do, and the remedy."""
+        """Yield the behaviours of a level that may give a value to a second individual, with the effect and the remedy."""
         open_: list[tuple[Behavior, ValueEffect]] = [
             (behavior, effect)
             for behavior in behaviors
@@ -106,7 +106,7 @@ class _Exclusive:
                 yield effect
 
     def free(self, behavior: Behavior, when: Sequence[Condition], value: str, own: str = "") -> bool:
-        """Return whether conditions say that no individual has a value; `own` may be excepted."""
+        """Return whether conditions require that no individual has a value; `own` may be excepted."""
         return any(self._none_has(c, value, own) for c in (*behavior.preconditions, *when))
 
     def _none_has(self, condition: Condition, value: str, own: str) -> bool:
@@ -134,7 +134,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the one that has the value of an effect loses it, or is the one that gets it."""
+        """Return whether the holder of an effect's value loses it, or is the one that gets it."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)
@@ -142,7 +142,7 @@ class _Exclusive:
         )
 
     def holders(self, behavior: Behavior, when: Sequence[Condition], value: str) -> Iterator[str]:
-        """Yield the terms that have a value before."""
+        """Yield the terms that have a value before the behaviour."""
         for condition in (*behavior.preconditions, *when):
             match condition:
                 case ValueCondition(self.situation, (holder,), of, False) if of == value:
@@ -151,7 +151,7 @@ class _Exclusive:
                     pass
 
     def releases(self, behavior: Behavior, when: Sequence[Condition], holder: str, value: str) -> bool:
-        """Return whether a behaviour gives one that has a value another one, wherever some conditions hold."""
+        """Return whether a behaviour gives the holder of a value another one whenever some conditions hold."""
         return any(
             (effect.situation, effect.arguments) == (self.situation, (holder,))
             and effect.value != value
@@ -160,7 +160,7 @@ class _Exclusive:
         )
 
     def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
-        """Yield the states from which the value of an effect is taken by the same behaviour."""
+        """Yield the states that the value of an effect leaves by the same behaviour."""
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
@@ -171,7 +171,7 @@ class _Exclusive:
                     pass
 
     def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the value of an effect is in some state before, and no longer after it."""
+        """Return whether the value of an effect is in some state before and not after."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)
@@ -187,7 +187,7 @@ class _Exclusive:
         )
 
     def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours after which an individual may have a value that is in such a state, and what they do."""
+        """Yield the behaviours after which an individual may have a value that is in such a state, with the effect."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):
@@ -213,13 +213,13 @@ class _Exclusive:
                     yield behavior, f"gives {said}"
 
     def inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term surely stands for a value of a state."""
+        """Return whether a term certainly denotes a value of a state."""
         if term[:1] == "?":
             return bool(way.kind) and self.below(behavior.kinds.get(term, ""), way.kind)
         return term == way.value or term in self.problem.classes.get(way.kind, ())
 
     def may_be_inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term may stand for a value of a state."""
+        """Return whether a term may denote a value of a state."""
         if term[:1] != "?":
             return self.inside(way, term, behavior)
         kind = behavior.kinds.get(term, "")
@@ -230,7 +230,7 @@ class _Exclusive:
         return both or not members.isdisjoint(self.problem.classes.get(way.kind, ()))
 
     def below(self, kind: str, other: str) -> bool:
-        """Return whether each individual of one class, which may be a union, is in another one."""
+        """Return whether each individual of a class, which may be a union, is in another class."""
         above = {*other.split("|"), other}
         for part in kind.split("|"):
             found, waiting = {part}, [part]

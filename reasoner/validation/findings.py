@@ -1,4 +1,4 @@
-"""What validation finds: frozen values that name file, node, what is wrong, why, and what to do."""
+"""Findings of validation: frozen values that name file, node, what is wrong, why, and the remedy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from confab.reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")
-"""Rules whose findings come first: others may follow from them."""
+"""Rules whose findings are listed first, since others may follow from them."""
 
 LABEL = ox.NamedNode(RDFS + "label")
 UPDATE = ox.NamedNode(CORE + "update")
@@ -26,7 +26,7 @@ UPDATE = ox.NamedNode(CORE + "update")
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """Something that is wrong with an ontology.
+    """A finding in an ontology.
 
     Attributes
     ----------
@@ -60,28 +60,28 @@ class Finding:
         return self.severity == ERROR
 
     def __str__(self) -> str:
-        """Return the finding as a compiler prints its own."""
+        """Return the finding in the format of compiler messages."""
         return f"{self.headline}\n{self.advice}"
 
     @property
     def headline(self) -> str:
-        """Where it is and what is wrong, in one line."""
+        """Place and fault, in one line."""
         place = f"{self.file}:{self.line}" if self.line else self.file
         place += "" if self.serious else f": {self.severity}"
         return f"{place}: {self.what} [{self.rule}]"
 
     @property
     def advice(self) -> str:
-        """Why it matters and what to do about it, in two lines."""
+        """Reason and remedy, in two lines."""
         return f"    why: {self.why}\n    do:  {self.remedy}"
 
     def as_dict(self) -> dict[str, str | int]:
-        """Return the finding as JSON can take it."""
+        """Return the finding as JSON data."""
         return asdict(self)
 
 
 def listing(findings: Sequence[Finding]) -> str:
-    """Return findings as a terminal shows them: errors last, where one looks first; advice once for findings of a kind."""
+    """Return findings for a terminal: errors last, and the advice for one kind of finding only once."""
     parts = []
     for severity in (REMARK, WARNING, ERROR):
         own = [finding for finding in findings if finding.severity == severity]
@@ -94,20 +94,20 @@ def listing(findings: Sequence[Finding]) -> str:
 
 
 class Places:
-    """Where the nodes of a loaded graph come from: file, line and label. Files are parsed again only when asked."""
+    """The origin of the nodes of a loaded graph: file, line and label. Files are parsed again only when asked for."""
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a node, with its file, line and label filled in; of one that an update says, its place in that."""
+        """Return a finding on a node with file, line and label; a finding in an update has the place in the update."""
         if node in self.graph.written:
             return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
         file = self._files.get(node) or self._naming(node) or self.graph.path
         return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
 
     def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a part of an update: its behaviour is the node, and the file's line that of the part."""
+        """Return a finding on a part of an update: the node is the behaviour, the line that of the part."""
         node = place.behavior
         file = self._files.get(node) or self.graph.path
         line = _line(file, node)
@@ -128,7 +128,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that names a node of which no file says anything."""
+        """Return a file that names a node about which no file states anything."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
@@ -159,12 +159,12 @@ def fill(template: str, words: Mapping[str, str]) -> str:
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings once each, by file and line; first what others may follow from."""
+    """Return the findings without duplicates, by file and line; causes first."""
     return sorted(set(findings), key=lambda finding: (finding.rule not in CAUSES, finding))
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:
-    """Return the IRIs that a file gives a type, and those that it says anything else about."""
+    """Return the IRIs that a file types, and those about which it states anything else."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
     with readable(file) as (content, form):
         for quad in ox.parse(content, format=form, base_iri=file.as_uri()):
@@ -174,7 +174,7 @@ def _subjects(file: Path) -> dict[str, list[str]]:
 
 
 def relative(node: str, file: Path) -> str:
-    """Return an IRI as it stands in a file, where it is relative to that.
+    """Return an IRI as its file writes it, if it is relative there.
 
     >>> relative("file:///tmp/a.ttl#x", Path("/tmp/a.ttl")), relative("file:///tmp/x", Path("/tmp/a.ttl"))
     ('#x', 'x')
@@ -184,7 +184,7 @@ def relative(node: str, file: Path) -> str:
 
 
 def _line(file: Path | None, node: str) -> int:
-    """Return the first line on which a Turtle file has the node as its subject, else on which it has its name."""
+    """Return the first line on which a Turtle file has the node as subject, or else mentions it."""
     if file is None or file.suffix != ".ttl":
         return 0
     text, short = file.read_text(encoding="utf-8"), local_name(node)

@@ -1,13 +1,13 @@
-"""Logic at edit time: HermiT says whether an ontology is consistent, and what can never be. owlready2 brings its jar.
+"""Logic at edit time: HermiT decides whether an ontology is consistent and which classes are empty. owlready2 brings its jar.
 
-Three questions are asked in one run of the reasoner: is the whole consistent, which named classes are empty in every model, and
-which behaviours have a precondition that no individual could satisfy. For the third, each term of a behaviour becomes a class,
-its *prototype*: what the positive conditions say about the term, with variables as nested classes. An empty prototype means that
-the conditions contradict the ontology. Two conditions that meet in one variable are looked at apart, so that this finds
-contradictions but doesn't prove that there are none.
+One run of the reasoner answers three questions: is the ontology consistent, which named classes are empty in every model, and
+which behaviours have a precondition that no individual can satisfy. For the third, each term of a behaviour becomes a class, its
+*prototype*: the positive conditions on the term, with variables as nested classes. An empty prototype means that the conditions
+contradict the ontology. Two conditions on one variable are examined separately, so this finds contradictions and doesn't prove
+that there are none.
 
-HermiT compares each two members of an ``owl:AllDifferent``: minutes at a thousand objects. It gets each member a number of its
-own instead, by a functional property that nothing else has: the same is concluded, in seconds.
+HermiT compares every two members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead, each member gets
+a number by a functional property of its own: the conclusions are the same, within seconds.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valuePropert
 
 
 class NoJavaError(KnowledgeError):
-    """There is no Java to run HermiT with."""
+    """No Java was found that could run HermiT."""
 
 
 def java() -> str:
@@ -73,7 +73,7 @@ def java() -> str:
 
 @dataclass(frozen=True)
 class Classification:
-    """What HermiT concluded.
+    """The conclusions of HermiT.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Classification:
 
 
 def world_of(triples: bytes) -> Any:
-    """Return an owlready2 world of some N-Triples; imports are left out, since they were followed before."""
+    """Return an owlready2 world of some N-Triples, without imports, which were followed before."""
     import owlready2
 
     world = owlready2.World()
@@ -144,7 +144,7 @@ def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False
 
 
 def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
-    """Return what HermiT prints about an ontology, or None if it is inconsistent."""
+    """Return HermiT's output for an ontology; None if it is inconsistent."""
     from owlready2.reasoning import _HERMIT_CLASSPATH
 
     with tempfile.TemporaryDirectory() as folder:
@@ -178,7 +178,7 @@ def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
 
 
 def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
-    """Yield triples with each owl:AllDifferent said by numbers: a functional property with another value of each member."""
+    """Yield triples in which each owl:AllDifferent is expressed by numbers: a functional property with different values."""
     all_different = ox.NamedNode(OWL + "AllDifferent")
     groups = {triple.subject for triple in triples if triple.predicate == TYPE and triple.object == all_different}
     first: dict[Any, Any] = {triple.subject: triple.object for triple in triples if triple.predicate == FIRST}
@@ -198,7 +198,7 @@ def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
 
 
 def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield what HermiT finds wrong: rule, node, what, why, remedy."""
+    """Yield the findings of HermiT: rule, node, what, why, remedy."""
     try:
         reading = read(graph)
     except KnowledgeError:
@@ -252,7 +252,7 @@ def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Writes what a behaviour's conditions say about a term as an OWL class, in Turtle."""
+    """Writes the conditions of a behaviour on a term as an OWL class, in Turtle."""
 
     reading: Reading
     properties: dict[str, str]
@@ -266,7 +266,7 @@ class _Writer:
         return _all(parts)
 
     def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
-        """Yield what one condition says about a term: nothing, or one class expression."""
+        """Yield the class expression of one condition on a term, if it has one."""
         match condition:
             case ValueCondition(situation, (about,), value, negated) if about == name:
                 iri = self.properties.get(self.reading.names.iri(situation))
@@ -287,7 +287,7 @@ class _Writer:
 
 
 def _flat(conditions: Sequence[Condition]) -> Iterator[Condition]:
-    """Yield conditions with those inside a positive witness among them."""
+    """Yield conditions, and those inside positive witnesses."""
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
             yield from _flat(condition.conditions)

@@ -24,7 +24,7 @@ from confab.reasoner.vocabulary import CORE
 
 
 def unlike_units(case: Case) -> Iterator[Fault]:
-    """Find amounts of different units that are compared, added, or assigned to one another."""
+    """Find amounts of different units that are compared, added or assigned to one another."""
     if case.reading is None:
         return
     reading = case.reading
@@ -34,7 +34,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     }
 
     def unit(expression: Expression) -> tuple[str, str]:
-        """Return the unit of an amount, none if it has none or could have any, and two that don't go together."""
+        """Return the unit of an amount (None if it has none, or any fits), and two units that don't match."""
         match expression:
             case Amount(situation):
                 return units.get(situation, ""), ""
@@ -74,7 +74,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
 
 
 def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]]:
-    """Yield the pairs of amounts that a behaviour compares, or changes one by the other, and which of that it does."""
+    """Yield the pairs of amounts that a behaviour compares or combines, and the operation."""
     for one in (inner for condition in behavior.conditions for inner in walk(condition)):
         if isinstance(one, Comparison):
             yield one.left, one.right, "compares"
@@ -86,7 +86,7 @@ def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]
 
 
 def multiplied_amounts(case: Case) -> Iterator[Fault]:
-    """Find amounts that change and are multiplied, or divided by: a whole level isn't searched with such a calculation."""
+    """Find products and quotients of changing amounts: flat search of a level doesn't support them."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -111,7 +111,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals without a number that a behaviour reads of their class: nothing can be done with them."""
+    """Find individuals without a number that a behaviour requires of their class: no behaviour can use them."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -142,7 +142,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
 def _measured(
     conditions: Sequence[Condition], among: Mapping[str, tuple[str, frozenset[str]]], problem: Problem
 ) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Yield each relation that gives a number of one term, with the term's class and the individuals that it can stand for."""
+    """Yield each relation that gives a number of one term, with the class of the term and its individuals."""
     among = dict(among)
     for condition in conditions:
         if isinstance(condition, ClassCondition) and not condition.negated and condition.term in among:
@@ -166,14 +166,14 @@ def _measured(
 # --------------------------------------------------------------------------------------------------- what amounts come to
 
 Range = tuple[Fraction | float, Fraction | float]
-"""The least and the most that an amount comes to."""
+"""Minimum and maximum of an amount."""
 ANY: Range = (-inf, inf)
 ROUNDS = 4
-"""Rounds after which a range that still grows is taken to grow without end."""
+"""Number of rounds after which a growing range counts as unbounded."""
 
 
 def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
-    """Find behaviours that can never be done, since the amounts that they ask for or lead to are never there."""
+    """Find behaviours that are never applicable, since their conditions or effects need amounts out of reach."""
     if case.reading is None or not case.reading.problem.initial:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -203,7 +203,7 @@ def _compares(behavior: Behavior) -> bool:
 
 
 class _Ranges:
-    """For each situation type what its amounts come to, over all individuals and all behaviours done so far."""
+    """For each situation type the range of its amounts, over all individuals and all sequences of behaviours."""
 
     def __init__(self, problem: Problem) -> None:
         self.quantities = {name: s.quantity for name, s in problem.domain.situations.items() if s.quantity is not None}
@@ -218,7 +218,7 @@ class _Ranges:
         }
 
     def widen(self, situation: str, more: Range, endlessly: bool = False) -> bool:
-        """Add amounts to those of a situation type; return whether some are new."""
+        """Add amounts to those of a situation type; return whether the range grew."""
         old = self.known.get(situation)
         low, high = more if old is None else (min(old[0], more[0]), max(old[1], more[1]))
         if endlessly and old is not None:
@@ -230,7 +230,7 @@ class _Ranges:
         return self.known[situation] != old
 
     def of(self, expression: Expression, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return what an expression comes to; None if nothing has such an amount."""
+        """Return the range of an expression; None if it has no value."""
         if expression in narrowed:
             return narrowed[expression]
         match expression:
@@ -245,7 +245,7 @@ class _Ranges:
                 return expression, expression
 
     def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
-        """Return what keeps a behaviour from being done, and what the amounts in it come to; None if nothing does."""
+        """Return why a behaviour is not applicable, with the ranges of its amounts; None if it is."""
         narrowed: dict[Expression, Range] = {}
         for condition in behavior.preconditions:
             if not isinstance(condition, Comparison) or condition.negated:
@@ -275,7 +275,7 @@ class _Ranges:
         return None
 
     def about(self, part: Comparison | AmountEffect) -> str:
-        """Return what the amounts that a condition or effect names come to, as a sentence."""
+        """Return the ranges of the amounts in a condition or effect, as a sentence."""
         found = (
             situations_in(part.left) | situations_in(part.right)
             if isinstance(part, Comparison)
@@ -296,7 +296,7 @@ class _Ranges:
         return " and ".join(said) or "that is never so"
 
     def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return what an effect makes of an amount."""
+        """Return the range of an amount after an effect."""
         now, by = self.of(Amount(effect.situation, effect.arguments), narrowed), self.of(effect.amount, narrowed)
         if now is None or by is None:
             return None
@@ -304,7 +304,7 @@ class _Ranges:
         return by if sign is None else _calculated(sign, now, by)
 
     def extend(self, behavior: Behavior, endlessly: bool) -> bool:
-        """Add what a behaviour makes of amounts; return whether that is new."""
+        """Add the amounts that a behaviour produces; return whether a range grew."""
         found = [(effect.situation, self.after(effect, {})) for effect in behavior.amounts]
         new = [self.widen(situation, after, endlessly) for situation, after in found if after is not None]
         return any(new)
@@ -314,7 +314,7 @@ CONVERSE = {"<": ">", "<=": ">=", "=": "=", ">=": "<=", ">": "<"}
 
 
 def _possible(sign: str, left: Range, right: Range) -> bool:
-    """Return whether some amount of one range compares with some of another as an operator says."""
+    """Return whether a comparison holds for some amounts of two ranges."""
     match sign:
         case "<":
             return left[0] < right[1]
@@ -329,7 +329,7 @@ def _possible(sign: str, left: Range, right: Range) -> bool:
 
 
 def _narrowed(sign: str, left: Range, right: Range) -> Range:
-    """Return the part of a range that compares with some amount of another as an operator says."""
+    """Return the part of a range for which a comparison with some amount of another range holds."""
     low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
     high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
     return low, high
@@ -359,6 +359,6 @@ def _plain_amount(amount: Amount) -> str:
 
 
 def some(names: Sequence[str], most: int = 5) -> str:
-    """Return the first of some names as a list in a sentence."""
+    """Return some names as a list in a sentence."""
     shown = [*names[:most], *(["others"] if len(names) > most else [])]
     return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))

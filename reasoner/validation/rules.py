@@ -1,4 +1,4 @@
-"""The table of our own rules of validation, those that a SPARQL query can't say well.
+"""The table of our own validation rules, for what a SPARQL query can't express well.
 
 Each rule is a function from a `Case` to findings, written as (node, what, why, remedy).
 """
@@ -37,6 +37,6 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
 WARNINGS = frozenset(
     {"axiom-not-watched", "crowded", "number-missing", "other-kind", "product-of-amounts", "repeated-name"}
 )
-"""Rules of what can be planned with all the same."""
+"""Rules whose findings don't prevent planning."""
 REMARKS = frozenset({"defined"})
-"""Rules that tell of what isn't wrong."""
+"""Rules that report facts which aren't faults."""

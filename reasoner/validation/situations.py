@@ -1,4 +1,4 @@
-"""Rules of the situation in the beginning, and of the one that is wanted: what physics allows in no state."""
+"""Rules on the initial situation and on the goal: states that physics doesn't allow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from confab.reasoner.validation.case import Case, Fault
 
 
 def impossible_situations(case: Case) -> Iterator[Fault]:
-    """Find an initial situation that can't be, and goals that can't hold together."""
+    """Find impossible initial situations, and goals that can't hold together."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

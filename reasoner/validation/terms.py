@@ -1,4 +1,4 @@
-"""Rules of names: terms that aren't declared, individuals that may be one, names of files."""
+"""Rules on names: undeclared terms, individuals that may be identical, names of files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Ann
 
 
 def undeclared_terms(case: Case) -> Iterator[Fault]:
-    """Find predicates that are no property, types that are no class, and individuals without a type."""
+    """Find undeclared properties and classes, and individuals without a type."""
     seen = set()
     for subject, iri, wanted, kinds in _undeclared(case):
         if iri in seen:
@@ -50,7 +50,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
 
 
 def relative_iris(case: Case) -> Iterator[Fault]:
-    """Find IRIs that are relative: what they stand for depends on where the file lies."""
+    """Find relative IRIs, which depend on the folder of the file."""
     for node in sorted(case.relative):
         name = local_name(node)
         yield (
@@ -62,7 +62,7 @@ def relative_iris(case: Case) -> Iterator[Fault]:
 
 
 def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
-    """Yield each use of a term that isn't declared: the subject, the term, what it has to be, in words and as classes."""
+    """Yield each use of an undeclared term: the subject, the term, and what it has to be, in words and as classes."""
     for triple in case.triples:
         for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
             types = case.types.get(iri, set())
@@ -71,7 +71,7 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return what names a term that isn't declared, and what names that: other faults of these may follow from it."""
+    """Return the nodes that name an undeclared term, and those that name these nodes: their other faults may follow from it."""
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value
@@ -110,7 +110,7 @@ SELECT DISTINCT ?individual ?class WHERE {
 
 
 def individuals_not_different(case: Case) -> Iterator[Fault]:
-    """Find things, or values of a functional property, of one class that nothing says to be different."""
+    """Find individuals or values of one class that no statement declares different."""
     groups = _all_different(case)
     apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
     members: dict[str, set[str]] = defaultdict(set)
@@ -153,7 +153,7 @@ def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
 
 
 def files_and_iris(case: Case) -> Iterator[Fault]:
-    """Find files whose name isn't the last part of their IRI, and catalogs that lead elsewhere."""
+    """Find files whose name isn't the last part of their IRI, and catalog entries that don't match."""
     for iri, file in case.graph.files.items():
         wanted = unquote(local_name(iri))
         if file.stem != wanted:

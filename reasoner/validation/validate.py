@@ -60,35 +60,36 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
+"""Rules that are silent about a node with an undeclared term, and about nodes that name it: they may hold once the name is
+corrected."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
-"""Checks that don't speak of a node of which another one does: who follows the remedy of the first makes it worse."""
+"""Checks that are silent about a node with a finding of another check, whose remedy could make theirs worse."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
-"""Checks that find facts or bounds at fault, as `impossible-situation` does, too."""
+"""Checks that report facts or bounds, as `impossible-situation` does."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
-"""Rules that ask what comes of the initial situation: they wait until its facts are right."""
+"""Rules that depend on the initial situation: they wait until its facts are correct."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
-"""What isn't said as long as the update of some behaviour can't be read."""
+"""Rules that are silent as long as the update of some behaviour can't be read."""
 
 MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_checks.RULES
 """Rules on an embodiment."""
 
 STAGES = 4
-"""Of the validation of a file."""
+"""Rules on a file."""
 QUICK = 100_000
-"""Triples up to which errors are looked for besides planning."""
+"""Maximum number of triples for which errors are looked for during planning."""
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
-"""Namespaces of the properties that shapes look at: not at the facts of scenes, which are many."""
+"""Namespaces of the properties in shapes, which exclude the many facts of scenes."""
 LISTS = (RDF + "first", RDF + "rest")
 
 
 def validate(
     files: Sequence[str | Path], *, deep: bool = False, done: Callable[[str], object] | None = None
 ) -> list[Finding]:
-    """Return everything that is wrong with some ontology files and what they import.
+    """Return the findings in some ontology files and their imports.
 
     Parameters
     ----------
@@ -115,9 +116,9 @@ def validate(
 
 
 def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
-    """Return the errors that are found in a moment in a graph whose conclusions are drawn: without shapes, bodies and HermiT.
+    """Return the errors that are found quickly in a graph with its conclusions: without shapes, bodies and HermiT.
 
-    A very large graph isn't looked at.
+    A very large graph isn't checked.
     """
     if len(graph.store) > QUICK:
         return []
@@ -132,13 +133,13 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
 
 
 def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
-    """Yield findings but for those that may only follow from a term that isn't declared."""
+    """Yield findings, except those that may only follow from an undeclared term."""
     unsure = misread(case)
     yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
 
 
 def _by_rules(case: Case, places: Places, found: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield what our own rules find, but for what may only follow from facts that are at fault."""
+    """Yield the findings of our own rules, except those that may only follow from wrong facts."""
     wrong_facts = any(finding.rule in WRONG_FACTS for finding in found)
     for rule, faults in RULES.items():
         if rule in FROM_FACTS and (wrong_facts or next(impossible_situations(case), None) is not None):
@@ -193,7 +194,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
 
 def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
-    """Return some behaviours and all that extend them, whose own updates can't be read without theirs."""
+    """Return some behaviours and those that extend them, whose updates can't be read without theirs."""
     pairs = [(text(one), text(other)) for one, other in graph.select("SELECT ?one ?other { ?one :extends ?other }")]
     found = set(behaviors)
     while more := {one for one, other in pairs if other in found} - found:
@@ -202,7 +203,7 @@ def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
 
 
 def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    """Conclude what follows by OWL 2 RL, so that the other checks see it, too."""
+    """Add the conclusions of OWL 2 RL, so that the other checks see them."""
     try:
         infer(graph)
     except KnowledgeError as error:
@@ -211,7 +212,7 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
 
 
 def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) -> Iterator[Finding]:
-    """Check the measures of bodies, if the scene has a robot that could take them."""
+    """Check the measures of bodies, if the scene has a robot for them."""
     if reading is None or not graph.select(ROBOTS):
         return
     try:
@@ -237,7 +238,7 @@ def _read(graph: KnowledgeGraph) -> tuple[Reading | None, KnowledgeError | None]
 
 
 def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) -> Finding:
-    """Return what the planner says of a file that it can't read, at the node that it names."""
+    """Return the planner's message about an unreadable file, at the node that it names."""
     why, said = "the planner reads the file in the same way", str(problem)
     named = [problem.node, *re.findall(r"<([^<>\s]+:[^<>\s]+)>", said)]
     what, mark, remedy = said.rpartition("; ")
@@ -256,7 +257,7 @@ def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) 
 
 @dataclass(frozen=True)
 class Check:
-    """A query that must have no rows, with the sentences to say about each row that it has."""
+    """A query that must have no rows, with the sentences for each row."""
 
     rule: str
     what: str
