@@ -15,7 +15,7 @@ from confab import ontology
 from confab.memory import Memory
 from confab.planner.paper.transitions import ground
 from confab.planner.solve import Mode
-from confab.reasoner.files import alone, write_whole
+from confab.reasoner.files import STDOUT, alone, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.memory.experience_file import Lines
 from confab.reasoner.names import local_name, nearest
@@ -128,7 +128,7 @@ def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, cl
 def turtle_path(given: str | Path) -> Path:
     """Return the path of a scene to write, if a scene can be read from there again."""
     path = Path(given)
-    if path.suffix.lower() != ".ttl":
+    if path.suffix.lower() != ".ttl" and path != STDOUT:
         raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
     return path
 

@@ -18,7 +18,7 @@ from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
 GROUPS = {  # as the help lists them, the main ones first
-    "Plan and act": ("plan", "run", "verify", "execute", "explain"),
+    "Plan and act": ("plan", "run", "runs", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
     "Ask": ("query", "serve", "mcp", "picture"),
     "Author": ("validate", "new", "generate", "convert", "fetch"),
@@ -27,6 +27,7 @@ GROUPS = {  # as the help lists them, the main ones first
 COMMANDS = {
     "plan": ("planning", "plan"),
     "run": ("planning", "run"),
+    "runs": ("planning", "runs"),
     "verify": ("planning", "verify"),
     "execute": ("planning", "execute"),
     "serve": ("asking", "serve"),

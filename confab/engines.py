@@ -24,6 +24,7 @@ from confab.planner.plan import Outcome, Plan, Reason, Status
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, within
+from confab.reasoner.names import nearest
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.symbols import Problem, Symbol
 from confab.reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
@@ -42,6 +43,17 @@ WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases
 """Packages of engines that take no amounts."""
 WITH_DEFINITIONS = {"up_fast_downward"}
 """Packages of engines that take derived predicates; unified-planning itself reads none."""
+KNOWN = {
+    "aries": "up-aries",
+    "enhsp": "up-enhsp",
+    "fast-downward": "up-fast-downward",
+    "fmap": "up-fmap",
+    "lpg": "up-lpg",
+    "pyperplan": "up-pyperplan",
+    "symk": "up-symk",
+    "tamer": "up-tamer",
+}
+"""Packages that bring an engine, by its name in unified-planning."""
 Answer = tuple[str, str, list[str]]
 """An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""
 
@@ -152,13 +164,14 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
         from unified_planning.engines import PDDLPlanner
         from unified_planning.environment import Environment
     except ImportError:
-        raise KnowledgeError("engines need unified-planning; install the extra pddl") from None
+        raise KnowledgeError("engines need unified-planning: pip install unified-planning") from None
 
     factory = Environment().factory
     if engine is not None and engine not in factory.engines:
         known = ", ".join(name for name in factory.engines if factory.engine(name).is_oneshot_planner()) or "none"
         raise KnowledgeError(
-            f"no engine '{engine}' is installed (installed: {known}); pip install up-{engine} may bring it"
+            f"no engine '{engine}' is installed{nearest(engine, KNOWN)} (installed: {known}); "
+            + (f"pip install {KNOWN[engine]} brings it" if engine in KNOWN else "unified-planning lists its engines")
         )
     first = engine or next((name for name in factory.preference_list if name in factory.engines), None)
     if first and issubclass(factory.engine(first), PDDLPlanner) and ":numeric-fluents" not in domain:

@@ -13,6 +13,13 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab run towers-small",
         "confab run beverage-serving --memory memory.ttl -o out --no-video",
     ),
+    "runs": (
+        "confab run towers-small -o runs --keep",
+        "confab run towers-small -o runs --keep",
+        "confab runs runs",
+        "confab runs runs 001 002",
+        "confab runs runs -o history.html",
+    ),
     "verify": (
         "confab plan beverage-serving -o plan.json",
         "confab verify beverage-serving plan.json",

@@ -380,6 +380,7 @@ class Options(TypedDict, total=False):
     patience: Patience
     caution: Caution | None
     perturb: bool
+    noise: float
     both_hands: bool
 
 
@@ -461,6 +462,7 @@ def execute(
     patience: Patience = Patience(),  # noqa: B008 - frozen
     caution: Caution | None = None,
     perturb: bool = False,
+    noise: float = 0.0,
     both_hands: bool = False,
 ) -> Execution:
     """Carry a task out in a closed loop.
@@ -488,6 +490,8 @@ def execute(
         What failed in earlier episodes.
     perturb : bool
         Vary poses, friction, masses and fill in PyBullet, by `seed`.
+    noise : float
+        Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
         In PyBullet: carry the plan out with all hands at once; what isn't done then, one hand after the other. Nobody interferes.
 
@@ -499,6 +503,8 @@ def execute(
     texts = list(interventions)
     wanted = [i for i in texts if isinstance(i, Intervention)]
     wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
+    if noise and world != "pybullet":
+        raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
     if both_hands and (world != "pybullet" or wanted):
         raise KnowledgeError("both hands at once: only in the world pybullet, and without interventions")
     if world == "symbolic":
@@ -516,7 +522,7 @@ def execute(
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     require_skills(scene, [behavior.name for behavior in lowest])
     varied = Perturbation() if perturb else None
-    with possible(), Physics(scene.embodiment, problem.initial, seed, varied) as physics:
+    with possible(), Physics(scene.embodiment, problem.initial, seed, varied, noise=noise) as physics:
         if prepare is not None:
             prepare(physics)
         live = LiveWorld(physics, problem.classes, problem, _reach_of(scene))

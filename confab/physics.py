@@ -169,6 +169,7 @@ class Options(TypedDict, total=False):
     """What else `verify` takes."""
 
     perturb: bool
+    noise: float
     video: str | Path | None
     prepare: Callable[[World], None] | None
     progress: Callable[[int, PrimitiveStep], None] | None
@@ -185,6 +186,7 @@ def verify(
     rollouts: int = 1,
     seed: int = 0,
     perturb: bool = False,
+    noise: float = 0.0,
     video: str | Path | None = None,
     prepare: Callable[[World], None] | None = None,
     progress: Callable[[int, PrimitiveStep], None] | None = None,
@@ -203,6 +205,8 @@ def verify(
         Number of rollouts, with the seeds `seed`, `seed` + 1, …
     perturb
         Vary poses, friction, masses and fill.
+    noise
+        Standard deviation of perceived positions, in metres.
     video
         Film the first rollout.
     prepare
@@ -227,6 +231,7 @@ def verify(
     """
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
+    number("noise", noise, "metres, e.g. 0.002")
     number("time_limit", time_limit, "seconds as a number, e.g. 5")
     if rollouts < 1:
         raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")
@@ -241,6 +246,7 @@ def verify(
             steps,
             expected,
             perturb=Perturbation() if perturb else None,
+            noise=noise,
             prepare=prepare,
         )
         seeds = list(range(seed, seed + rollouts))

@@ -441,6 +441,28 @@ class Result:
 
         return float(cost_of(self.problem, self.plan))
 
+    def dearer(self) -> str:
+        """Return what is known of a cheaper plan, and how to ask for it; an empty text if nothing is.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").plan().dearer()
+        ''
+        """
+        from confab.planner.plan_costs import in_circles
+
+        if self.outcome.plan is None or self.outcome.bound is not None:
+            return ""
+        how = "--optimal (in Python optimal=True) looks for a cheaper one"
+        if circles := in_circles(self.problem, self.plan):
+            of = len(self.plan.primitives)
+            return f"{circles} of the {of} primitives only undo each other (the steps above ask for them); {how}"
+        costs = {behavior.cost for behavior in self.problem.domain.behaviors.values()}
+        if self.outcome.cost is not None or len(costs) > 1:
+            return f"the plan costs {self.cost:g}; a cheaper one wasn't looked for: {how}"
+        return ""
+
     @property
     def solved(self) -> bool:
         """Whether there is a plan."""

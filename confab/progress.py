@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Timer
+from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
@@ -31,8 +32,12 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
     total : int, optional
         How much there is to do; if nobody knows, the bar shows the time alone.
     """
-    if quiet() or not sys.stderr.isatty():
-        yield lambda _, __: None
+    begin = perf_counter()
+    if quiet() or not sys.stderr.isatty() or log.isEnabledFor(logging.DEBUG):
+        try:
+            yield lambda _, __: None
+        finally:
+            log.debug("confab: %s took %.2f s", what, perf_counter() - begin)
         return
     bar = progress_bar()
     task = bar.add_task(what, total=total)
@@ -69,6 +74,17 @@ def tell(what: str) -> None:
     """Say on stderr in a line what goes on, where no bar can be shown."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
+
+
+def be_verbose() -> None:
+    """Say on stderr what each stage takes, and what is logged, until the process ends."""
+    spoken = logging.getLogger("confab")
+    spoken.setLevel(logging.DEBUG)
+    if not spoken.handlers:
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("%(message)s"))
+        spoken.addHandler(handler)
+        spoken.propagate = False
 
 
 def quiet() -> bool:

@@ -35,13 +35,15 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
     A scene whose bodies aren't complete yet can be planned in all the same; `tell` then hears what is missing.
     """
     graph = scene.knowledge
-    if (
-        graph.remote
-        or graph.faults
-        or graph.path is None
-        or graph.path.is_relative_to(ontology.ROOT)
-        or not graph.select(ROBOTS)
-    ):
+    if graph.remote or graph.faults or not graph.select(ROBOTS):
+        return scene
+    if graph.path is None:  # a text has no file beside it
+        try:
+            return with_reach(scene)
+        except (KnowledgeError, ImportError) as error:
+            tell(f"what the hands reach isn't known: {error}")
+            return scene
+    if graph.path.is_relative_to(ontology.ROOT):
         return scene
     file = graph.path.with_name(f"{graph.path.stem}.reach.ttl")
     own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]

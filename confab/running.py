@@ -4,107 +4,125 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from confab.history import RECORD, record
 from confab.memory import Memory, undisturbed
 from confab.planner.plan import Status
-from confab.planner.solve import Mode
+from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, unreached, with_reach
 from confab.reasoner.files import check_replaceable, has_content, write_whole
-from confab.reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, VERDICTS
+from confab.reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, RUN, VERDICTS
 from confab.reasoner.reading.observed import assert_observed, save_observed
 from confab.reasoner.validation.findings import listing
 from confab.reasoner.validation.validate import validate
 from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene, load
 from confab.show import show
+from confab.terminal import MISUSE, WITHOUT_PHYSICS, remark
 
 if TYPE_CHECKING:
     from confab.physics import Report
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8
-"""After so many primitives it is said how far the plan is, where there is no progress bar."""
+"""Number of primitives between two lines on how far the plan is, where there is no progress bar."""
 
 
-def run(name: str, memory: Path | None, mode: Mode, seed: int, out: Path, film: bool, gui: bool = False) -> int:
-    """Do the main job on a scene and say on stdout what came of it; files go to `out`, what was learned to `memory` alone.
+@dataclass(frozen=True)
+class Job:
+    """What `run` does: its scene and goals, how it plans, what it films, and where the results go.
 
-    A scene without a robot's body is planned in, and the plan is checked; physics has no say then.
+    `memory` is the only file that is read or written as memory. `noise` is the standard deviation of perceived positions in metres.
+    """
+
+    scene: str
+    out: Path
+    goals: tuple[str, ...] = ()
+    memory: Path | None = None
+    mode: Mode = DEFAULT_MODE
+    seed: int = 0
+    noise: float = 0.0
+    film: bool = True
+    gui: bool = False
+
+
+def run(job: Job) -> int:
+    """Do the main job, print its results, and write its files.
+
+    A scene without a robot's body is planned in and the plan is checked. The same is done where PyBullet isn't installed: a
+    remark says first what can't be done, and the exit code is that of misuse.
 
     Returns
     -------
     int
-        Exit code: 0 verified, 1 invalid, unsolvable or failed in physics, 3 gave up.
+        Exit code: 0 verified, 1 invalid, unsolvable or failed in physics, 2 not verified without PyBullet, 3 gave up.
 
     Raises
     ------
     KnowledgeError
         The scene, or the memory, can't be read.
     """
-    kinds = {
-        "plan.json": PLAN,
-        "report.html": REPORT,
-        "verify.json": VERDICTS,
-        "observed.ttl": OBSERVED,
-        "run.mp4": FILM,
-    }
-    for file, kind in kinds.items():
-        check_replaceable(out / file, kind)
-    if memory is not None:
-        check_replaceable(memory, MEMORY)
+    kinds = {"plan.json": PLAN, "report.html": REPORT, "verify.json": VERDICTS, "observed.ttl": OBSERVED}
+    for file, kind in {**kinds, "run.mp4": FILM, RECORD: RUN}.items():
+        check_replaceable(job.out / file, kind)
+    if job.memory is not None:
+        check_replaceable(job.memory, MEMORY)
     tell("validating")
     with progress("validating") as advance:
-        findings = validate([name], done=lambda what: advance(what, 0))
+        findings = validate([job.scene], done=lambda what: advance(what, 0))
     if findings:
         print(listing(findings))
     if any(finding.serious for finding in findings):
         return NO
     tell("loading the scene")
-    scene = load(name)
+    scene = load(job.scene)
     bodies = has_robot(scene)
-    scene = with_reach(scene) if bodies else scene
+    physics = find_spec("pybullet") is not None
+    if bodies and not physics:
+        remark(f"the plan won't be verified, filmed or learned from: {WITHOUT_PHYSICS}")
+    scene = with_reach(scene) if bodies and physics else scene
     tell("planning")
     with progress("planning"):
+        memory = job.memory
         remembered = Memory.load(memory, scene) if memory and has_content(memory) else Memory.of(scene)
-        result = scene.plan(memory=remembered, mode=mode)
-    if result.outcome.plan is None:
-        show(result)
-        for line in unreached(scene) if bodies else ():
-            tell(line)
-        print(f"report    {reported(scene, result, None, None, out)}")
-        return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
+        result = scene.plan(job.goals, remembered, job.mode)
     report = None
-    if bodies:
-        video = out / "run.mp4" if film else None
-        scene, result, report = persuaded(
-            scene, result, seed, video, gui, partial(Scene.plan, memory=remembered, mode=mode)
-        )
+    if result.outcome.plan is not None and bodies and physics:
+        replan = partial(Scene.plan, goals=job.goals, memory=remembered, mode=job.mode)
+        scene, result, report = persuaded(scene, result, job, replan)
     show(result if report is None else report)
-    if memory and (report is None or report.verified):
-        with undisturbed(memory):
-            if has_content(memory):  # others may have learned meanwhile
-                remembered = Memory.load(memory, scene)
+    for line in unreached(scene) if result.outcome.plan is None and bodies and physics else ():
+        tell(line)
+    good = result.outcome.plan is not None and (report is None or report.verified) and (physics or not bodies)
+    if job.memory and good:
+        with undisturbed(job.memory):
+            if has_content(job.memory):  # another process may have learned meanwhile
+                remembered = Memory.load(job.memory, scene)
             remembered.learn(scene, result)
-            remembered.save(memory)
-    files = written(scene, result, report, remembered if memory else None, out)
-    for what, path in {"memory": memory, **files}.items() if memory else files.items():
+            remembered.save(job.memory)
+    files = written(scene, result, report, remembered if job.memory else None, job)
+    for what, path in {"memory": job.memory, **files}.items() if job.memory and good else files.items():
         print(f"{what:<9} {path}")
-    return YES if report is None or report.verified else NO
+    if result.outcome.plan is None:
+        return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
+    if bodies and not physics:
+        return MISUSE
+    return YES if good else NO
 
 
-def persuaded(
-    scene: Scene, result: Result, seed: int, video: Path | None, gui: bool, plan: Callable[[Scene], Result]
-) -> tuple[Scene, Result, Report]:
+def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
     """Return the first plan that physics doesn't refute, with what is known by then, and what physics says of it.
 
     What a planner of motions refutes is known to the next plan, and kept if there is one.
     """
-    report = verified(scene, result, seed, video, gui)
+    report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):
         known = knowing(scene, refuted)
         tell(f"refuted: {refuted[-1]}; planning anew")
@@ -113,13 +131,14 @@ def persuaded(
             break
         keep(scene, refuted)
         scene, result = known, another
-        report = verified(scene, result, seed, video, gui)
+        report = verified(scene, result, job)
     return scene, result, report
 
 
-def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: bool = False) -> Report:
+def verified(scene: Scene, result: Result, job: Job) -> Report:
     """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
     steps = result.plan.primitives
+    video = job.out / "run.mp4" if job.film else None
     tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
     with progress("carrying out", len(steps)) as advance:
 
@@ -128,20 +147,21 @@ def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: b
             if done and done % TOLD == 0:
                 tell(f"{done} of {len(steps)} primitives done")
 
-        return scene.verify(result, seed=seed, video=video, gui=gui, progress=before)
+        return scene.verify(result, seed=job.seed, video=video, gui=job.gui, noise=job.noise, progress=before)
 
 
-def reported(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> Path:
-    """Write the report of a run, and return where it lies."""
+def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
+    """Write report and record, of a plan the plan, of a rollout verdicts and observed facts too, and return what lies where."""
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 
-    return write_page(out / "report.html", page_data(scene, result, report, learned=learned))
-
-
-def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> dict[str, Path]:
-    """Write plan and report, of what was carried out verdicts and observed facts too, and return what lies where."""
-    paths = {"plan": result.save(out / "plan.json"), "report": reported(scene, result, report, learned, out)}
+    out, paths = job.out, {}
+    if result.outcome.plan is not None:
+        paths["plan"] = result.save(out / "plan.json")
+    data = page_data(scene, result, report, learned=learned)
+    paths["report"] = write_page(out / "report.html", data)
+    how = {"goals": list(job.goals), "mode": job.mode, "seed": job.seed, "noise": job.noise}
+    paths["record"] = record(out, data, how, "" if learned is None else learned.said())
     if report is None:
         return paths
     paths |= {"verdicts": out / "verify.json", "observed": out / "observed.ttl"}

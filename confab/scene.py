@@ -292,6 +292,36 @@ def _read(source: object) -> KnowledgeGraph:
     return graph
 
 
+def load_text(content: bytes) -> Scene:
+    """Load a scene from its text: RDF/XML, JSON-LD or Turtle, by its first signs; it imports shipped ontologies.
+
+    Raises
+    ------
+    KnowledgeError
+        Broken syntax.
+    """
+    from tempfile import TemporaryDirectory
+
+    head = content.lstrip()[:200].lower()
+    xml = head.startswith((b"<?xml", b"<rdf:rdf", b"<!doctype"))
+    suffix = ".owl" if xml else ".jsonld" if head.startswith((b"{", b"[{")) else ".ttl"
+    begin = perf_counter()
+    with TemporaryDirectory() as folder:
+        file = Path(folder, f"stdin{suffix}")
+        file.write_bytes(content)
+        try:
+            graph = load_graph(file, tolerant=True)
+        except KnowledgeError as error:
+            raise KnowledgeError(str(error).replace(f"{folder}/", "")) from error
+        graph.faults[:] = [fault.replace(f"{folder}/", "") for fault in graph.faults]
+    graph.files.pop(graph.scene, None)
+    try:
+        infer(graph)
+    except KnowledgeError as error:
+        graph.faults.append(str(error))
+    return Scene(graph, {"load": perf_counter() - begin})
+
+
 def _local(address: str | PathLike[str]) -> str | Path:
     """Return a file's path for its address, ``file:///…``; anything else as it is."""
     if not isinstance(address, str) or not address.startswith("file:"):

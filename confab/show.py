@@ -98,6 +98,18 @@ def lengths(plan: Plan) -> str:
     return " / ".join(map(str, plan.length.values())) or "no"
 
 
+def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
+    """Return what a plan costs where behaviours have prices, and what is proved of its length or cost."""
+    said = "" if cost is None else f", costs {cost:g}"
+    if bound is None:
+        return said
+    best = "shortest" if cost is None else "cheapest"
+    if (len(plan.primitives) if cost is None else cost) <= bound:
+        return f"{said}, proved {best} on the lowest level"
+    least = f"any plan has at least {bound:g} primitives" if cost is None else f"any plan costs at least {bound:g}"
+    return f"{said}; not proved {best}: {least}; a longer --time-limit may prove more, or find a better plan"
+
+
 def summary(outcome: Outcome) -> str:
     """Return how a planning call ended: one line, and one more for each level given up and each rule broken by that."""
     expanded = sum(counts.expanded for counts in outcome.search.values())
@@ -106,8 +118,7 @@ def summary(outcome: Outcome) -> str:
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
     if not outcome.plan.steps:
         return f"solved: nothing to do, since all goals hold ({outcome.seconds * 1000:.0f} ms)"
-    bound = "" if outcome.cost is None else f", costs {outcome.cost:g}"
-    bound += "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
+    bound = _proved(outcome.plan, outcome.cost, outcome.bound)
     counts = outcome.plan.length
     on = " per level" if not counts or min(counts) == 1 else f" on levels {' / '.join(map(str, counts))}"
     effort = f"{expanded} expansions in all"

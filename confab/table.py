@@ -80,6 +80,16 @@ class Table(Sequence[tuple[str | None, ...]]):
         writer.writerows(self.rows)
         return text.getvalue()
 
+    def tsv(self) -> str:
+        r"""Return the rows separated by tabs, with a header line; tabs, line ends and backslashes in cells are escaped.
+
+        >>> Table(("what", "where"), (("cup 1", "a\tb"),)).tsv()
+        'what\twhere\ncup 1\ta\\tb\n'
+        """
+        escaped = str.maketrans({"\t": "\\t", "\n": "\\n", "\r": "\\r", "\\": "\\\\"})
+        lines = [self.columns, *self.rows]
+        return "".join("\t".join((cell or "").translate(escaped) for cell in line) + "\n" for line in lines)
+
     def records(self) -> list[dict[str, str | None]]:
         """Return the rows as one mapping each."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]

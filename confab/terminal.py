@@ -11,6 +11,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import Timer, current_thread, main_thread
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -32,7 +33,7 @@ LONGEST = 2_000
 
 WITHOUT_PHYSICS = (
     "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
-    "pip install 'confab-planner[physics]' compiles it; all but physics works without"
+    "pip install pybullet compiles it; all but physics works without"
 )
 
 
@@ -128,9 +129,19 @@ def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
         watch.cancel()
 
 
+def told(out: Path, text: str) -> None:
+    """Say what was written where: on stdout, or, if that is where it was written, on stderr."""
+    if out == Path("-"):
+        remark(text)
+    else:
+        print(f"{out}: {text}")
+
+
 def show_result(what: Any) -> None:
-    """Print JSON data, a line of text, or what rich can show, to stdout."""
-    if isinstance(what, dict | list):
+    """Print JSON data, a line of text, a table, or what rich can show, to stdout; a table in a pipe is separated by tabs."""
+    if hasattr(what, "tsv") and not sys.stdout.isatty():
+        print(what.tsv(), end="")
+    elif isinstance(what, dict | list):
         print(json.dumps(what, indent=1, ensure_ascii=False))
     elif isinstance(what, str):
         print(what)

@@ -28,6 +28,32 @@ def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
     return found
 
 
+def in_circles(problem: Problem, plan: Plan) -> int:
+    """Return the number of primitives that lead from a state back to the same state: the goal is reached without them.
+
+    Of nested circles the widest counts; where primitives do more than they undo, there is none.
+    """
+    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    values: dict[tuple[str, tuple[str, ...]], str | None] = {}
+    now, states = 0, [0]  # a state is the exclusive or of its facts' hashes
+    for step in plan.primitives:
+        for situation, key, value in (
+            rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or ()
+        ):
+            cell = situation, key
+            now ^= hash((cell, values[cell] if cell in values else facts.value(situation, key))) ^ hash((cell, value))
+            values[cell] = value
+            facts.put(situation, key, value)
+        states.append(now)
+    last = {state: number for number, state in enumerate(states)}
+    circles, at = 0, 0
+    while at < len(states) - 1:
+        back = last[states[at]]
+        circles += back - at
+        at = max(back, at) + 1
+    return circles
+
+
 def costs_of_steps(problem: Problem, steps: Sequence[Step]) -> list[float]:
     """Return what each of some steps costs, with all that is below it."""
     parts = [Plan((step,)).primitives for step in steps]

@@ -8,6 +8,7 @@ import logging
 import os
 import re
 import stat
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ from confab.reasoner.kinds import Kind, kind_of
 from confab.reasoner.limits import LimitError
 
 log = logging.getLogger(__name__)
+STDOUT = Path("-")
+"""In place of a file's name: standard output."""
 PATIENCE = 600.0
 """Seconds to wait for others who write beside a file: a lesson in a large scene takes minutes."""
 
@@ -36,6 +39,9 @@ def write_whole(
         Reads what was written; raises what is wrong with it, and nothing is replaced then.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
+    if path == STDOUT:
+        sys.stdout.write("".join(piece if isinstance(piece, str) else piece.decode("utf-8") for piece in pieces))
+        return
     with written_whole(path) as part:
         with part.open("xb") as file:
             for piece in pieces:
@@ -97,6 +103,8 @@ def check_replaceable(path: Path, kind: str) -> None:
     OSError
         The file must not be replaced.
     """
+    if path == STDOUT:
+        return
     target = _behind(path)
     try:
         if _replaceable(target) is not None:

@@ -31,6 +31,7 @@ GENERATED, IMPORTED, CONVERTED, CONSTRUCTED = (
     "a converted ontology",
     "a constructed ontology",
 )
+RUN = "the record of a run"
 DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
 STAMP = re.compile(rb"[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})\n?\Z")
 STAMP_BYTES = 200
@@ -151,6 +152,8 @@ def _json(text: bytes) -> Kind | None:
             return Kind(PLAN)
         case {"status": _, "success": _, "rollouts": list()}:
             return Kind(VERDICTS)
+        case {"run": _, "when": _, "how": _, "page": _}:
+            return Kind(RUN)
         case {"head": {"vars": list(names)}, "results": _}:
             return Kind(ROWS, columns=tuple(map(str, names)))
         case bool() | [] | {"head": _, "boolean": _}:

@@ -237,7 +237,7 @@ def _on_ray(trial: Trial, seeds: Sequence[int], address: str) -> Iterator[Rollou
     try:
         import ray
     except ImportError as error:
-        raise RuntimeError("workers on a Ray cluster need Ray: pip install 'confab-planner[cluster]'") from error
+        raise RuntimeError("workers on a Ray cluster need Ray: pip install ray") from error
     begun = not ray.is_initialized()
     if begun:
         ray.init(address=None if address == RAY else address, log_to_driver=False, logging_level="error")

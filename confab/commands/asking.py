@@ -24,8 +24,9 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
+from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.terminal import NO, YES, limited, show_result
+from confab.terminal import NO, YES, limited, show_result, told
 
 if TYPE_CHECKING:
     from confab.table import Table
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @QUERY_ROWS
 @QUIET
 def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
-    """Serve a scene as a page and a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
+    """Serve a scene as a page and a SPARQL endpoint, until Ctrl-C."""
     from threading import Event
 
     from confab.reasoner.graph.apart import QueryLimits
@@ -75,7 +76,10 @@ FORMS = {
 @command(epilog=examples("query"))
 @SCENE
 @click.argument(
-    "sparql", required=False, metavar="[QUERY]", help="SPARQL text, a .rq file, or a ready query: where-was-it."
+    "sparql",
+    required=False,
+    metavar="[QUERY]",
+    help="SPARQL text, a .rq file, a ready query (where-was-it), or - for stdin.",
 )
 @click.option(
     "--episodes", multiple=True, type=PATH, metavar="FILE", help="Ask this saved episode as well; repeatable."
@@ -121,6 +125,8 @@ def query(
     from confab.reasoner.graph.apart import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
+    if sparql == "-":
+        sparql = sys.stdin.read()
     asked = {"QUERY": sparql, "--show": show, "--affords": affords}
     given = [name for name, value in asked.items() if value is not None]
     if len(given) > 1:
@@ -144,11 +150,11 @@ def query(
         if out is not None and out.suffix.lower() == ".ttl":
             if sparql is None:
                 raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
-            print(f"{out}: {loaded.construct(sparql, out, limits)} triples")
+            told(out, f"{loaded.construct(sparql, out, limits)} triples")
             return
         with progress("asking"):
             table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
-    form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
+    form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out not in (None, STDOUT) else "table")
     if form is None or form not in FORMS.values():
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
         raise KnowledgeError(f"unknown format '{form or out}'; {wanted}")
@@ -179,4 +185,4 @@ def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -
     from confab.reasoner.kinds import TRIPLES, stamped
 
     write_whole(out, stamped(TRIPLES, [text]) if form == "turtle" else text)
-    print(f"{out}: {len(table)} rows")
+    told(out, f"{len(table)} rows")

@@ -22,7 +22,7 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE
-from confab.terminal import NO, YES, limited, remark, show_result
+from confab.terminal import NO, YES, limited, remark, show_result, told
 
 
 @command(epilog=examples("new"))
@@ -150,7 +150,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     from confab.reasoner.generate import write_scene
 
     write_scene(turtle_path(out), family, objects, hands, clutter, seed)
-    print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
+    told(out, f"a scene of the family {family}; plan in it with: confab plan {out}")
 
 
 @command(epilog=examples("convert"))
@@ -183,7 +183,7 @@ def convert(file: Path, form: str, out: Path | None) -> None:
         from confab.reasoner.kinds import stamped
 
         write_whole(turtle_path(out), stamped(CONVERTED, [found.text]))
-        print(f"{out}: {len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")
+        told(out, f"{len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")
     for note in found.notes:
         remark(note)
 
@@ -204,7 +204,7 @@ def import_(domain: Path, problem: Path, out: Path, level: int, time_limit: floa
     with limited(time_limit):
         imported = import_pddl(domain, problem, turtle_path(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
-    print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
+    told(out, f"{behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
 
 @command(epilog=examples("export"))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab import ontology
 from confab.progress import progress
+from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.terminal import remark
 
@@ -19,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def load_scene(source: str, iri: str | None = None) -> Scene:
-    """Load a scene, with what its hands reach if it has a body."""
+    """Load a scene, with what its hands reach if it has a body; ``-`` is read from standard input."""
     from confab.reaching import with_current_reach
-    from confab.scene import load
+    from confab.scene import load, load_text
 
-    with progress(f"reading {source}"):
-        scene = load(source, iri)
+    with progress(f"reading {'stdin' if source == '-' else source}"):
+        scene = load_text(sys.stdin.buffer.read()) if source == "-" else load(source, iri)
     return with_current_reach(scene, remark)
 
 
@@ -87,7 +89,7 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
 def json_file(path: Path) -> Path:
     """Return the path of a plan or of verdicts to write, if it says that it is JSON."""
-    if path.suffix.lower() != ".json":
+    if path.suffix.lower() != ".json" and path != STDOUT:
         raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
     return path
 

@@ -12,12 +12,32 @@ from typing import Any
 import click
 
 from confab import ontology
+from confab.reasoner.files import STDOUT
+from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
 
-PATH = click.Path(path_type=Path)
+TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
+"""Kinds of content that can go to standard output; the empty one is a query's."""
+
+STDIN = Path("/dev/stdin")
+
+
+class Input(click.Path):
+    """A file that a command reads; ``-`` is standard input."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        return STDIN if value == "-" else super().convert(value, param, ctx)
+
+
+PATH = Input()
+FOLDER = click.Path(path_type=Path)
 
 
 class Output(click.Path):
-    """A file that a command writes.
+    """A file that a command writes; ``-`` is standard output, for text that is the result of a command.
 
     Parameters
     ----------
@@ -34,6 +54,8 @@ class Output(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, if content of this kind may be written there."""
         path = Path(str(super().convert(value, param, ctx)))
+        if path == STDOUT and self.kind not in TEXTS:
+            self.fail(f"{self.kind or 'this'} can't be written to stdout; wanted the name of a file", param, ctx)
         if self.kind and ctx is not None and not ctx.resilient_parsing:
             from confab.reasoner.files import check_replaceable
 
@@ -42,13 +64,17 @@ class Output(click.Path):
 
 
 class Command(click.Command):
-    """A command none of whose outputs is an input or another output of the same call."""
+    """A command none of whose outputs is an input or another output of the same call, and that reads stdin for one thing."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command, unless one file stands for two things."""
+        read = [p for p in self.params if _reads_stdin(ctx.params.get(p.name or ""), p)]
+        if len(read) > 1:
+            names = " and ".join(map(_name, read))
+            raise click.UsageError(f"stdin can be read for one thing; {names} are both '-'", ctx)
         for output in self.params:
             path = ctx.params.get(output.name or "")
-            if not isinstance(output.type, Output) or not isinstance(path, Path):
+            if not isinstance(output.type, Output) or not isinstance(path, Path) or path == STDOUT:
                 continue
             for other in self.params:
                 given = ctx.params.get(other.name or "")
@@ -60,6 +86,12 @@ class Command(click.Command):
                         ctx,
                     )
         return super().invoke(ctx)
+
+
+def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
+    """Return whether a parameter's value stands for standard input."""
+    values = given if isinstance(given, tuple) else (given,)
+    return any(value in (STDIN, "-") for value in values) and not isinstance(parameter.type, Output)
 
 
 def _same_file(path: Path, given: object, parameter: click.Parameter) -> bool:
@@ -85,6 +117,13 @@ def _quiet(context: click.Context, option: click.Parameter, wanted: bool) -> Non
         logging.disable(logging.WARNING if wanted else logging.NOTSET)
 
 
+def _verbose(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from confab.progress import be_verbose
+
+        be_verbose()
+
+
 def scene_names(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
     """Return what a scene's name can go on with: shipped names, and files of ontologies."""
     folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
@@ -93,11 +132,24 @@ def scene_names(context: click.Context, option: click.Parameter, begun: str) -> 
     return [*(name for name in ontology.scenes() if name.startswith(begun)), *files]
 
 
-QUIET = click.option(
+_QUIET = click.option(
     "-q", "--quiet", is_flag=True, expose_value=False, callback=_quiet, help="Say nothing but results and errors."
 )
+_VERBOSE = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Say what each stage takes, on stderr."
+)
+
+
+def QUIET(function: Any) -> Any:  # noqa: N802 - an option as the others
+    """Add the two options that say how much is told."""
+    return _QUIET(_VERBOSE(function))
+
+
 SCENE = click.argument(
-    "scene", metavar="SCENE", shell_complete=scene_names, help="Shipped name, file, or URL of a SPARQL endpoint."
+    "scene",
+    metavar="SCENE",
+    shell_complete=scene_names,
+    help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.",
 )
 SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
 GOALS = click.option(
@@ -140,13 +192,20 @@ TIME_LIMIT = click.option(
 )
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(0.0, 0.05),
+    default=0.0,
+    metavar="M",
+    help="Standard deviation of perceived positions in metres, e.g. 0.002.",
+)
 GUI = click.option("--gui", is_flag=True, help="Show the first rollout in a window; needs a screen.")
 OUT = click.option(
     "-o",
     "--output",
     "--out",
     "out",
-    type=PATH,
+    type=FOLDER,
     default=Path("confab-out"),
     metavar="DIR",
     help="Folder to write into.",

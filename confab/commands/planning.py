@@ -13,11 +13,13 @@ from click.exceptions import Exit
 from confab.commands.given import blame_reach, doubt, json_file, load_scene, memory_for, plan_in
 from confab.commands.options import (
     AS_JSON,
+    FOLDER,
     GOALS,
     GUI,
     MEMORY_FILE,
     MODE,
     NO_MEMORY,
+    NOISE,
     OUT,
     PATH,
     QUIET,
@@ -34,7 +36,7 @@ from confab.planner.solve import Mode
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
-from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result
+from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
     from confab.explaining import Explanation
@@ -113,10 +115,12 @@ def plan(
     if report is not None:
         result.report(report)
     if out is not None:
-        show_result(f"{result.save(out)}: {summary(result.outcome)}")
+        told(result.save(out), summary(result.outcome))
     else:
         # What draws trees is imported for a plan alone: there may be no time left for it.
         show_result(result.json() if as_json else result if result.solved else str(result))
+    if dearer := result.dearer():
+        remark(dearer)
     doubt(loaded, deadline)
     blame_reach(loaded, result.outcome, deadline)
     raise Exit(EXIT[result.outcome.status.value])
@@ -131,29 +135,66 @@ def plan(
     shell_complete=scene_names,
     help="Shipped name, file, or URL of a SPARQL endpoint.",
 )
+@GOALS
 @MEMORY_FILE
 @MODE
 @SEED
+@NOISE
 @OUT
+@click.option(
+    "--keep", is_flag=True, help="Keep the run in a folder of its own in DIR: 001, 002, …; 'confab runs' lists them."
+)
 @click.option("--no-video", is_flag=True, help="Don't film: faster.")
 @GUI
 @TIME_LIMIT
 @QUIET
 def run(
     scene: str,
+    goal: tuple[str, ...],
     memory: Path | None,
     mode: Mode,
     seed: int,
+    noise: float,
     out: Path,
+    keep: bool,
     no_video: bool,
     gui: bool,
     time_limit: float | None,
 ) -> None:
     """Validate, plan, verify in physics, learn and report."""
+    from confab.history import new_folder
+    from confab.running import Job
     from confab.running import run as run_all
 
     with limited(time_limit):
-        raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
+        folder = new_folder(out) if keep else out
+        raise Exit(run_all(Job(scene, folder, goal, memory, mode, seed, noise, not no_video, gui)))
+
+
+@command(epilog=examples("runs"))
+@click.argument(
+    "folder", type=FOLDER, default="confab-out", metavar="[FOLDER]", help="Where 'confab run --keep' keeps runs."
+)
+@click.argument("names", nargs=-1, metavar="[RUN OTHER]", help="Two runs to compare.")
+@click.option("-o", "--output", "out", type=Output(REPORT), metavar="FILE.html", help="Write them as a page.")
+@AS_JSON
+@QUIET
+def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+    """List the runs that were kept, or compare two of them."""
+    from confab.history import compared, history_html, listed
+    from confab.history import runs as read
+
+    if len(names) not in (0, 2):
+        raise KnowledgeError(f"got {len(names)} run; wanted the names of two to compare, or none to list all")
+    found = read(folder)
+    if out is not None:
+        from confab.reasoner.files import write_whole
+
+        write_whole(out, history_html(found, f"Runs in {folder.name or folder}"))
+        told(out, f"{len(found)} runs")
+        return
+    table = compared(found, *names) if names else listed(found)
+    show_result(table.records() if as_json else table)
 
 
 @command(epilog=examples("verify"))
@@ -163,6 +204,7 @@ def run(
 )
 @click.option("--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="How often, with seeds S, S+1, …")
 @SEED
+@NOISE
 @click.option("--workers", default="1", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--video", type=Output(FILM), metavar="OUT.mp4", help="Film the first rollout.")
@@ -178,6 +220,7 @@ def verify(
     plan: Path,
     rollouts: int,
     seed: int,
+    noise: float,
     workers: str,
     perturb: bool,
     video: Path | None,
@@ -195,14 +238,22 @@ def verify(
     with limited(time_limit), counted(rollouts) as done:
         loaded = load_scene(scene)
         report = loaded.verify(
-            plan_in(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
+            plan_in(plan, loaded),
+            rollouts,
+            seed,
+            perturb=perturb,
+            noise=noise,
+            video=video,
+            workers=workers,
+            done=done,
+            gui=gui,
         )
     keep(loaded, refuted_in(loaded, report))
     if out is not None:
         from confab.reasoner.files import write_whole
 
         write_whole(out, json.dumps(report.json(), indent=1) + "\n")
-        show_result(f"{out}: {report.summary()}")
+        told(out, report.summary())
     else:
         show_result(report.json() if as_json else report)
     raise Exit(YES if report.verified else NO)
@@ -232,6 +283,7 @@ def verify(
 @click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write what happened as a page.")
 @SCENE_IRI
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@NOISE
 @click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
 @click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
 @TIME_LIMIT
@@ -258,6 +310,7 @@ def execute(
     report: Path | None,
     iri: str | None,
     perturb: bool,
+    noise: float,
     both_hands: bool,
     learn: bool,
     time_limit: float | None,
@@ -293,6 +346,7 @@ def execute(
             seed,
             tell,
             perturb=perturb,
+            noise=noise,
             both_hands=both_hands,
         )
     if execution.episode.refuted:

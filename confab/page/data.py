@@ -226,6 +226,9 @@ class Planned(Protocol):
     problem: Problem
     outcome: Outcome
 
+    def dearer(self) -> str:
+        """Return what is known of a cheaper plan."""
+
 
 class Executed(Protocol):
     """The result of executing a task, as the page needs it: `confab.execution.Execution`."""
@@ -293,7 +296,7 @@ def page_data(
         else "",
         "tiles": _tiles(problem, timeline if planned else None, outcome, report, execution),
         "goals": _goals(timeline, labels, planned),
-        "notes": _small_print(outcome),
+        "notes": [*_small_print(outcome), *filter(None, [result.dearer() if result is not None else ""])],
         "again": again or _again(scene, report, execution, timeline.unit == "s"),
     }
     if alarm := _alarm(timeline, labels, outcome, report, execution):

@@ -15,9 +15,7 @@ from confab.reasoner.limits import LimitError
 if TYPE_CHECKING:
     import anywidget
 
-MISSING = (
-    "the board needs anywidget, which isn't installed; pip install 'confab-planner[notebook]', and restart the kernel"
-)
+MISSING = "the board needs anywidget, which isn't installed; pip install anywidget, and restart the kernel"
 
 
 def board(scene: Known) -> anywidget.AnyWidget:

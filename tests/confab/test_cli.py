@@ -141,7 +141,7 @@ def test_bad_input_is_one_clear_line_and_nothing_is_written(
 
 def test_a_query_gives_table_csv_and_json() -> None:
     text = "SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o"
-    assert "bottle1 │ location4" in confab("query", "beverage-serving", text).stdout
+    assert "bottle1\tlocation4\n" in confab("query", "beverage-serving", text).stdout
     assert confab("query", "beverage-serving", text, "--format", "csv").stdout.startswith("o,l\nbottle1,location4\n")
     assert json.loads(confab("query", "beverage-serving", text, "--json").stdout)[0] == {
         "o": "bottle1",

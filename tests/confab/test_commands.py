@@ -87,7 +87,7 @@ def test_output_means_the_same_everywhere(run: CliRunner, option: str) -> None:
 def test_a_scene_without_bodies_is_run_without_physics(run: CliRunner) -> None:
     told = run.invoke(app, ["run", "towers-small", "-o", "out"])
     assert told.exit_code == 0, told.output
-    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.json", "report.html"]
+    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.json", "report.html", "run.json"]
     assert "a plan, checked" in Path("out/report.html").read_text()
     assert list(Path().iterdir()) == [Path("out")]
 

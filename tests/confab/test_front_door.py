@@ -159,18 +159,6 @@ def test_a_ready_query_is_asked_by_its_name(scene: confab.Scene) -> None:
         scene.query("where-is-everythin")
 
 
-def test_names_of_neighbours_do_not_meet_on_a_map(scene: confab.Scene) -> None:
-    """Words as wide as they are drawn, lines as high: of no two the boxes overlap."""
-    for name in ("beverage-serving", "beverage-serving-moved", "cereal-serving", "kitchen-corner", "house-small"):
-        other = confab.load(name)
-        words = re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)" class="(\w+)">([^<]+)</text>', other._repr_html_())
-        assert len(words) > 5, name
-        boxes = [(float(x), float(y), len(said) * 5.6, said) for x, y, _, said in words]
-        for i, (x, y, wide, said) in enumerate(boxes):
-            for x2, y2, wide2, said2 in boxes[:i]:
-                assert abs(y - y2) >= 9 or abs(x - x2) >= (wide + wide2) / 2, (name, said, said2)
-
-
 def test_a_picture_of_classes_tells_what_follows() -> None:
     words = [text.get_text() for text in class_tree(confab.load("packing-small")).axes[0].texts]
     assert "Thing\nLIES_IN\nfollows: INSIDE, OUT_OF_REACH,\nSTORED_AWAY" in words

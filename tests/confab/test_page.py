@@ -248,7 +248,7 @@ def test_notebooks_show_values_without_a_script(
 
 def test_without_anywidget_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    with pytest.raises(confab.KnowledgeError, match=r"needs anywidget.*pip install 'confab-planner\[notebook\]'"):
+    with pytest.raises(confab.KnowledgeError, match=r"needs anywidget.*pip install anywidget"):
         confab.load("two-cups").board()
 
 
@@ -353,6 +353,24 @@ def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
         browser.wait("document.querySelector('.tile')?.textContent.includes('✓ reached')")
     assert [words.split(":")[0] for words in said] == ["3 steps", "20 steps"]
     assert browser.faults == []
+
+
+MEETING = """(() => { const boxes = [...document.querySelectorAll('.map text:not(.key)')].map((e) => [e.getBoundingClientRect(), e.textContent]);
+  return boxes.flatMap(([a, one], i) => boxes.slice(0, i).filter(([b]) => a.left < b.right - 1 && b.left < a.right - 1
+    && a.top + 2 < b.bottom - 2 && b.top + 2 < a.bottom - 2).map(([, other]) => `${one} on ${other}`)); })()"""
+
+
+@needs_browser
+@pytest.mark.parametrize("name", ["beverage-serving", "cereal-serving", "kitchen-corner", "house-small", "two-tables"])
+def test_no_name_on_a_map_lies_on_another_and_none_is_lost(browser: Browser, name: str, tmp_path: Path) -> None:
+    data = page_data(confab.load(name))
+    address = write_page(tmp_path / "page.html", data).as_uri()
+    for width in (1280, 420):
+        browser.open(address, width)
+        browser.wait("document.querySelector('.map text') !== null")
+        assert browser.run(MEETING) == []
+        shown = browser.run("document.querySelector('.map').textContent")
+        assert [place["label"] for place in data["map"]["places"] if place["label"] not in shown] == []
 
 
 # ------------------------------------------------------------------------------------------------------------ commands

@@ -75,7 +75,7 @@ def test_a_price_in_turtle_leads_to_the_cheapest_plan_and_is_told(tmp_path: Path
     assert found.outcome.plan is not None
     assert [step.behavior for step in found.outcome.plan.steps] == ["UNLOAD", "DRIVE", "DRIVE"]  # 4 + 3 + 1, not 3 * 5
     assert (found.outcome.cost, found.json()["cost"], found.json()["bound"]) == (8.0, 8.0, 8.0)
-    assert "costs 8, at least 8 proved" in str(found)
+    assert "costs 8, proved cheapest on the lowest level" in str(found)
     assert confab.load(path).plan(mode="paper").outcome.cost == 8.0
 
 

@@ -1,0 +1,160 @@
+"""Runs that are kept: each in a folder with a record (``run.json``); a folder of runs is listed, compared and shown on the page."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import nearest
+from confab.table import Table
+
+if TYPE_CHECKING:
+    from confab.page.data import PageData
+
+RECORD = "run.json"
+"""The file in a run's folder by which it is known."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that was kept: its folder's name, when it was made, by which options, what memory held, and what the page shows.
+
+    Examples
+    --------
+    `confab run SCENE -o runs --keep` makes one; `confab.history.runs("runs")` reads them.
+    """
+
+    name: str
+    when: str
+    how: Mapping[str, object]
+    memory: str
+    page: PageData
+
+    def figures(self) -> dict[str, str]:
+        """Return how it ended and its figures, by name, as text."""
+        sign = {True: "✓ ", False: "✗ ", None: ""}[self.page.get("good")]
+        figures = {"verdict": sign + self.page["status"]}
+        figures |= {tile["name"]: tile["text"] for tile in self.page["tiles"]}
+        return {**figures, **{name: _text(value) for name, value in self.how.items()}, "memory": self.memory}
+
+    def steps(self) -> list[str]:
+        """Return the steps of the first level, in words."""
+        return [step["what"] for step in self.page["steps"] if "." not in step["id"]]
+
+
+def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str) -> Path:
+    """Write the record of a run into its folder, and return its path; the film isn't in it."""
+    shown = {key: value for key, value in page.items() if key != "film"}
+    when = datetime.now().astimezone().isoformat(timespec="seconds")
+    data = {"run": folder.resolve().name, "when": when, "how": dict(how), "memory": memory, "page": shown}
+    write_whole(folder / RECORD, json.dumps(data, ensure_ascii=False) + "\n")
+    return folder / RECORD
+
+
+def new_folder(runs: Path) -> Path:
+    """Make the next folder for a run, 001 or one more than the last, and return its path."""
+    runs.mkdir(parents=True, exist_ok=True)
+    last = max((int(one.name) for one in runs.iterdir() if one.name.isdecimal() and one.name.isascii()), default=0)
+    while True:
+        last += 1
+        folder = runs / f"{last:03}"
+        try:
+            folder.mkdir()  # fails where another process has taken it meanwhile
+        except FileExistsError:
+            continue
+        return folder
+
+
+def runs(folder: str | Path) -> list[Run]:
+    """Return the runs in a folder, in the order in which they were made.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such folder, it has no run, or a record can't be read.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise KnowledgeError(f"{folder}: no such folder; 'confab run SCENE -o {folder} --keep' begins one")
+    files = [folder / RECORD, *sorted(folder.glob(f"*/{RECORD}"))]
+    found = [_read(file) for file in files if file.is_file()]
+    if not found:
+        raise KnowledgeError(f"{folder}: has no runs; 'confab run SCENE -o {folder} --keep' keeps one there")
+    return sorted(found, key=lambda run: (run.when, run.name))
+
+
+def _read(file: Path) -> Run:
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise KnowledgeError(f"{file}: not JSON: {error}") from error
+    match data:
+        case {"when": str(when), "how": dict(how), "memory": str(memory), "page": dict(page)} if _is_page(page):
+            return Run(file.parent.resolve().name, when, how, memory, cast("PageData", page))
+    raise KnowledgeError(f"{file}: is no record of a run; wanted what 'confab run' writes")
+
+
+def _is_page(page: Mapping[str, object]) -> bool:
+    lists = ("tiles", "steps", "rows", "goals", "marks", "notes")
+    return isinstance(page.get("status"), str) and all(isinstance(page.get(name), list) for name in lists)
+
+
+def listed(those: Sequence[Run]) -> Table:
+    """Return the runs as a table: a row each, and a column for each figure."""
+    figures = [run.figures() for run in those]
+    names = tuple(dict.fromkeys(name for one in figures for name in one))
+    rows = tuple(
+        (run.name, run.page["title"], run.when, *(one.get(name, "") for name in names))
+        for run, one in zip(those, figures, strict=True)
+    )
+    return Table(("run", "scene", "when", *names), rows)
+
+
+def compared(those: Sequence[Run], one: str, other: str) -> Table:
+    """Return in what two runs differ: a row for each figure, step of the first level and goal that isn't the same.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no run of such a name.
+    """
+    by_name = {run.name: run for run in those}
+    for name in (one, other):
+        if name not in by_name:
+            raise KnowledgeError(f"no run '{name}'{nearest(name, by_name)} (runs: {', '.join(by_name)})")
+    return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))
+
+
+def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
+    a, b = one.figures(), other.figures()
+    for name in dict.fromkeys((*a, *b)):
+        if a.get(name, "") != b.get(name, ""):
+            yield name, a.get(name, ""), b.get(name, "")
+    first, second = Counter(one.steps()), Counter(other.steps())
+    for step in (first - second).elements():
+        yield "step", step, ""
+    for step in (second - first).elements():
+        yield "step", "", step
+    ends = [{goal["label"]: goal.get("after", "") for goal in run.page["goals"]} for run in (one, other)]
+    for goal in dict.fromkeys((*ends[0], *ends[1])):
+        if ends[0].get(goal) != ends[1].get(goal):
+            yield f"in the end ({goal})", ends[0].get(goal, "not a goal"), ends[1].get(goal, "not a goal")
+
+
+def history_html(those: Sequence[Run], title: str) -> str:
+    """Return the page on which runs are shown and compared."""
+    from confab.page.frozen import page_html
+
+    shown = [{"name": run.name, "when": run.when, "memory": run.memory, "page": run.page} for run in those]
+    return page_html({"title": title, "runs": shown}, title)
+
+
+def _text(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -1,0 +1,137 @@
+"""The command line in pipes: stdin and stdout, tables by tabs, runs that are kept, and what can't be done said first."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import confab
+from confab import ontology
+from confab.cli import app
+from confab.history import compared, new_folder, runs
+from confab.sim.rollouts import Trial
+from confab.sim.verify import Rollout
+
+RUN = [sys.executable, "-c", "from confab.start import main; main()"]
+WITHOUT = [sys.executable, "-c", "import sys; sys.modules['pybullet'] = None\nfrom confab.start import main; main()"]
+TOWERS = (ontology.ROOT / "scenes" / "towers-small.ttl").read_bytes()
+
+
+def piped(*arguments: str, given: bytes = b"", line: list[str] = RUN, at: Path | None = None) -> tuple[int, str, str]:
+    """Return exit code, stdout and stderr of a command that reads stdin."""
+    done = subprocess.run([*line, *arguments], input=given, capture_output=True, cwd=at, check=False)
+    return done.returncode, done.stdout.decode(), done.stderr.decode()
+
+
+def test_a_scene_a_plan_and_a_query_come_from_stdin_and_results_go_to_stdout() -> None:
+    code, plan, said = piped("plan", "-", "-o", "-", given=TOWERS)
+    assert (code, json.loads(plan)["status"]) == (0, "solved")
+    assert said.startswith("confab: solved")
+    code, done, _ = piped("execute", "towers-small", "--plan", "-", "--json", given=plan.encode())
+    assert (code, json.loads(done)["status"]) == (0, "reached")
+    code, rows, _ = piped("query", "beverage-serving", "-", given=b"SELECT ?w WHERE { :cup1 k:location ?w }")
+    assert (code, rows) == (0, "w\nlocation2\n")
+
+
+def test_stdin_is_read_once_and_pictures_do_not_go_to_stdout() -> None:
+    code, _, said = piped("execute", "-", "--plan", "-", given=TOWERS)
+    assert code == 2
+    assert "SCENE and --plan are both '-'" in said
+    code, _, said = piped("picture", "two-cups", "-o", "-")
+    assert code == 2
+    assert "a picture can't be written to stdout" in said
+
+
+def test_what_is_no_scene_on_stdin_is_refused_in_a_line() -> None:
+    for given in (b"", b"\xff\xfe", b"{", b"<rdf:RDF", b"no turtle"):
+        code, _, said = piped("plan", "-", given=given)
+        assert (code, said.count("\n")) == (2, 1), said
+        assert "/tmp" not in said
+
+
+def test_verbose_says_what_stages_take() -> None:
+    _, _, said = piped("plan", "towers-small", "-v")
+    assert "planning took" in said
+
+
+def test_without_pybullet_run_says_first_what_is_missing_and_writes_the_rest(tmp_path: Path) -> None:
+    code, out, said = piped("run", "two-cups", "-o", "out", line=WITHOUT, at=tmp_path)
+    assert code == 2
+    assert said.index("won't be verified, filmed or learned from") < said.index("planning")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["plan.json", "report.html", "run.json"]
+    assert "plan      out/plan.json" in out
+
+
+def test_goals_of_a_run_are_kept_in_its_record(tmp_path: Path) -> None:
+    goal = "c ON spot2"
+    ran = CliRunner().invoke(app, ["run", "towers-small", "--goal", goal, "-o", str(tmp_path), "--seed", "1"])
+    assert ran.exit_code == 0, ran.output
+    (run,) = runs(tmp_path)
+    assert (run.how["goals"], run.how["seed"]) == ([goal], 1)
+    assert any("spot 2" in step["label"] for step in run.page["goals"])
+
+
+def test_noise_reaches_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def run(trial: Trial, *arguments: object, **options: object) -> Rollout:
+        seen.append(trial.noise)
+        return Rollout(0, True, (), (), 0.0, 0.0)
+
+    monkeypatch.setattr(Trial, "run", run)
+    scene = confab.load("two-cups")
+    scene.verify(scene.plan(), noise=0.002)
+    assert seen == [0.002]
+
+
+def test_noise_is_refused_where_nothing_is_measured() -> None:
+    with pytest.raises(confab.KnowledgeError, match="only in the world pybullet"):
+        confab.load("towers-small").execute(noise=0.001)
+
+
+def test_runs_that_are_kept_are_listed_compared_and_shown(tmp_path: Path) -> None:
+    invoke = CliRunner().invoke
+    for mode in ("guarded", "paper"):
+        made = ["run", "towers-small", "-o", str(tmp_path / "runs"), "--keep", "--mode", mode, "-q"]
+        assert invoke(app, made).exit_code == 0
+    listed = invoke(app, ["runs", str(tmp_path / "runs")]).output.splitlines()
+    assert listed[0].split("\t")[:4] == ["run", "scene", "when", "verdict"]
+    assert [line.split("\t")[0] for line in listed[1:]] == ["001", "002"]
+    found = {row[0]: row[1:] for row in compared(runs(tmp_path / "runs"), "001", "002")}
+    assert found["mode"] == ("guarded", "paper")
+    assert "primitives" in found
+    page = tmp_path / "history.html"
+    assert invoke(app, ["runs", str(tmp_path / "runs"), "-o", str(page)]).exit_code == 0
+    assert '"runs":[' in page.read_text()
+    wrong = invoke(app, ["runs", str(tmp_path / "runs"), "001", "02"])
+    assert "did you mean '002'?" in str(wrong.exception)
+    (tmp_path / "runs" / "001" / "run.json").write_text('{"run": 1}')
+    assert "is no record of a run" in str(invoke(app, ["runs", str(tmp_path / "runs")]).exception)
+
+
+def test_each_kept_run_has_a_folder_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "007").mkdir()
+    assert [new_folder(tmp_path).name for _ in range(2)] == ["008", "009"]
+
+
+def test_no_package_is_named_after_a_typo() -> None:
+    with pytest.raises(confab.KnowledgeError) as told:
+        confab.load("towers-small").plan(engine="fast-downwrad")
+    assert "up-fast-downwrad" not in str(told.value)
+    assert "fast-downward" in str(told.value)
+
+
+def test_what_is_proved_of_a_length_is_said_in_plain_words() -> None:
+    assert "proved shortest on the lowest level" in repr(confab.load("two-cups").plan(optimal=True))
+    said = repr(confab.load("beverage-serving").plan(optimal=True, time_limit=1))
+    assert "not proved shortest: any plan has at least" in said
+
+
+def test_a_plan_whose_steps_undo_each_other_says_so_and_how_to_ask_for_less() -> None:
+    said = confab.load("three-cups").plan().dearer()
+    assert said.startswith("12 of the 30 primitives only undo each other")
+    assert "--optimal" in said
+    assert confab.load("beverage-serving").plan().dearer() == ""
