@@ -1,7 +1,6 @@
 """What a user types first works: names that the Tab key offers, facts as text, results where plans are wanted, edits that count."""
 
 import inspect
-import re
 from pathlib import Path
 
 import pytest

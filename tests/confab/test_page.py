@@ -355,7 +355,8 @@ def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
     assert browser.faults == []
 
 
-MEETING = """(() => { const boxes = [...document.querySelectorAll('.map text:not(.key)')].map((e) => [e.getBoundingClientRect(), e.textContent]);
+MEETING = """(() => { const words = [...document.querySelectorAll('.map text:not(.key)')];
+  const boxes = words.map((e) => [e.getBoundingClientRect(), e.textContent]);
   return boxes.flatMap(([a, one], i) => boxes.slice(0, i).filter(([b]) => a.left < b.right - 1 && b.left < a.right - 1
     && a.top + 2 < b.bottom - 2 && b.top + 2 < a.bottom - 2).map(([, other]) => `${one} on ${other}`)); })()"""
 
