@@ -93,7 +93,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the public names, which is what the Tab key offers."""
+    """Return the public names, for completion with the Tab key."""
     return [*__all__, "__doc__", "__version__"]
 
 

@@ -1,4 +1,4 @@
-"""What a caller may hand over where a plan, a memory or some facts are wanted: itself, what has it, or a file's name."""
+"""Arguments in several forms: a plan, a memory or facts, an object that has them, or the name of a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Problem
 
 
 class HasPlan(Protocol):
-    """What has a plan in it: a result, an execution, a report."""
+    """An object with a plan: a result, an execution, a report."""
 
     @property
     def plan(self) -> Plan:
@@ -26,13 +26,13 @@ class HasPlan(Protocol):
 
 
 AnyPlan: TypeAlias = "Plan | HasPlan | str | Path"
-"""A plan, what has one in it, or the file that ``confab plan --json`` wrote."""
+"""A plan, an object with a plan, or the file that ``confab plan --json`` wrote."""
 Facts: TypeAlias = "str | Iterable[str]"
 """One fact or several, each like ``cup2 LOCATION location8``."""
 
 
 def plan_of(given: AnyPlan, problem: Problem) -> Plan:
-    """Return the plan that is meant; one in a file is read for a problem.
+    """Return the plan of an argument; a plan in a file is read for a problem.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
 
 
 def check_goal(scene: str, problem: Problem) -> None:
-    """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type; or no behaviour."""
+    """Raise `KnowledgeError` if there is no goal or no behaviour, or if a goal has a value outside its situation type."""
     if not problem.domain.behaviors:
         raise KnowledgeError(f"{scene} has no behaviours, so that nothing can be done; import a domain that has some")
     if not problem.goal:
@@ -67,7 +67,7 @@ def check_goal(scene: str, problem: Problem) -> None:
 
 @contextmanager
 def possible() -> Iterator[None]:
-    """Turn what is said of a state that can't be into a `KnowledgeError`."""
+    """Turn the message about an impossible state into a `KnowledgeError`."""
     try:
         yield
     except ImpossibleStateError as error:
@@ -75,7 +75,7 @@ def possible() -> Iterator[None]:
 
 
 def several(given: Facts) -> list[str]:
-    """Return texts that are given one or many.
+    """Return a list of texts, given one or several.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def several(given: Facts) -> list[str]:
 
 
 def number(name: str, given: object, wanted: str = "a number") -> None:
-    """Raise `KnowledgeError` if what was given for a parameter is no number; None is none given.
+    """Raise `KnowledgeError` if the argument for a parameter is no number; None is allowed.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 
 
 def sparql_of(given: str) -> str:
-    """Return a query, or what the file of that name, or the shipped query of that name, holds.
+    """Return a query: the text itself, or the content of the file or shipped query of that name.
 
     Raises
     ------

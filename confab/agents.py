@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
 SHOWN, KEPT = 4_000, 50
-"""Maximum bytes of an answer, and of how many long ones the whole is kept."""
+"""Maximum bytes of an answer, and maximum number of long answers that are kept completely."""
 MORE, MEGABYTES, MOST_SECONDS = 10.0, 6_000, 600.0
-"""Seconds that a process may take beyond its limit, its memory, and the largest limit."""
+"""Seconds that a process may exceed its limit, its maximum memory, and the largest limit."""
 
 SceneName = Annotated[
     str, Field(description="A shipped scene (tool scenes), or a file in the folder, e.g. kitchen.ttl")
@@ -42,14 +42,14 @@ Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=M
 
 
 class Kept:
-    """The whole of the answers that were cut, by their number, the latest `KEPT` of them."""
+    """The complete texts of answers that were cut, by number; the latest `KEPT` of them."""
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}
         self._count = 0
 
     def shown(self, text: str) -> str:
-        """Return an answer, or its beginning with the address of the whole."""
+        """Return an answer, or its beginning with the address of the complete text."""
         if len(text.encode()) <= SHOWN:
             return text
         self._count += 1
@@ -59,7 +59,7 @@ class Kept:
         return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
 
     def whole(self, number: str) -> str:
-        """Return the whole of an answer.
+        """Return the complete text of an answer.
 
         Raises
         ------
@@ -152,7 +152,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Say why a step is in the plan: what it gives, and what needs that."""
+        """Say why a step is in the plan: its effects, and what needs them."""
         return await answered(answers.why, scene, goals, step, seconds, seconds=seconds)
 
     @made.tool()
@@ -164,7 +164,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Say why something else isn't done: what it lacks, or what it costs more."""
+        """Say why an alternative isn't in the plan: the conditions that it lacks, or its additional cost."""
         return await answered(answers.why_not, scene, goals, instead, seconds, seconds=seconds)
 
     @made.tool()
@@ -175,12 +175,12 @@ def server(folder: Path) -> MCPServer[Any]:
         seed: int = 0,
         seconds: Seconds = 120.0,
     ) -> str:
-        """Plan, and carry the plan out in physics: which steps had their effects, and by what numbers."""
+        """Plan, and execute the plan in physics: which steps had their effects, with measurements."""
         return await answered(answers.verify, scene, goals, rollouts, seed, seconds, seconds=seconds)
 
     @made.resource("confab://answers/{number}", mime_type="text/plain")
     def whole(number: str) -> str:
-        """Return the whole of an answer that was cut."""
+        """Return the complete text of an answer that was cut."""
         try:
             return kept.whole(number)
         except KeyError:

@@ -1,4 +1,4 @@
-"""What agents ask for (`confab.agents`), as text: each answer is worked out in a process of its own, within one folder."""
+"""The answers of the tools for agents (`confab.agents`) as text; each is computed in a process of its own, within one folder."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def scene_of(folder: Path, name: str) -> Scene:
-    """Return a shipped scene, or one in a folder, none of whose files lies outside of it.
+    """Return a shipped scene, or a scene in a folder all of whose files lie in that folder.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def scene_of(folder: Path, name: str) -> Scene:
 
 
 def scenes(folder: Path) -> str:
-    """Return the names of the scenes that can be asked about."""
+    """Return the names of the available scenes."""
     own = sorted(
         str(file.relative_to(folder))
         for file in folder.rglob("*")
@@ -79,14 +79,14 @@ def scenes(folder: Path) -> str:
 
 
 def planned(scene: Scene, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> Result:
-    """Return what comes of planning in a scene, with some facts in place of what it says."""
+    """Return the result of planning in a scene, with some of its facts replaced."""
     return (scene.with_fact(*facts) if facts else scene).plan(
         list(goals), mode=mode, time_limit=seconds, engine=None if mode == "paper" else NO_ENGINE
     )
 
 
 def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> str:
-    """Return a plan as a tree of steps, or why there is none."""
+    """Return a plan as a tree of steps, or the reason why there is none."""
     result = planned(scene_of(folder, name), goals, facts, mode, seconds)
     if not result.solved:
         return "\n".join([repr(result), *map(str, result.explain().proof)])
@@ -107,7 +107,7 @@ def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
 
 
 def validate(folder: Path, name: str) -> str:
-    """Return what is wrong with a file, with what to do about it; the answer is empty of findings where nothing is."""
+    """Return the findings in a file with their remedies; the list is empty if there are none."""
     from confab.reasoner.validation.validate import validate as found
 
     path = ontology.scenes()[name] if name in ontology.scenes() else scene_of(folder, name).knowledge.path
@@ -121,7 +121,7 @@ def validate(folder: Path, name: str) -> str:
 
 
 def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float) -> str:
-    """Return why a step is in the plan, or each step; where there is no plan, why."""
+    """Return why a step is in the plan, or each step; if there is no plan, why."""
     with within(seconds):
         result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
         return (
@@ -130,13 +130,13 @@ def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float
 
 
 def why_not(folder: Path, name: str, goals: Sequence[str], instead: str, seconds: float) -> str:
-    """Return why something else isn't done."""
+    """Return why an alternative isn't in the plan."""
     with within(seconds):
         return str(planned(scene_of(folder, name), goals, (), "guarded", seconds).why_not(instead))
 
 
 def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: int, seconds: float) -> str:
-    """Return what came of carrying the plan out in physics, rollout by rollout."""
+    """Return the results of executing the plan in physics, rollout by rollout."""
     if not 1 <= rollouts <= ROLLOUTS:
         raise KnowledgeError(f"got {rollouts} rollouts; wanted 1 to {ROLLOUTS}")
     with within(seconds):

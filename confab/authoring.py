@@ -1,4 +1,4 @@
-"""What a knowledge engineer does beside editing: begin a domain, see what an edit changed, take memory along in a rename."""
+"""Tools for authors: begin a domain, compare two versions of a scene, rename terms in a memory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 SPEAKS = "behavior does situationType relation termType ofClass first then refines isValueOf becomesValueOf"
 TERMS = [CORE + name for name in SPEAKS.split()]
 WORDS = [CORE + name for name in ("asks", "answer")]
-"""What names terms in texts."""
+"""Properties whose values are texts that contain terms."""
 ROLES = [CORE + name for name in ARGUMENTS]
 
 
@@ -79,9 +79,9 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
 
 
 def validate(*files: str | Path, deep: bool = False) -> Table:
-    """Return what is wrong with ontology files and what they import: a row for each finding, with what to do about it.
+    """Return the findings in ontology files and their imports: a row for each, with its remedy.
 
-    `deep` asks HermiT as well, which needs Java.
+    `deep` also asks HermiT, which needs Java.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, cl
 
 
 def turtle_path(given: str | Path) -> Path:
-    """Return the path of a scene to write, if a scene can be read from there again."""
+    """Return the path of a scene to write, if its suffix is that of a readable format."""
     path = Path(given)
     if path.suffix.lower() != ".ttl" and path != STDOUT:
         raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
@@ -138,7 +138,7 @@ def turtle_path(given: str | Path) -> Path:
 
 @dataclass(frozen=True)
 class Difference:
-    """What differs between two scenes: names gained and lost by kind, and the plans' lines before and after."""
+    """The difference between two scenes: names added and removed by kind, and the plans before and after."""
 
     gained: dict[str, tuple[str, ...]]
     lost: dict[str, tuple[str, ...]]
@@ -146,7 +146,7 @@ class Difference:
     after: tuple[str, ...]
 
     def json(self) -> dict[str, Any]:
-        """Return the difference as JSON can take it."""
+        """Return the difference as JSON data."""
         return {
             "gained": {kind: list(names) for kind, names in self.gained.items()},
             "lost": {kind: list(names) for kind, names in self.lost.items()},
@@ -154,7 +154,7 @@ class Difference:
         }
 
     def __str__(self) -> str:
-        """Return the difference in lines that start with ``+`` and ``-``, as people know them."""
+        """Return the difference as lines that start with ``+`` and ``-``."""
         lines = []
         for kind in self.gained:
             lines += [f"- {kind} {name}" for name in self.lost[kind]] + [
@@ -173,7 +173,7 @@ class Difference:
 
 
 def difference(old: Scene, new: Scene, mode: Mode) -> Difference:
-    """Return what an edit changed: objects, behaviours and quantified behaviours, and the plan."""
+    """Return the effects of an edit on objects, behaviours, quantified behaviours and the plan."""
     before, after = _inventory(old), _inventory(new)
     return Difference(
         {kind: tuple(n for n in after[kind] if n not in set(before[kind])) for kind in after},
@@ -213,9 +213,9 @@ def _steps(steps: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
-    """Return the terms of a domain that a memory speaks of and a scene doesn't know, with the nearest known name.
+    """Return the terms of a domain that a memory names and a scene doesn't know, each with the most similar known name.
 
-    Not the individuals of other scenes, which the paper's links speak of.
+    Individuals of other scenes, which the paper's links may name, are left out.
     """
     spoken: set[str] = set()
     with suppress(SyntaxError):  # of which reading the memory tells
@@ -275,7 +275,7 @@ def _rename(text: str, iris: set[str]) -> tuple[str, str]:
 
 
 def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.Triple:
-    """Return a triple with its IRIs renamed, and the words of facts that are written as text."""
+    """Return a triple with its IRIs renamed, including terms in texts."""
     value: Any = quad.object
     if isinstance(value, ox.NamedNode):
         value = ox.NamedNode(table.get(value.value, value.value))
@@ -285,7 +285,7 @@ def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.
 
 
 def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:
-    """Return what a memory file says, and its prefixes."""
+    """Return the content of a memory file, and its prefixes."""
     if not memory.is_file():
         raise KnowledgeError(f"{memory}: no such memory file")
     Memory.load(memory)  # what it isn't, it says better

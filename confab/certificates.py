@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """What the checker says of a certificate: `refused` says why it proves nothing; None where it proves that there is no plan."""
+    """The verdict of the checker on a certificate: `refused` says why it proves nothing.
+
+    None if it proves that there is no plan.
+    """
 
     refused: str | None
     claims: tuple[str, ...]

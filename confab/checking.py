@@ -16,10 +16,10 @@ from confab.reasoner.reading.surroundings import Surroundings
 
 
 def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:
-    """Return what the whole scene finds wrong with a plan that was made in a slice of it; nothing if it is a plan there.
+    """Return the faults of a plan in the whole scene, after it was made in a part of the scene; empty if the plan is valid.
 
-    The plan is carried out among its own individuals, and the checker says which others each condition and effect depends on.
-    The graph is asked for all of these until none is missing; what task recognition left out plays no part.
+    The plan is executed among its own individuals, and the checker reports on which other individuals each condition and effect
+    depends. The graph is queried for these until none is missing. Task recognition plays no part in this.
 
     Parameters
     ----------

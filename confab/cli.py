@@ -45,7 +45,7 @@ COMMANDS = {
     "import": ("authoring", "import_"),
     "export": ("authoring", "export"),
 }
-"""For each command the module in `confab/commands/` and the function that is it."""
+"""For each command its module in `confab/commands/` and its function."""
 SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 
 
@@ -57,7 +57,7 @@ class Commands(click.Group):
         return [name for names in GROUPS.values() for name in names]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands by their purpose."""
+        """Write the commands, grouped by purpose."""
         width = max(map(len, COMMANDS))
         for title, names in GROUPS.items():
             commands = [(name, self.get_command(ctx, name)) for name in names]
@@ -68,7 +68,7 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is meant; for a wrong name, say the most similar one."""
+        """Return the command of a name; for a wrong name, suggest the most similar one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             from confab.reasoner.names import nearest
 
@@ -121,8 +121,8 @@ def app() -> None:
 
 
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
-    """Run the command line: whatever happens in it ends as an exit code and at most one line on stderr.
+    """Run the command line: everything ends as an exit code and at most one line on stderr.
 
-    `ending` ends the process where a step goes on long after its deadline; without it, as within another program, nothing does.
+    `ending` ends the process if a step continues long after its deadline; without it, as within another program, nothing does.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

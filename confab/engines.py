@@ -1,7 +1,7 @@
-"""A level handed to a planner that people already have, through unified-planning: exported, planned, read back, put in order.
+"""Planning a level with an external planner through unified-planning: export, plan, read back, order.
 
-The plan is one of ours then: its steps stand behind what they depend on, and under behaviours of the levels above wherever a run of
-steps does what one of them says; `confab.planner.validation` has the last word.
+The result is one of our plans: each step stands behind the steps on which it depends, and below a behaviour of a higher level
+wherever a run of steps has exactly the effect of that behaviour. `confab.planner.validation` has to accept it.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
-"""What an engine may take if nothing is said."""
+"""Default limit of an engine in seconds."""
 IMPORTING = 1.0
-"""What importing unified-planning takes: with less time left, no engine is asked."""
+"""Seconds for importing unified-planning; with less time left, no engine is started."""
 READING = 0.93
-"""Of its time, the share after which an engine is stopped: what is left is for reading and checking its plan."""
+"""Share of the time after which an engine is stopped; the rest is for reading and checking its plan."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
-"""Packages of engines that take no amounts."""
+"""Packages of engines without support for numbers."""
 WITH_DEFINITIONS = {"up_fast_downward"}
 """Packages of engines that take derived predicates; unified-planning itself reads none."""
 KNOWN = {
@@ -55,7 +55,7 @@ KNOWN = {
 }
 """Packages that bring an engine, by its name in unified-planning."""
 Answer = tuple[str, str, list[str]]
-"""An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""
+"""The engine's name, its status in unified-planning's words, and the steps of its plan as ``action object …``."""
 
 
 def plan_by_engine(
@@ -132,9 +132,9 @@ def unified(domain: str, problem: str) -> unified_planning.model.Problem:
 
 
 def some_installed(problem: Problem) -> bool:
-    """Whether unified-planning and an engine that takes such a problem seem to be there.
+    """Whether unified-planning and an engine for such a problem seem to be installed.
 
-    By their names: importing them takes longer than most plans.
+    Only names are checked: importing the packages takes longer than most plans.
     """
     if find_spec("unified_planning") is None:
         return False
@@ -147,13 +147,13 @@ def some_installed(problem: Problem) -> bool:
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
-    """Return the rest values that hold in the beginning, of what only levels below the first know: a plan has to restore them."""
+    """Return the initial rest values that only lower levels see: a plan has to restore them."""
     first = problem.domain.levels[0]
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
 
 def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
-    """Ask unified-planning for a plan.
+    """Plan with unified-planning.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return what unified-planning answers to a level that it reads itself, in the process of `confab.reasoner.workers.call`."""
+    """Return unified-planning's answer to a level that it reads itself, in the process of `confab.reasoner.workers.call`."""
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException
@@ -230,15 +230,16 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
 
 
 def _tell(engine: str, deadline: Deadline) -> None:
-    """Say which engine is asked, and how long at most."""
+    """Report the engine and its time limit."""
     limit = "" if deadline.left is None else f", for up to {deadline.left:.3g} s (--time-limit)"
     log.warning("confab: the engine %s is asked for a plan%s; --engine none asks none", engine, limit)
 
 
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
-    """Give the files to an engine that reads PDDL itself; return what became of it, and the steps of its plan.
+    """Give the files to an engine that reads PDDL itself; return its status and the steps.
 
-    unified-planning would read and write them anew first: that takes minutes where relations are large, and no derived predicates.
+    unified-planning would first read and write them again, which takes minutes for large relations, and it doesn't support derived
+    predicates.
     """
     from unified_planning.model import Problem as Nothing
 

@@ -1,4 +1,4 @@
-"""Examples of every command, as its help shows them; each of them runs in an empty folder, if the ones above it did."""
+"""Examples of every command for its help; they run in an empty folder, each after the ones above it."""
 
 from __future__ import annotations
 
@@ -82,5 +82,5 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 
 def examples(command: str) -> str:
-    """Return what stands below the help of a command."""
+    """Return the text below the help of a command."""
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[command])

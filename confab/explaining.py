@@ -1,4 +1,4 @@
-"""Why this behaviour and not that one: the rule that does it, the episodes behind it, and the summands of cogency themselves."""
+"""Why memory prefers one behaviour to another: the rule, the episodes behind it, and the summands of cogency."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Why:
-    """One fact: what it is of the chosen behaviour and of the alternative, and how much it spoke for the choice."""
+    """One fact: its value for the chosen behaviour and for the alternative, and its weight in favour of the choice."""
 
     fact: str
     chosen: str
@@ -42,9 +42,9 @@ class Why:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why `chosen` was preferred to `other`; weights are differences of ln odds, `lead` is their sum.
+    """Why `chosen` was preferred to `other`; weights are differences of ln odds, and `lead` is their sum.
 
-    `rule` says what was learned in a sentence, `behind` the episodes behind it, `note` where memory has nothing to say.
+    `rule` is the learned rule as a sentence, `behind` the episodes behind it, `note` a remark if memory has no advice.
     """
 
     chosen: str
@@ -88,7 +88,7 @@ class Explanation:
         return "\n".join([*lines, *([f"  ({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw what spoke for the choice (right) and against it (left), and save the picture if a file is given."""
+        """Draw the weights for the choice (right) and against it (left), and save the picture if a file is given."""
         from confab.picturing import save, words_as_they_are
 
         with words_as_they_are():
@@ -187,7 +187,7 @@ def explain(
 
 
 def behind(memory: Memory, name: str) -> str:
-    """Return how often something proved good, in whose episodes."""
+    """Return how often a rule was chosen, passed over, and failed, and in whose episodes."""
     tally = memory.experience.totals().get(name, {}).get(ITSELF, Tally())
     those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
     lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))

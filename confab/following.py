@@ -1,4 +1,4 @@
-"""What follows from definitions in a scene's initial state, written into the graph for the queries that name it."""
+"""Facts that follow from definitions in a scene's initial state, written into the graph for queries that name them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Whether anything may be defined: asked first, since most scenes need not be read to be queried."""
+"""Whether anything may be defined; asked first, since most scenes needn't be read for a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write what follows in the initial state of the defined situation types that a query names into the graph `DERIVED`."""
+    """Write the initial facts of the defined situation types in a query into the graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):
@@ -53,7 +53,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
 
 
 def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
-    """Yield what follows in the initial state of some defined situation types."""
+    """Yield the initial facts of some defined situation types."""
     if not situations:
         return
     table = Table(problem.domain.situations, problem.initial)

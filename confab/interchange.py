@@ -1,4 +1,4 @@
-"""Plans as JSON, the form in which they leave and enter the command line (docs/command-line.md)."""
+"""Plans as JSON, the format in which the command line writes and reads them (docs/command-line.md)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from confab.reasoner.names import nearest
 from confab.reasoner.symbols import Behavior, Problem
 
 DEEPEST = 50
-"""Steps inside one another in a plan that is read."""
+"""Maximum depth of nested steps in a plan."""
 
 
 def step_json(step: Step) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def read_certificate(path: Path) -> Certificate:
 
 
 def _json(path: Path, what: str) -> Any:
-    """Return what a JSON file holds, which shall be a plan or a certificate."""
+    """Return the content of a JSON file that should be a plan or a certificate."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -115,7 +115,7 @@ def _json(path: Path, what: str) -> Any:
 
 
 def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
-    """Return a quantified behaviour that is written like ``B2_PICK right_hand cup1``.
+    """Return a quantified behaviour written like ``B2_PICK right_hand cup1``.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
 
 
 def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, ...], where: str) -> None:
-    """Raise `KnowledgeError` if a behaviour doesn't take some arguments; the message begins with `where`."""
+    """Raise `KnowledgeError` if a behaviour doesn't accept some arguments; the message begins with `where`."""
     if len(arguments) != len(behavior.parameters):
         raise KnowledgeError(
             f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}"

@@ -36,7 +36,7 @@ S = TypeVar("S", bound="Known")
 @right_names("a scene", "confab.hints", "SCENE")
 @dataclass
 class Known:
-    """What is known of a scene: read, asked in SPARQL, edited and changed; `confab.scene.Scene` adds what is done in it.
+    """Reading, querying and editing a scene; `confab.scene.Scene` adds planning and acting.
 
     Attributes
     ----------
@@ -62,15 +62,15 @@ class Known:
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return what pickling and copying keep: the knowledge as it is now; what was read from it is read again."""
+        """Return the state for pickling and copying: the present knowledge; what was read from it is read again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
     @cached_property
     def reading(self) -> Reading:
-        """The whole scene as the planner takes it, and the table that leads from its names back to IRIs.
+        """The whole scene as a problem, and the table of its names and IRIs.
 
-        `plan` does without it: it reads what the task can need.
+        `plan` doesn't use it: it reads only what the task can need.
         """
         self.settle()
         self.knowledge.require_whole()
@@ -83,12 +83,12 @@ class Known:
 
     @property
     def problem(self) -> Problem:
-        """What is there, what can be done, what holds and what is wanted."""
+        """Objects, behaviours, facts and goals."""
         return self.reading.problem
 
     @cached_property
     def names(self) -> Names:
-        """Short names and the IRIs behind them; where the scene can't be read, of all that its files speak of."""
+        """Short names and their IRIs; if the scene can't be read, of all terms in its files."""
         try:
             if "reading" in self.__dict__:
                 return self.reading.names
@@ -133,7 +133,7 @@ class Known:
 
     @property
     def facts(self) -> list[str]:
-        """What holds in the beginning, each as `with_fact` takes it.
+        """The initial facts, in the form that `with_fact` takes.
 
         Examples
         --------
@@ -146,7 +146,7 @@ class Known:
 
     @property
     def goals(self) -> list[str]:
-        """What is wanted, each as `with_goal` and `plan` take it.
+        """The goals, in the form that `with_goal` and `plan` take.
 
         Examples
         --------
@@ -158,7 +158,7 @@ class Known:
         return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items())
 
     def with_fact(self: S, *facts: str) -> S:
-        """Return a scene in which some facts hold, each in place of what was stated of its symbol; this one stays as it is.
+        """Return a scene with some facts replaced; this scene stays as it is.
 
         Raises
         ------
@@ -176,7 +176,7 @@ class Known:
         return self._restated(with_facts, facts)
 
     def with_goal(self: S, *goals: str) -> S:
-        """Return a scene in which some facts are wanted, each in place of the goal of its symbol; this one stays as it is.
+        """Return a scene with some goals replaced; this scene stays as it is.
 
         Raises
         ------
@@ -203,7 +203,7 @@ class Known:
 
     @cached_property
     def graph(self) -> rdflib.Graph:
-        """The scene's triples as an rdflib graph; what is added to it or removed from it counts in `query` and `plan` at once."""
+        """The scene's triples as an rdflib graph; changes to it take effect in `query` and `plan` at once."""
         from confab.reasoner.graph.rdflib_graph import rdflib_graph
 
         self.settle()
@@ -211,7 +211,7 @@ class Known:
 
     @cached_property
     def embodiment(self) -> Embodiment:
-        """What the ontology says about bodies: robot, furniture, shapes, skills and perceivers.
+        """The embodiment in the ontology: robot, furniture, shapes, skills and perceivers.
 
         Raises
         ------
@@ -237,17 +237,17 @@ class Known:
 
     @property
     def owl(self) -> Any:
-        """The scene as an owlready2 world; what is added through it is seen by `query` and `plan`."""
+        """The scene as an owlready2 world; changes to it take effect in `query` and `plan`."""
         return self._mirror.world
 
     def _forget(self) -> None:
-        """Forget what was read before an edit."""
+        """Discard what was read before an edit."""
         for name in ("reading", "names", "embodiment"):
             self.__dict__.pop(name, None)
         self._edited = True
 
     def settle(self) -> None:
-        """Take over what was edited through `owl`, and conclude anew what follows from what was edited anywhere."""
+        """Transfer edits made through `owl`, and infer again after any edit."""
         if "_mirror" in self.__dict__ and self._mirror.pull():
             self.__dict__.pop("graph", None)
             self._forget()
@@ -305,7 +305,7 @@ class Known:
         return self
 
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
-        """Return the graph as a query shall see it; what is missing in it is told once."""
+        """Return the graph for a query; missing imports are reported once."""
         from confab.following import write_following
         from confab.reasoner.graph.apart import QueryLimits
         from confab.reasoner.reading.affordance import SITUATION, write_situation
@@ -333,7 +333,7 @@ class Known:
     def construct(
         self, sparql: str, path: str | Path | None = None, limits: QueryLimits | None = None
     ) -> rdflib.Graph | int:
-        """Return the triples that a CONSTRUCT query gives; or write them into a file that imports this scene, and return how many.
+        """Return the triples of a CONSTRUCT query; or write them into a file that imports this scene, and return their number.
 
         Raises
         ------
@@ -350,7 +350,10 @@ class Known:
         return rdflib.Graph().parse(data=self.query(sparql, limits).turtle(self.knowledge.spoken), format="turtle")
 
     def applicable_query(self, behavior: str) -> str:
-        """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
+        """Return the SPARQL query for the individuals with which a behaviour is applicable.
+
+        `query` answers it on the initial situation.
+        """
         from confab.reasoner.graph.apart import standing_alone
         from confab.reasoner.reading.affordance import applicable_query
         from confab.reasoner.reading.quantification import behavior_named
@@ -376,7 +379,7 @@ class Known:
             raise KnowledgeError(f"{name} can't be shown as an update: {error}") from error
 
     def quantifying_query(self, behavior: str) -> str:
-        """Return the SPARQL query that quantifies a behaviour: a row for each way to put individuals in for its parameters."""
+        """Return the SPARQL query that quantifies a behaviour: a row for each assignment of individuals to its parameters."""
         from confab.reasoner.graph.apart import standing_alone
         from confab.reasoner.reading.quantification import behavior_named, query_for
 
@@ -412,7 +415,7 @@ class Known:
         return self.names.short(value) if type(term).__name__ == "NamedNode" else value
 
     def __repr__(self) -> str:
-        """Return what the scene is, in one line."""
+        """Return a description of the scene in one line."""
         problem = self.problem
         return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
 

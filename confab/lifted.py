@@ -1,4 +1,4 @@
-"""What was learned, as sentences in labels: rules, orders, methods, kinds of goals, and the facts by which cogency tells."""
+"""Learned experience as sentences with labels: rules, orders, methods, kinds of goals, and facts of cogency."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from confab.reasoner.symbols import (
 )
 
 MOST_SAID = 6
-"""So many conditions of a rule are said; how many more it asks for is counted."""
+"""Maximum number of conditions in the sentence of a rule; the others are counted."""
 ASKED = (
     (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
     (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),
@@ -32,7 +32,7 @@ ASKED = (
 
 
 class Sayings:
-    """Says what was learned; without labels in the ontology's names.
+    """Writes learned experience as sentences; without labels, in the ontology's names.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Sayings:
         self.labels = labels or Labels({}, {}, Domain({}, {}))
 
     def name(self, name: str) -> str:
-        """Return what people call a role, class or term."""
+        """Return the label of a role, class or term."""
         role = re.fullmatch(r"\?(.+?)(\d*)", name)
         if role is None or name in self.labels.words:
             return self.labels.name(name)
@@ -77,7 +77,7 @@ class Sayings:
         return self.labels.behavior(known, put)
 
     def goal(self, rule: Rule) -> str:
-        """Return what a rule is for."""
+        """Return the goal of a rule."""
         if rule.goal.value in (MORE, LESS):
             who = " ".join(map(self.name, rule.goal.arguments))
             return f"{self.name(rule.goal.situation)} of {who} becomes {rule.goal.value}"
@@ -93,7 +93,7 @@ class Sayings:
         return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)}"
 
     def said(self, one: Said) -> str:
-        """Return what something says that was learned."""
+        """Return any learned item as a sentence."""
         match one:
             case Rule():
                 return self.rule(one)
@@ -108,7 +108,7 @@ class Sayings:
         raise TypeError(one)
 
     def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:
-        """Return a fact that cogency looked at, with individuals for roles."""
+        """Return a fact of cogency as a sentence, with individuals for roles."""
         asks, answer = fact
 
         def put(word: str) -> str:

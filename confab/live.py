@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Tell = Callable[[Moment], None]
 LOG = 6
-"""So many of the last happenings are shown."""
+"""Number of recent events that are shown."""
 
 
 @dataclass(repr=False)

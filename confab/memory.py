@@ -1,6 +1,6 @@
-"""The memory at the front desk: load it, learn into it, save it, merge it, look at it.
+"""The memory as Python and the command line use it: load, learn, save, merge, show.
 
-One file holds both kinds of experience: rules with counts, by which the planner is led (`confab.reasoner.memory.experience`),
+One file holds both kinds of experience: rules with counts, which lead the default planner (`confab.reasoner.memory.experience`),
 and the paper's links between facts and quantified behaviours, which the paper's mode reads (`confab.reasoner.memory.links`).
 """
 
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""What would give the paper's memory more links isn't learned for the paper's mode, which plans small scenes alone."""
+"""Maximum number of links; plans that would add more aren't learned for the paper's mode, which plans small scenes only."""
 SHOWN = 3
-"""So many are said of whom a method took lately."""
+"""Maximum number of preferences of a method that are listed."""
 
 
 @right_names("a memory", "confab.hints", "MEMORY")
@@ -186,12 +186,12 @@ class Memory:
         self.links = links
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
-        """Return the paper's links with a plan learned, or as they are where that would be too many."""
+        """Return the paper's links with a plan learned, or unchanged if there would be too many."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 
     def merge(self, other: Memory | str | Path, trust: bool = False) -> None:
-        """Take in the counts of another memory, or of its file; with `trust`, they may lead. The paper's links can't be merged."""
+        """Add the counts of another memory or its file; with `trust`, they may lead. The paper's links can't be merged."""
         if not isinstance(other, Memory):
             other = Memory.load(other)
         self.experience.merge(other.experience)
@@ -199,7 +199,7 @@ class Memory:
             self.trusted.update(other.experience.episodes)
 
     def trust(self, replicas: Iterable[str]) -> None:
-        """Let other replicas' experience lead like its own.
+        """Let the experience of other replicas lead like its own.
 
         Raises
         ------
@@ -213,7 +213,7 @@ class Memory:
             self.trusted.add(replica)
 
     def live(self, problem: Problem, episode: Episode) -> None:
-        """Learn from what was carried out: what was done, if nobody interfered, and which behaviours were chosen in vain.
+        """Learn from an execution: its steps, if there were no interventions, and the behaviours that failed.
 
         Parameters
         ----------
@@ -231,7 +231,7 @@ class Memory:
                 live(self.experience, begun, episode.done if whole else Plan(()), vain=vain)
 
     def save(self, target: str | Path) -> Path:
-        """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters.
+        """Write the memory as Turtle atomically, and return the path; to an endpoint, only this replica's own counters.
 
         A file is read back before it replaces anything.
 
@@ -253,7 +253,7 @@ class Memory:
         return Path(target)
 
     def _check_written(self, file: Path) -> None:
-        """Raise `KnowledgeError` unless a file says what this memory says."""
+        """Raise `KnowledgeError` unless a file has the content of this memory."""
         found = memory_lines(file)
         read, links = parse(found, "what was written", self.names), load_links(file, self.names, found)
         if read != self.experience or len(links) != len(self.links):
@@ -263,7 +263,7 @@ class Memory:
 
     @property
     def advisor(self) -> Advisor:
-        """The memory as the fast planner takes it."""
+        """The memory in the form that the default planner takes."""
         from confab.planner.experience.advice import Memory as Advisor
 
         mine = {self.experience.replica, *self.trusted}
@@ -281,7 +281,7 @@ class Memory:
         return Table(("behaviour", "symbol", "value", "p(value | behaviour)"), tuple(rows[:most]))
 
     def sayings(self) -> Sayings:
-        """Return what says in sentences what was learned."""
+        """Return the writer of sentences about this memory."""
         from confab.lifted import Sayings
 
         return Sayings(self.labels() if self.labels is not None else None)
@@ -302,7 +302,7 @@ class Memory:
         return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
 
     def told(self, most: int | None = None) -> list[tuple[str, list[str]]]:
-        """Return the rules as sentences with how often, by kind of goal."""
+        """Return the rules as sentences with their counts, by kind of goal."""
         found: list[tuple[str, list[str]]] = []
         for row in self.advice(most):
             record, rule, chosen, passed, failed = map(str, row)
@@ -322,7 +322,7 @@ class Memory:
         return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
 
     def also(self) -> list[str]:
-        """Return the orders and methods that were learned, as sentences with how often."""
+        """Return the learned orders and methods as sentences with their counts."""
         from confab.planner.experience.evidence import DECAY
         from confab.planner.experience.leading import usable
 
@@ -345,14 +345,14 @@ class Memory:
         ]
 
     def __repr__(self) -> str:
-        """Return how much was learned."""
+        """Return the numbers of learned items."""
         learned = counted(len(self.links), "link") + " of " + counted(len(self.links.tables), "behaviour")
         lived = counted(sum(self.experience.episodes.values()), "episode")
         by = counted(len(self.experience.episodes), "replica")
         return f"Memory({learned}, {counted(len(self.experience), 'counter')} of {lived} by {by}, in {self.scene})"
 
     def said(self) -> str:
-        """Return how much was learned, as a sentence."""
+        """Return the numbers of learned items as a sentence."""
         lived = counted(sum(self.experience.episodes.values()), "episode")
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
         kinds = [
@@ -363,7 +363,7 @@ class Memory:
         return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."
 
     def __rich__(self) -> Group:
-        """Return what was learned for rich, what tells chosen from passed over first."""
+        """Return the learned items for rich, most decisive first."""
         from rich.console import Group
 
         return Group(self.said(), self.advice(20).__rich__())
@@ -377,7 +377,7 @@ class Memory:
 
 
 def _labels(scene: Known) -> Callable[[], Labels]:
-    """Return what reads the labels of a scene's terms, once somebody asks."""
+    """Return a function that reads the labels of a scene's terms on demand."""
 
     @cache
     def read() -> Labels:
@@ -389,7 +389,7 @@ def _labels(scene: Known) -> Callable[[], Labels]:
 
 
 def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
-    """Return in words who was taken for something lately, and who wasn't or failed, the clearest first."""
+    """Return the recent preferences for individuals in words, the clearest first."""
     clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
@@ -418,12 +418,12 @@ def endpoint(source: str | Path) -> str | None:
 
 
 def undisturbed(target: str | Path) -> AbstractContextManager[None]:
-    """Let nobody else rewrite a memory file until this is done; at an endpoint every replica has its own graph anyway."""
+    """Lock a memory file against other writers; at an endpoint every replica has a graph of its own."""
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
 def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
-    """Yield the behaviours of the most abstract level that failed in an episode, with the state there and what of each failed."""
+    """Yield the behaviours of the most abstract level that failed in an episode, each with the state and the failed conditions."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments

@@ -1,4 +1,4 @@
-"""What `confab import` and `confab export` do: PDDL files in, a scene out; a level of a scene out as PDDL, its plans in."""
+"""The commands `confab import` and `confab export`: PDDL files to a scene; a level of a scene to PDDL, and plans back."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
 
 
 def _check_turtle(file: Path) -> None:
-    """Raise `SyntaxError` if what was written isn't Turtle."""
+    """Raise `SyntaxError` if the written text isn't Turtle."""
     for _ in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
         pass
 
@@ -97,14 +97,14 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
 def read_pddl_plan(
     problem: Problem, level: int | None, text: str, regroup: bool = False, shorten: bool = False
 ) -> Plan:
-    """Read a plan that another planner found for the export of a level, as a plan of ours.
+    """Read a plan of another planner for an exported level, as one of our plans.
 
-    A planner without hierarchy interleaves steps that don't depend on one another as it happens: one hand waits at a place
-    where the other has to go. With `regroup` each step stands behind the latest that it depends on, with `shorten` besides those
-    that the goal doesn't need are left out.
+    A planner without hierarchy interleaves independent steps arbitrarily: one hand waits at a place that the other needs.
+    `regroup` puts each step behind the latest step on which it depends; `shorten` also leaves out steps that the goal doesn't
+    need.
 
-    What a behaviour's variables stand for (the object that is grasped) follows from the state before it, and is what a robot
-    has to be told; behind a step that isn't applicable it is left open, and validation says so.
+    The values of a behaviour's variables (the object that is grasped) follow from the state before it, and a robot needs them.
+    Behind an inapplicable step they are left open, and validation reports that.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def read_pddl_plan(
 
 
 def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:
-    """Return the steps regrouped; as they are, if they don't lead to the goal or there is no time for it."""
+    """Return the steps regrouped; unchanged if they don't reach the goal or time is short."""
     try:
         task = ground(problem, level)
     except (OutOfTimeError, UngroundableError):

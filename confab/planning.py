@@ -1,4 +1,4 @@
-"""Planning at the front desk: from a scene and options to a result, which says what came of it."""
+"""Planning in a scene: from options to a result."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ if TYPE_CHECKING:
     from confab.why import Account, Because, WhyNot
 
 NO_ENGINE = "none"
-"""In place of an engine's name: no engine at all."""
+"""The name of an engine that means: no engine."""
 OURS = 0.6
-"""Of a time limit, the share of our own search where an engine is installed that is asked next."""
+"""Share of a time limit for our own search if an installed engine is tried afterwards."""
 OURS_WORK = 10_000_000
-"""The same without a time limit, as work in states times operators, and as much for the last resort: some twenty seconds."""
+"""The same without a time limit, in work (states times operators), and as much for the last resort: about twenty seconds."""
 OPTIMAL_SECONDS = 10.0
-"""Where the search for the best plan stops if no time limit is given."""
+"""Default time limit of the search for an optimal plan."""
 
 
 class Options(TypedDict, total=False):
-    """What `plan` takes besides goals."""
+    """Options of `plan` besides goals."""
 
     memory: Memory | Links | str | Path | None
     mode: Mode
@@ -237,7 +237,7 @@ def _plan(
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the plan of whichever engine is installed, or why it found none; nothing where there is no engine."""
+    """Return the plan of an installed engine, or why it found none; None if no engine is installed."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
@@ -258,7 +258,7 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
 
 
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
-"""What a step of a plan is asked for by; see `Result.why`."""
+"""How to name a step of a plan; see `Result.why`."""
 
 
 @right_names("a result", "confab.hints", "RESULT")
@@ -279,7 +279,7 @@ class Result:
     goals: tuple[str, ...] = ()
 
     def faults(self, plan: Plan) -> list[Fault]:
-        """Return what is wrong with a plan for the same task, in the whole scene; nothing if it is one."""
+        """Return the faults of a plan for the same task in the whole scene; empty if the plan is valid."""
         faults = validate(self.problem, plan)
         if faults or self.part is None:
             return faults
@@ -294,7 +294,7 @@ class Result:
         return self.outcome.plan
 
     def in_order(self, *ids: int) -> Plan:
-        """Return the plan with its steps of the first level in another order, as somebody may have shown it.
+        """Return the plan with its steps of the first level in another order, for example that of a demonstration.
 
         Raises
         ------
@@ -320,7 +320,7 @@ class Result:
         return plan
 
     def verify(self, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
-        """Carry out the plan in PyBullet: see `confab.physics.verify`."""
+        """Execute the plan in PyBullet: see `confab.physics.verify`."""
         from confab.physics import verify
 
         self.scene.settle()
@@ -328,14 +328,14 @@ class Result:
         return verify(self.scene, self.plan, rollouts, seed, **options)
 
     def execute(self, interventions: Facts = (), **options: Unpack[execution.Options]) -> Execution:
-        """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
+        """Execute the task in a closed loop, beginning with this plan: see `Scene.execute`."""
         from confab.execution import carry_out
 
         return carry_out(self.scene, self, interventions, **options)
 
     @cached_property
     def labels(self) -> Labels:
-        """What people call the behaviours, situation types and individuals of the problem."""
+        """The labels of the problem's behaviours, situation types and individuals."""
         from confab.labels import labels_of
 
         return labels_of(self.scene.knowledge, self.scene.names, self.problem)
@@ -348,7 +348,7 @@ class Result:
         return purposes(self.problem, self.plan)
 
     def why(self, step: AnyStep) -> Because:
-        """Return why a step is in the plan: what it gives, and what needs that.
+        """Return why a step is in the plan: its effects, and what needs them.
 
         Parameters
         ----------
@@ -371,7 +371,9 @@ class Result:
         return because(self.plan, found, self.purposes[found.path], self.labels)
 
     def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
-        """Return why something else isn't done: what it lacks, or what plan follows from it and what that costs more.
+        """Return why an alternative isn't in the plan.
+
+        The conditions that it lacks, or the plan with it and its additional cost.
 
         Parameters
         ----------
@@ -407,13 +409,13 @@ class Result:
             return self.in_whole_scene().why_not(asked, instead)
 
     def in_whole_scene(self) -> Result:
-        """Return the same result with the problem of the whole scene, not of the part that the task was thought to need."""
+        """Return the same result with the problem of the whole scene instead of the part that was read for the task."""
         if self.part is None:
             return self
         return replace(self, problem=with_goals(self.scene.problem, self.goals), part=None)
 
     def explain(self) -> Account:
-        """Return why each step of the plan is there; or, where there is no plan, why."""
+        """Return why each step of the plan is there; without a plan, why there is none."""
         from confab.show import summary
         from confab.why import Account, account, proved
 
@@ -424,12 +426,15 @@ class Result:
 
     @property
     def certificate(self) -> Certificate | None:
-        """What proves that there is no plan, verified by `confab.planner.certificate_checks`; None unless it is unsolvable."""
+        """The certificate that there is no plan, verified by `confab.planner.certificate_checks`.
+
+        None unless the task is unsolvable.
+        """
         return self.outcome.certificate
 
     @property
     def cost(self) -> float:
-        """What the plan costs on its lowest level: the sum of the costs of its primitives.
+        """The cost of the plan on its lowest level: the sum of the costs of its primitives.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""How far something is, on stderr: a bar with the remaining time in a terminal, a line here and there elsewhere."""
+"""Progress on stderr: a bar with the remaining time in a terminal, occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 PATIENCE = 1.0
-"""Seconds after which a bar appears: what is done by then needs none."""
+"""Seconds before a bar appears; shorter work needs none."""
 
 Advance: TypeAlias = Callable[[str, int], None]
-"""Takes what is being done now, and how much more is done."""
+"""Receives the present activity and the amount of work done."""
 
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Advance]:
-    """Show how far something is, once it takes longer than `PATIENCE`; give what is to be told.
+    """Show the progress of work that takes longer than `PATIENCE`; yield the function that receives it.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
 
 
 def progress_bar() -> Progress:
-    """Return a rich progress bar on stderr, which goes away when it is done."""
+    """Return a rich progress bar on stderr that disappears in the end."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -71,7 +71,7 @@ def progress_bar() -> Progress:
 
 
 def tell(what: str) -> None:
-    """Say on stderr in a line what goes on, where no bar can be shown."""
+    """Write the present activity to stderr in a line, where no bar can be shown."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
 
@@ -88,5 +88,5 @@ def be_verbose() -> None:
 
 
 def quiet() -> bool:
-    """Return whether nothing but results and errors is to be said (`confab COMMAND --quiet`)."""
+    """Return whether only results and errors are to be printed (`confab COMMAND --quiet`)."""
     return not log.isEnabledFor(logging.WARNING)

@@ -1,4 +1,4 @@
-"""Reach facts at the front desk: computed from geometry when they are missing or stale, and kept beside the scene."""
+"""Reach facts: computed from geometry when they are missing or outdated, and kept beside the scene."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
   FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
   FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
-"""A file with an episode, or a memory, is about a scene that has its own reach."""
+"""Ontologies of episodes and memories, whose scenes have reach facts of their own."""
 
 REACHED = "SELECT DISTINCT ?place WHERE {{ ?hand <{relation}> ?place }}"
 """The places that some hand reaches."""
 
 
 def has_robot(scene: Known) -> bool:
-    """Return whether a scene has a robot with a body, which physics could move."""
+    """Return whether a scene has a robot with a body."""
     return bool(scene.knowledge.select(ROBOTS))
 
 
 def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
-    """Return the scene with reach facts if it has a robot and they are missing, or older than one of the user's own files.
+    """Return the scene with reach facts if it has a robot and they are missing or older than one of the user's files.
 
-    A scene whose bodies aren't complete yet can be planned in all the same; `tell` then hears what is missing.
+    A scene with incomplete bodies can still be planned in; `tell` then receives what is missing.
     """
     graph = scene.knowledge
     if graph.remote or graph.faults or not graph.select(ROBOTS):
@@ -99,7 +99,7 @@ def with_reach(scene: S) -> S:
 
 
 def unreached(scene: Known) -> list[str]:
-    """Return a line for each place of the first or the wanted facts that no hand reaches, with what is in the way of each hand."""
+    """Return a line for each place in the initial facts or goals that no hand reaches, with the obstacle for each hand."""
     from confab.reasoner.embodiment.reach import reach_relation
     from confab.sim.reach import hindrance
 

@@ -1,4 +1,4 @@
-"""Refutations at the front desk: what physics found impossible as things stand is known to the next plan and to later calls."""
+"""Refutations: behaviours that physics found impossible in a situation are known to the next plan and to later calls."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
-    """Return what the first rollout that failed refutes; nothing if it failed otherwise than for want of a motion."""
+    """Return the refutation of the first failed rollout; None if the failure wasn't a missing motion."""
     failure = report.shown.failure
     if failure is None:
         return ()
@@ -32,14 +32,14 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:
-    """Return a scene in which some behaviours are refuted; this one stays as it is."""
+    """Return a scene in which some behaviours are refuted; this scene stays as it is."""
     return type(scene)(with_refuted(scene.knowledge, scene.reading, refutations), dict(scene.seconds))
 
 
 def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
-    """Write refutations into ``SCENE.reach.ttl`` beside a scene of the user's own, which later calls read.
+    """Write refutations into ``SCENE.reach.ttl`` beside a scene of the user, for later calls.
 
-    They stand there as long as the scene's geometry stays what it is. What is shipped isn't written into.
+    They are valid as long as the geometry doesn't change. Nothing is written beside shipped scenes.
     """
     path = scene.knowledge.path
     if not refutations or path is None or path.is_relative_to(ontology.ROOT):

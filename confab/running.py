@@ -1,4 +1,4 @@
-"""The main job, end to end: validate, plan, verify in physics where there are bodies, learn from it, report."""
+"""The main job: validate, plan, verify in physics if there are bodies, learn, report."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def run(job: Job) -> int:
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
     """Return the first plan that physics doesn't refute, with what is known by then, and what physics says of it.
 
-    What a planner of motions refutes is known to the next plan, and kept if there is one.
+    What motion planning refutes is known to the next plan, and is saved if there is one.
     """
     report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):

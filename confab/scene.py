@@ -1,4 +1,4 @@
-"""A scene at the front desk: what is known of it, and what is done in it; each verb is a few lines that lead to its module."""
+"""A scene: knowledge (`confab.known`) with planning and acting; each method leads to its module in a few lines."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 class Scene(Known):
-    """A scene of the ontology, loaded with all that it imports.
+    """A scene of the ontology with all its imports.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Scene(Known):
             return image.copy()
 
     def board(self) -> anywidget.AnyWidget:
-        """Return the page for a notebook: map, timeline, plan, queries; facts, goals and interventions are turned by hand.
+        """Return the page for a notebook: map, timeline, plan, queries; facts, goals and interventions can be changed on it.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Scene(Known):
         return shown
 
     def verify(self, plan: AnyPlan, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
-        """Carry out the primitives of a plan, or of what has one in it, in PyBullet: see `confab.physics.verify`."""
+        """Execute the primitives of a plan, or of an object with a plan, in PyBullet: see `confab.physics.verify`."""
         from confab.physics import verify
 
         self.settle()
@@ -124,11 +124,11 @@ class Scene(Known):
         time_limit: float | None = None,
         **options: Unpack[execution.Options],
     ) -> Execution:
-        """Carry the task out in a closed loop: see `confab.execution.execute`.
+        """Execute the task in a closed loop: see `confab.execution.execute`.
 
-        `plan` is what to begin with: a plan, a result, or the name of a file that ``confab plan --json`` wrote. Plans from
-        scratch are made with `memory`; `Memory.live` learns from what came of it. `watch` shows what happens while it
-        happens, in a notebook or a terminal; `tell` is a display of one's own. After `time_limit` seconds the episode gives up.
+        It begins with `plan`: a plan, a result, or the name of a file that ``confab plan --json`` wrote. New plans are made with
+        `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal; `tell` is a
+        display of your own. After `time_limit` seconds the episode gives up.
 
         Examples
         --------
@@ -210,7 +210,7 @@ class Scene(Known):
         return export_pddl(self.problem, level, Path(folder))
 
     def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[planning.Options]) -> Account:
-        """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes.
+        """Plan, and return why each step is there; without a plan, why there is none. Takes the parameters of `plan`.
 
         Raises
         ------
@@ -274,7 +274,7 @@ def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | 
 
 
 def _read(source: object) -> KnowledgeGraph:
-    """Return what files hold, or a graph of rdflib."""
+    """Return the content of files, or of an rdflib graph."""
     if isinstance(source, str | PathLike):
         return load_graph(_local(source), tolerant=True)
     if isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source):
@@ -323,7 +323,7 @@ def load_text(content: bytes) -> Scene:
 
 
 def _local(address: str | PathLike[str]) -> str | Path:
-    """Return a file's path for its address, ``file:///…``; anything else as it is."""
+    """Return the path of an address ``file:///…``; anything else unchanged."""
     if not isinstance(address, str) or not address.startswith("file:"):
         return address if isinstance(address, str) else Path(address)
     from urllib.parse import urlsplit

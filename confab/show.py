@@ -1,4 +1,4 @@
-"""How plans look to people in a terminal; what notebooks and pages show is `confab.page`."""
+"""Plans in a terminal; `confab.page` shows them in notebooks and pages."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
 STYLES = ("bold cyan", "green", "default")
 Notes = Mapping[tuple[int, ...], str]
-"""What to say behind a step, by its path: a verdict, for instance."""
+"""Remarks on steps, by path: verdicts, for instance."""
 
 UNLIMITED = 100_000
-"""Columns of a page that is no terminal: no line is broken or cut there."""
+"""Number of columns for output that isn't a terminal, where no line is broken or cut."""
 
 
 def page() -> Console:
-    """Return stdout as rich writes to it: as wide as the terminal, without limit in a pipe or a file."""
+    """Return a rich console for stdout: as wide as the terminal, without limit in a pipe or a file."""
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else UNLIMITED)
 
 
 def show(what: Any) -> None:
-    """Print what rich can show to stdout, whole: lines wrap in a terminal, and are left as long as they are elsewhere."""
+    """Print an object of rich to stdout completely: lines wrap in a terminal only."""
     page().print(what, markup=False, highlight=False)
 
 
@@ -43,7 +43,7 @@ class PlanTree:
     notes: Notes
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Tree | Segment]:
-        """Yield a tree for a terminal, else plain text: rich takes longer to draw a large plan than it takes to find it."""
+        """Yield a tree for a terminal, otherwise plain text, since rich takes longer to draw a large plan than the search takes."""
         from rich.control import strip_control_codes
         from rich.segment import Segment
         from rich.text import Text
@@ -63,7 +63,7 @@ class PlanTree:
 
 
 def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:
-    """Return the plan as rich prints it, with what there is to say of its steps."""
+    """Return the plan as rich prints it, with remarks on its steps."""
     return PlanTree(plan, title, notes or {})
 
 
@@ -94,7 +94,7 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
 
 
 def lengths(plan: Plan) -> str:
-    """Return how many steps a plan has on each level, e.g. ``4 / 10 / 32``."""
+    """Return the number of steps on each level, e.g. ``4 / 10 / 32``."""
     return " / ".join(map(str, plan.length.values())) or "no"
 
 
@@ -111,7 +111,7 @@ def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
 
 
 def summary(outcome: Outcome) -> str:
-    """Return how a planning call ended: one line, and one more for each level given up and each rule broken by that."""
+    """Return how a planning call ended: a line, and another for each level given up and each violated condition."""
     expanded = sum(counts.expanded for counts in outcome.search.values())
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"

@@ -1,6 +1,6 @@
-"""Where the command `confab` begins: Ctrl-C ends it in one line, too, until all is imported, and changes nothing after the end.
+"""Start of the command `confab`: Ctrl-C ends it in one line even during imports, and changes nothing after the end.
 
-The end is quick: what a large scene took is given back by the system at once, and not object by object, which takes half a second.
+The process ends without freeing its objects one by one, which takes half a second for a large scene.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def _leave(code: int) -> NoReturn:
-    """End the process, with nothing lost that was to be written."""
+    """End the process after everything has been written."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
@@ -35,6 +35,6 @@ def _leave(code: int) -> NoReturn:
 
 
 def _interrupted(*_: object) -> None:
-    """Say what `confab.cli` would say, which may not be there yet."""
+    """Print the message that `confab.cli` would print, which may not be imported yet."""
     os.write(2, b"confab: interrupted; every file is as it was before, or whole\n")
     os._exit(130)

@@ -1,4 +1,4 @@
-"""Rows of a query as a table that shows well in a terminal and in a notebook."""
+"""The rows of a query as a table for terminals and notebooks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
-"""Forms of the SPARQL 1.1 recommendations, and what pyoxigraph calls them."""
+"""Forms of the SPARQL 1.1 recommendations, with pyoxigraph's names for them."""
 
 
 @dataclass(frozen=True)
 class Table(Sequence[tuple[str | None, ...]]):
-    """Rows with named columns; iterate over it, index it, show it, or turn it into a DataFrame.
+    """Rows with named columns, for iteration, indexing, display and conversion into a DataFrame.
 
-    `terms` are the rows as the store answered them, with IRIs and datatypes; `truth` is the answer of an ASK query, which is then
-    also what the table counts as in a condition.
+    `terms` are the rows as the store returned them, with IRIs and datatypes; `truth` is the answer of an ASK query and then also
+    the truth value of the table.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return len(self.rows)
 
     def __bool__(self) -> bool:
-        """Return what an ASK query answered; of other queries, whether there is a row."""
+        """Return the answer of an ASK query; for other queries, whether there is a row."""
         return bool(self.rows) if self.truth is None else self.truth
 
     def __iter__(self) -> Iterator[tuple[str | None, ...]]:
@@ -58,7 +58,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return iter(self.rows)
 
     def values(self) -> list[tuple[Any, ...]]:
-        """Return the rows with numbers, truth values and dates as Python's own."""
+        """Return the rows with numbers, truth values and dates as Python values."""
         return [tuple(map(_value, row, terms)) for row, terms in zip(self.rows, self.terms or self.rows, strict=True)]
 
     def iris(self) -> Table:
@@ -91,7 +91,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return "".join("\t".join((cell or "").translate(escaped) for cell in line) + "\n" for line in lines)
 
     def records(self) -> list[dict[str, str | None]]:
-        """Return the rows as one mapping each."""
+        """Return a mapping for each row."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
     def standard(self, form: str) -> bytes:
@@ -153,7 +153,7 @@ class Table(Sequence[tuple[str | None, ...]]):
 
 
 def _value(cell: str | None, term: Any) -> Any:
-    """Return a literal as Python's own value, where its datatype has one; anything else as it is shown."""
+    """Return a literal as a Python value if its datatype has one, otherwise as its text."""
     datatype = getattr(term, "datatype", None)
     if datatype is None or term.language is not None:
         return cell

@@ -1,6 +1,6 @@
-"""The terminal's end of the command line: what is printed where, and how everything that can happen ends.
+"""The terminal side of the command line: streams, exit codes and messages.
 
-Results go to stdout, remarks and errors to stderr, in one line each. No traceback ever reaches a user.
+Results go to stdout; remarks and errors go to stderr, one line each. Users never see a traceback.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Ending = Callable[[int], NoReturn]
 """Ends the process at once with an exit code."""
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
-"""What the status of an outcome is as an exit code."""
+"""Exit codes by status of an outcome."""
 LONGEST = 2_000
-"""Signs of a message: it quotes what others wrote, which may be of any length."""
+"""Maximum number of characters of a message, which may quote texts of any length."""
 
 WITHOUT_PHYSICS = (
     "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
@@ -38,7 +38,7 @@ WITHOUT_PHYSICS = (
 
 
 def run_to_end(call: Callable[[], int | None]) -> NoReturn:
-    """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
+    """Run the command line: everything ends here, as an exit code and at most one line on stderr."""
     from confab.reasoner.language import DomainError
     from confab.reasoner.limits import LimitError
 
@@ -76,7 +76,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
 
 
 def _interruptible(call: Callable[[], int | None]) -> int | None:
-    """Call something that Ctrl-C interrupts, even where a library makes another error of that, as imports in C do."""
+    """Call a function that Ctrl-C interrupts, even where a library turns the interrupt into another error, as C imports do."""
     came = []
 
     def interrupt(sign: int, _: object) -> NoReturn:
@@ -97,7 +97,7 @@ def _interruptible(call: Callable[[], int | None]) -> int | None:
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[Deadline]:
-    """Let what a command does in here end within some seconds from now, by itself or, a tenth later, by force."""
+    """Limit a command to some seconds: it ends by itself or, a tenth later, by force."""
     from confab.reasoner.limits import within
 
     with within(seconds) as deadline, ended_by(deadline, click.get_current_context().obj):
@@ -106,9 +106,9 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
-    """End the process where what is done in here takes a tenth longer than it may: nothing interrupts a query of a store.
+    """End the process if a block exceeds its time by a tenth: nothing else interrupts a query of a store.
 
-    Files that are written in here are written as a whole or not at all (`confab.reasoner.files.write_whole`).
+    Files are written in the block completely or not at all (`confab.reasoner.files.write_whole`).
     """
     if deadline.left is None or ending is None:
         yield
@@ -152,7 +152,7 @@ def show_result(what: Any) -> None:
 
 
 def _open_streams() -> None:
-    """See to it that no file that is opened later takes the place of a standard stream that the caller has closed."""
+    """Ensure that no opened file takes the place of a standard stream that the caller has closed."""
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
         os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
@@ -172,7 +172,7 @@ def _is_open(stream: int) -> bool:
 
 
 def _log(error: BaseException) -> str:
-    """Write a traceback into a file of its own and return where it lies."""
+    """Write a traceback into a file of its own and return its path."""
     import tempfile
     import traceback
 
@@ -186,7 +186,7 @@ def _log(error: BaseException) -> str:
 
 
 def _usage(error: Any) -> str:
-    """Return in one line what is wrong with a call; where nothing at all was asked for, print the help instead."""
+    """Return the fault of a call in one line; for a call without arguments, print the help instead."""
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         sys.exit(MISUSE)
@@ -196,13 +196,13 @@ def _usage(error: Any) -> str:
 
 
 def remark(text: str) -> None:
-    """Say something on stderr in one line, unless nothing but results and errors is wanted."""
+    """Print a line on stderr, unless only results and errors are to be printed."""
     if not quiet():
         _say(text)
 
 
 def _say(text: str) -> None:
-    """Say something on stderr in one line, whatever signs it quotes."""
+    """Print a line on stderr, whatever characters it quotes."""
     line = " ".join(text.split())
     shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Files that are being edited: told whenever one of them, or what it imports, has changed."""
+"""Watching edited files: report whenever one of them, or an import, has changed."""
 
 from __future__ import annotations
 

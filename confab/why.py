@@ -21,7 +21,7 @@ from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 
 MOST_TOLD = 12
-"""Maximum number of facts of one kind that are told of a certificate."""
+"""Maximum number of facts of one kind in the text of a certificate."""
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from confab.planner.certificates import Certificate
 
 Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
-"""Plans anew for some goals; also returns the problem that was planned in, and what people call what is in it."""
+"""Plans again for some goals; also returns the problem and the labels of its names."""
 Path: TypeAlias = "tuple[int, ...]"
 Steps: TypeAlias = "Mapping[Path, Step]"
 BY = re.compile(r"\s+(?:by|with)\s+(\S+)\s*$")
 SHOWN = 3
-"""Of what needs a step, so many are said; the rest is counted."""
+"""Maximum number of needs of a step that are listed; the rest is counted."""
 
 
 @dataclass(frozen=True)
 class Because:
-    """Why a step is there: what it gives, and what needs that, the nearest first.
+    """Why a step is in a plan: its effects and their needs, nearest first.
 
-    `number` is how it is asked for: ``L2#3`` is the step 3 of level 2, counted from 0.
+    `number` names the step: ``L2#3`` is step 3 of level 2, counted from 0.
     """
 
     number: str
@@ -95,10 +95,10 @@ class Because:
 
 @dataclass(frozen=True)
 class WhyNot:
-    """Why an alternative isn't what is done: what it lacks, or what plan follows from it and what that costs more.
+    """Why an alternative isn't in the plan: the conditions that it lacks, or the plan with it and its additional cost.
 
-    `answer` says it. `plan` is the plan that follows, from the beginning to the end, where there is one; `more` what it costs more;
-    `breaks` what levels above ask that this plan breaks and the present one doesn't.
+    `answer` is the answer as a sentence. `plan` is the complete plan with the alternative, if there is one; `more` is its
+    additional cost; `breaks` lists conditions of levels above that this plan violates and the present plan doesn't.
     """
 
     asked: str
@@ -147,7 +147,7 @@ class WhyNot:
 
 @dataclass(frozen=True)
 class Account:
-    """Why a plan is as it is, step by step; or, where there is none, why: `proof` says what a certificate claims."""
+    """Why a plan is as it is, step by step; without a plan, why there is none: `proof` states the claims of the certificate."""
 
     headline: str
     steps: tuple[Because, ...] = ()
@@ -163,7 +163,7 @@ class Account:
         }
 
     def __str__(self) -> str:
-        """Return it as text, a step to a line, and what needs it behind it."""
+        """Return the account as text, a step per line, each with its first need."""
         lines = [self.headline, *(f"  {line}" for line in self.proof)]
         for step in self.steps:
             why = f": {step.needs[0]}" if step.needs else ""
@@ -210,12 +210,12 @@ class Account:
 
 
 def number_of(plan: Plan, step: Step) -> str:
-    """Return how a step is asked for: its level, and which step of that level it is, counted from 0."""
+    """Return the number of a step: its level, and its position on that level, counted from 0."""
     return f"L{step.level}#{[other.path for other in plan.at_level(step.level)].index(step.path)}"
 
 
 def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
-    """Return how each step is asked for, by its path."""
+    """Return the number of each step, by its path."""
     seen: dict[int, int] = {}
     found = {}
     for step in plan.walk():
@@ -225,7 +225,7 @@ def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
 
 
 def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels: Labels) -> Step:
-    """Return the step that is asked for.
+    """Return the step that an argument names.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ def _because(step: Step, purpose: Purpose, labels: Labels, steps: Steps, number:
 
 
 def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
-    """Return what a certificate of unsolvability claims, a sentence a line.
+    """Return the claims of a certificate of unsolvability, a sentence per line.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
 
 
 def _listed(before: str, sentences: Sequence[str]) -> list[str]:
-    """Return a line for each of some sentences, and one that counts the others."""
+    """Return a line for each of some sentences, and a last line that counts the others."""
     lines = [f"{before}{sentence}" for sentence in sentences[:MOST_TOLD]]
     return [*lines, *([f"{before}{len(sentences) - MOST_TOLD} facts more"] if len(sentences) > MOST_TOLD else [])]
 
@@ -370,7 +370,7 @@ def _instead(changes: Sequence[Change], labels: Labels) -> str:
 def why_not(
     asked: str, problem: Problem, plan: Plan, labels: Labels, ask: Ask, replan: Replan, instead: Step | None = None
 ) -> WhyNot:
-    """Return why an alternative isn't what is done.
+    """Return why an alternative isn't in the plan.
 
     Parameters
     ----------
@@ -413,7 +413,7 @@ def why_not(
 
 
 def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
-    """Return the individuals that are named for a behaviour's parameters."""
+    """Return the individuals that a text assigns to a behaviour's parameters."""
     names = [p.name for p in behavior.parameters]
     given: dict[str, str] = {}
     for position, word in enumerate(text.split()):
@@ -514,7 +514,7 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:
-    """Return what a level asks that another plan breaks and this one doesn't, in sentences."""
+    """Return the conditions that another plan violates and this one doesn't, as sentences."""
     first = problem.domain.levels[0]
     if all(step.level == first for step in other.steps):
         return ()  # no level is left

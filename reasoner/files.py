@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Atomic writing of files: complete, or not at all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 STDOUT = Path("-")
 """In place of a file's name: standard output."""
 PATIENCE = 600.0
-"""Seconds to wait for others who write beside a file: a lesson in a large scene takes minutes."""
+"""Seconds to wait for other writers of a file: a lesson in a large scene takes minutes."""
 
 
 def write_whole(
@@ -96,7 +96,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
 
 
 def check_replaceable(path: Path, kind: str) -> None:
-    """Raise what `written_whole` would raise for content of a kind, before anything is computed.
+    """Raise the errors that `written_whole` would raise for content of a kind, before anything is computed.
 
     Raises
     ------
@@ -114,12 +114,12 @@ def check_replaceable(path: Path, kind: str) -> None:
 
 
 def has_content(path: Path) -> bool:
-    """Return whether there is a file that isn't empty."""
+    """Return whether a file exists and isn't empty."""
     return path.is_file() and path.stat().st_size > 0
 
 
 def _replaceable(target: Path) -> os.stat_result | None:
-    """Return the state of the ordinary, writable file that is there; None if there is none."""
+    """Return the status of an ordinary, writable file; None if the file doesn't exist."""
     if target.is_symlink():
         raise OSError(errno.ELOOP, "is a link that leads back to itself; give the name of a file")
     old = target.stat() if target.exists() else None
@@ -142,9 +142,9 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Let nobody else who asks for it rewrite a file until this is done; its folder is locked, so that nothing is left behind.
+    """Lock a file, by locking its folder so that no lock file is left behind; other callers of this function wait.
 
-    Links are followed, so that all ways to a file lead to one lock. Who has to wait is told so.
+    Links are followed, so that all paths to a file lead to one lock. A caller that has to wait is told so.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def alone(path: Path) -> Iterator[None]:
 
 
 def as_iri_part(name: str) -> str:
-    """Return a file's name as the last part of an IRI: what no IRI can hold is escaped.
+    """Return a file's name as the last part of an IRI, with invalid characters escaped.
 
     >>> as_iri_part("my table"), as_iri_part("Küche-2")
     ('my%20table', 'Küche-2')
@@ -186,13 +186,13 @@ def as_iri_part(name: str) -> str:
 
 
 def _behind(path: Path) -> Path:
-    """Return the file that a path leads to through all links, also if it doesn't exist yet."""
+    """Return the target of a path through all links, even if it doesn't exist yet."""
     return Path(os.path.realpath(path))
 
 
 @contextmanager
 def silent_about_numbers() -> Iterator[None]:
-    """Have rdflib not warn, with a traceback, of literals that aren't the numbers that they say they are."""
+    """Suppress rdflib's warnings, with tracebacks, about literals that don't match their datatypes."""
     spoken = logging.getLogger("rdflib.term")
     before, spoken.disabled = spoken.disabled, True
     try:

@@ -21,7 +21,7 @@ from confab.reasoner.nesting import MOST_NESTED, nested
 from confab.reasoner.vocabulary import CORE, EPISODES, OWL, RDF
 
 MAKER = "Made by Confab"
-"""What the metadata of pictures and films says."""
+"""The maker's name in the metadata of pictures and films."""
 REPORT, PICTURE, FILM = "a report", "a picture", "a film"
 PLAN, VERDICTS, ROWS, TRIPLES = "a plan", "verdicts", "rows of a query", "triples of a query"
 MEMORY, EPISODE, OBSERVED, REACH = "a memory", "an episode", "observed facts", "facts of what hands reach"
@@ -35,7 +35,7 @@ RUN = "the record of a run"
 DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
 STAMP = re.compile(rb"[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})\n?\Z")
 STAMP_BYTES = 200
-"""More than the longest stamp has."""
+"""Bytes at the end of a file that contain any stamp."""
 HEAD_BYTES = 4096
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-")
 GENERATOR = re.compile(rb'<meta name="generator" content="Confab"')
@@ -63,13 +63,13 @@ class Kind:
         return f"{self.name} (columns {', '.join(self.columns)})" if self.columns else self.name
 
     def replaces(self, old: Kind) -> bool:
-        """Return whether content of this kind may take the place of content of another."""
+        """Return whether content of this kind may replace content of another."""
         same_columns = None in (self.columns, old.columns) or self.columns == old.columns
         return not old.foreign and self.name == old.name and same_columns
 
 
 def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
-    """Yield a text piece by piece, then a comment by which its kind is recognised until it is edited.
+    """Yield a text piece by piece, then the stamp: a comment by which its kind is recognised until the text is edited.
 
     >>> print("".join(stamped("a text", ["one"])).strip())
     one
@@ -164,7 +164,7 @@ def _json(text: bytes) -> Kind | None:
 
 
 def _turtle(text: bytes) -> Kind | None:
-    """Return the kind of a Turtle file by the first triple that tells it; None if it isn't Turtle."""
+    """Return the kind of a Turtle file by the first significant triple; None if it isn't Turtle."""
     some = False
     if nested(text) <= MOST_NESTED:
         try:
@@ -190,7 +190,7 @@ def _told_by(triple: ox.Quad) -> str | None:
 
 
 def _rows(file: Path, suffix: str | None) -> Kind:
-    """Return the kind of any other text: rows of a query if its first line has columns as its ending says."""
+    """Return the kind of any other text: rows of a query if its first line has columns that fit the file's suffix."""
     with file.open(encoding="utf-8", errors="replace", newline="") as lines:
         first = lines.readline(HEAD_BYTES).rstrip("\r\n")
     columns: tuple[str, ...] = ()

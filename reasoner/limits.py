@@ -1,7 +1,7 @@
-"""The deadline of a call: set once around it, asked in every loop inside of it, and not handed down.
+"""The deadline of a call: set once around the call and read in every loop inside it, instead of being passed on.
 
-A call that shall end in time is made inside of `within`. Whatever loops there calls `check`, or asks for `left`. Blocks nest, and
-the earliest deadline counts, so that a part of a call can be given a share of its time.
+`within` sets it. Loops call `check`, or read `left`. Blocks nest, and the earliest deadline applies, so that a part of a call can
+receive a share of its time.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from time import perf_counter
 
 
 class LimitError(Exception):
-    """A limit was reached; the message says which, during which work, and how to raise it."""
+    """A limit was reached; the message names it, the work in progress, and how to raise it."""
 
 
 class OutOfTimeError(LimitError):
@@ -24,7 +24,7 @@ class OutOfTimeError(LimitError):
 
 @dataclass(frozen=True)
 class Deadline:
-    """When a call ends, on the clock of `time.perf_counter`; `seconds` is the time that it was given.
+    """The end of a call on the clock of `time.perf_counter`; `seconds` is the time that it was given.
 
     >>> Deadline().left
     >>> Deadline.after(60.0).left > 50.0
@@ -36,18 +36,18 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """Return the deadline that many seconds from now; None: there is none."""
+        """Return the deadline in so many seconds; None means no deadline."""
         return cls() if seconds is None else cls(perf_counter() + seconds, seconds)
 
     @property
     def left(self) -> float | None:
-        """Seconds until then, not less than 0; None without a deadline."""
+        """Seconds left, at least 0; None without a deadline."""
         return None if math.isinf(self.at) else max(0.0, self.at - perf_counter())
 
     def check(self, doing: str, ahead: float = 0.0) -> None:
-        """Raise `OutOfTimeError` if the deadline has passed, or will have passed after a step that takes `ahead` seconds.
+        """Raise `OutOfTimeError` if the deadline has passed, or will have passed after a step of `ahead` seconds.
 
-        `doing` says during which work.
+        `doing` names the work for the message.
         """
         if perf_counter() + ahead > self.at:
             raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
@@ -58,9 +58,9 @@ _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # n
 
 @contextmanager
 def within(limit: Deadline | float | None) -> Iterator[Deadline]:
-    """Let everything that is done in a block end by a deadline, given as such or in seconds from now.
+    """Limit everything in a block to a deadline, or to seconds from now.
 
-    Yields the deadline that counts: this one, or an earlier one that holds already.
+    Yields the effective deadline: this one, or an earlier one that applies already.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def overtime(share: float = 0.1) -> Iterator[Deadline]:
-    """Let a result that was found in time be checked in a share of the time more, and in a tenth of a second at least.
+    """Extend the deadline to check a result that was found in time: by a share of the time, at least a tenth of a second.
 
     Examples
     --------
@@ -101,10 +101,10 @@ def overtime(share: float = 0.1) -> Iterator[Deadline]:
 
 
 def current() -> Deadline:
-    """Return the deadline that holds here."""
+    """Return the current deadline."""
     return _current.get()
 
 
 def check(doing: str, ahead: float = 0.0) -> None:
-    """Raise `OutOfTimeError` if the deadline that holds here has passed, or will have passed in `ahead` seconds."""
+    """Raise `OutOfTimeError` if the current deadline has passed, or will have passed in `ahead` seconds."""
     _current.get().check(doing, ahead)

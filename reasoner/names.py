@@ -75,7 +75,7 @@ def _ontology_name(iri: str) -> str:
 
 
 def right_names(kind: str, module: str, table: str) -> Callable[[C], C]:
-    """Return a decorator of a class: the error for an attribute that it lacks names the one that does what is meant.
+    """Return a class decorator: the error for a missing attribute names the attribute with that function.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def right_names(kind: str, module: str, table: str) -> Callable[[C], C]:
 
 
 def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) -> NoReturn:
-    """Raise the error for a name that `there` lacks: with the name that does what it means, or the most similar one.
+    """Raise the error for a missing name: with the name of the same function, or the most similar name.
 
     Parameters
     ----------

@@ -7,21 +7,21 @@ from contextlib import suppress
 from xml.parsers import expat
 
 MOST_NESTED = 1_000
-"""Levels that every parser here reads without trouble; ontologies have some ten."""
+"""Depth that every parser here reads; ontologies have about ten levels."""
 PIECE = 256
-"""Bytes that are counted at once; by so much a depth may be taken for larger than it is."""
+"""Bytes that are counted at once; the depth may be overestimated by as much."""
 TURTLE = re.compile(
     rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
     rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""Texts, IRIs and comments of Turtle and its relatives, whose brackets don't count."""
+"""Texts, IRIs and comments of Turtle and related formats, whose brackets don't count."""
 JSON = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 OPENING, CLOSING = (b"[", b"(", b"{", b"<<"), (b"]", b")", b"}", b">>")
 
 
 def nested(content: bytes, quoted: re.Pattern[bytes] = TURTLE) -> int:
-    """Return an upper bound of how many brackets are open at once; `quoted` is what may hold brackets that don't count.
+    """Return an upper bound of the number of brackets open at once; `quoted` matches text whose brackets don't count.
 
     >>> nested(b"[" * 5000 + b"]" * 5000), nested(b"[]" * 5000), nested(b'"[" ' * 5000)
     (5000, 256, 0)

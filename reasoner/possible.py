@@ -1,8 +1,8 @@
-"""What no state can be: one check, with one set of messages, for every door by which a state comes in.
+"""Impossible states: one check, with one set of messages, for every source of states.
 
-Files, facts that a caller gives, observations, interventions and the board say what holds. Each time, a value has to be one of
-its situation type, an amount within its bounds, and what physics gives to one individual only one has. A symbol without a value
-is unknown, which is no fault.
+Files, facts of a caller, observations, interventions and the board state what holds. Each time, a value has to belong to its
+situation type, an amount has to lie within its bounds, and an exclusive value may have one holder. A symbol without a value is
+unknown, which is no fault.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from confab.reasoner.amounts import DECIMAL, Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
-"""The perceivers that tell where an object is, what a hand holds and where a hand is."""
+"""Perceivers of an object's place, of what a hand holds, and of a hand's position."""
 
 
 class ImpossibleStateError(ValueError):
-    """Something would hold that can't; the message says what, and what to do."""
+    """A given state is impossible; the message says why, and what to do."""
 
 
 @dataclass(frozen=True)
 class Impossible:
-    """Why a state can't be.
+    """The reason why a state is impossible.
 
     Attributes
     ----------
@@ -40,12 +40,12 @@ class Impossible:
     remedy: str
 
     def __str__(self) -> str:
-        """Return what is wrong, and what to do."""
+        """Return the fault and the remedy."""
         return f"{self.what}; {self.remedy}"
 
 
 def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield why a state can't be; nothing for one that can.
+    """Yield the reasons why a state is impossible.
 
     Parameters
     ----------
@@ -72,13 +72,13 @@ def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield the exclusive values that two individuals have, and objects that are held and stand somewhere at once."""
+    """Yield the exclusive values with two holders, and objects that are both held and at a place."""
     yield from _had_twice(problem, state)
     yield from _held_elsewhere(problem, state)
 
 
 def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a state can't be, for a reason that isn't one of the state before.
+    """Raise `ImpossibleStateError` if a state is impossible, for a reason that the state before doesn't have.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
 
 
 def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:
-    """Yield values that name what is declared nowhere, and amounts that are no numbers or out of their bounds."""
+    """Yield undeclared values, and amounts that are no numbers or outside their bounds."""
     for symbol, value in state.items():
         quantity = domain.situations[symbol.situation].quantity
         if quantity is not None and (limits := _limits(value, quantity)):
@@ -112,7 +112,7 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
 
 
 def _limits(value: str, quantity: Quantity) -> str:
-    """Return what a value of an amount has to be, if it isn't."""
+    """Return the requirement on an amount, if a value violates it."""
     if not DECIMAL.fullmatch(value):
         return "wanted a number, like 2 or 1.5"
     if quantity.allows(Fraction(value)):
@@ -124,7 +124,7 @@ def _limits(value: str, quantity: Quantity) -> str:
 
 
 def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield the exclusive values that two individuals have."""
+    """Yield the exclusive values with two holders."""
     having: dict[tuple[str, str], list[Symbol]] = defaultdict(list)
     for symbol, value in sorted(state.items()):
         perceived = problem.domain.situations[symbol.situation].perceived
@@ -141,9 +141,9 @@ def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield objects that stand at a place while a hand that is elsewhere holds them, or are in a hand while no hand holds them.
+    """Yield objects at a place while a hand elsewhere holds them, and objects in a hand while no hand holds them.
 
-    A hand that grasps or puts down holds what still stands at its place: as long as it is at that object.
+    A hand that grasps or releases an object holds it while it is still at its place, as long as the hand is at that object.
     """
     by = {s.perceived.by: s for s in problem.domain.situations.values() if s.perceived is not None}
     if PLACE not in by or HELD not in by:

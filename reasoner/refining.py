@@ -1,4 +1,4 @@
-"""Behaviours that no level below can do: a fault of the domain that is certain without any search (docs/levels.md)."""
+"""Behaviours that no plan can contain: faults of a domain that are certain without a search (docs/levels.md)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from confab.reasoner.symbols import FALSE, AmountEffect, AnyOf, Behavior, Proble
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
-    """Yield each behaviour that the task could need and that can be in no plan, whatever the situation, and why.
+    """Yield each relevant behaviour that no plan can contain in any situation, with the reason.
 
-    Two faults are looked for. Of a behaviour above the lowest level: it always changes something that no behaviour of a level
-    below changes so, hence it can never be refined. Of any behaviour: it always leaves a situation type with a rest value at
-    another value, and no behaviour brings it back, hence no refinement or plan that has it ends at rest.
+    Two faults are detected. A behaviour above the lowest level can never be refined if it always makes a change that no behaviour
+    of some level below makes. Any behaviour is useless if it always leaves a situation type with a rest value at another value and
+    no behaviour restores it, since no refinement and no plan may end so.
     """
     domain = problem.domain
     values: dict[str, set[str]] = {}
@@ -49,13 +49,13 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
 
 
 def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
-    """Return a problem in which some behaviours can't be done; the IDs of all behaviours stay as they are."""
+    """Return a problem in which some behaviours are inapplicable; the IDs of all behaviours stay the same."""
     never = {one.name: replace(one, preconditions=(*one.preconditions, AnyOf(()))) for one in behaviors}
     return replace(problem, domain=replace(problem.domain, behaviors={**problem.domain.behaviors, **never}))
 
 
 def _needed(problem: Problem) -> list[Behavior]:
-    """Return the behaviours that change what the goal wants, or what such a behaviour or a rule asks or changes."""
+    """Return the behaviours that change what the goal, or a condition or effect of such a behaviour or rule, mentions."""
     behaviors = [*problem.domain.behaviors.values()]
     doing = [*behaviors, *(rule.behavior for rules in problem.domain.rules.values() for rule in rules)]
     counting, before = {symbol.situation for symbol in problem.goal}, -1
@@ -98,7 +98,7 @@ def _values(problem: Problem, behavior: Behavior, effect: ValueEffect) -> set[st
 
 
 def _sure(problem: Problem, behavior: Behavior) -> Iterator[ValueEffect | AmountEffect]:
-    """Yield the effects that a behaviour has wherever it is done; none if no individual can take one of its parameters."""
+    """Yield the effects of every execution of a behaviour; none if no individual fits one of its parameters."""
     kinds = behavior.kinds
     if not all(problem.members(kind) for kind in kinds.values()):
         return

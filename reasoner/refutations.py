@@ -26,7 +26,7 @@ class Refutation:
 
     @property
     def individuals(self) -> frozenset[str]:
-        """The individuals that it names."""
+        """The individuals in it."""
         return frozenset(
             {*self.arguments, *(part for fact in self.facts for part in (*fact.symbol.arguments, fact.value))}
         )

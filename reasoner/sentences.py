@@ -1,4 +1,4 @@
-"""Conditions and amounts as sentences, in names or in whatever words a caller has for facts and names."""
+"""Conditions and amounts as sentences, in names or in a caller's words for facts and names."""
 
 from __future__ import annotations
 
@@ -47,16 +47,7 @@ SIGNS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", 
 
 
 def said(condition: Condition, words: Words = str) -> str:
-    """Return a condition as a sentence, in a caller's words for facts and names, if it has some.
-
-    >>> said(RelationCondition("canReach", ("left_hand", "location7")))
-    'left_hand canReach location7'
-    >>> said(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "location7"),), negated=True))
-    'no Cup LOCATION location7'
-    >>> shut = ValueCondition("SHUT", ("?door",), TRUE)
-    >>> said(Witness("?door", "Door", (RelationCondition("inFrontOf", ("?door", "shelf")), shut), negated=True))
-    'no Door that inFrontOf shelf SHUT true'
-    """
+    """Return a condition as a sentence, in the caller's words for facts and names."""
     match condition:
         case ValueCondition(situation, arguments, value, negated):
             if negated and value in (TRUE, FALSE):

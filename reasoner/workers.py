@@ -1,8 +1,8 @@
-"""Processes that end with the process that started them, however that ends, and have a limit of CPU time of their own.
+"""Processes that end with the process that started them, even if that is killed, and have their own limit of CPU time.
 
-Each gets one end of a pipe whose other end the starting process holds. The kernel is asked to kill the started process, with the
-processes that it starts in turn, as soon as that other end is closed (Linux). After kill -9 or a crash no code has to run
-for that, and it doesn't matter which thread started the process.
+Each gets one end of a pipe whose other end the parent process holds. The kernel kills the child, with its own children, as soon as
+that other end is closed (Linux). After kill -9 or a crash no code has to run for that, and it doesn't matter which thread started
+the process.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 LAUNCHER = os.path.abspath(__file__)  # noqa: PTH100 - in a fast start
 CPU_SECONDS = 3_600.0
-"""CPU time of a process for which nothing else is said."""
+"""Default limit of CPU seconds of a process."""
 MOST_SECONDS = 1e9
 TEXT_BYTES = 2_000
-"""How much of what a process says on stderr is handed on, from the end."""
+"""Number of characters from the end of a process's stderr that are reported."""
 
 
 class WorkerError(RuntimeError):
@@ -45,12 +45,12 @@ class WorkerError(RuntimeError):
 
     @property
     def late(self) -> bool:
-        """Whether its limit of CPU time ended it."""
+        """Whether the process ended at its limit of CPU time."""
         return self.status == -signal.SIGXCPU
 
     @property
     def too_large(self) -> bool:
-        """Whether it asked for more memory than its limit."""
+        """Whether the process requested more memory than its limit."""
         return self.status == -signal.SIGABRT or "memory" in self.said.lower()
 
 
@@ -79,7 +79,7 @@ def limit_cpu(seconds: float) -> None:
 
 
 def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) -> Popen[bytes]:
-    """Start a command in a session of its own; it ends with this process, however that ends.
+    """Start a command in a session of its own; the command ends with this process, even if that is killed.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) 
 
 
 def kill(process: Popen[bytes]) -> None:
-    """Kill a process that was started here, with all that it started."""
+    """Kill a process that was started here, with its children."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
@@ -127,7 +127,7 @@ def call(
     timeout: float | None = None,
     started: Callable[[Popen[bytes]], object] | None = None,
 ) -> Any:
-    """Return what a function returns in a process of its own.
+    """Return the result of a function that runs in a process of its own.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def call(
 
 
 def answer(megabytes: int) -> None:
-    """Call the function that stdin names, and write to stdout whether it returned, and what it returned or raised."""
+    """Call the function that stdin names, and write its result or exception to stdout."""
     import pickle
 
     out = os.fdopen(os.dup(1), "wb")
@@ -194,7 +194,7 @@ def answer(megabytes: int) -> None:
 
 
 def main(end: int, seconds: int, command: list[str]) -> None:
-    """Become a command that ends with the process which holds the other end of a pipe."""
+    """Become a command that ends with the process that holds the other end of a pipe."""
     tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # of a process that was started with a limit itself

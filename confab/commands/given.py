@@ -1,4 +1,4 @@
-"""What a command line names, read: scenes, memories, plans, and files to write."""
+"""Reading the arguments of commands: scenes, memories, plans, and files to write."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def load_scene(source: str, iri: str | None = None) -> Scene:
-    """Load a scene, with what its hands reach if it has a body; ``-`` is read from standard input."""
+    """Load a scene, with reach facts if it has a body; ``-`` is read from standard input."""
     from confab.reaching import with_current_reach
     from confab.scene import load, load_text
 
@@ -31,7 +31,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
 
 
 def doubt(scene: Scene, deadline: Deadline) -> None:
-    """Say in one line if `confab validate` would find errors in a scene of the user's own, as far as there is time to look."""
+    """Report in one line if `confab validate` would find errors in a user's scene, as far as there is time for it."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return
@@ -47,7 +47,7 @@ def doubt(scene: Scene, deadline: Deadline) -> None:
 
 
 def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
-    """Say which places no hand reaches and what is in the way, a line each: where there is no plan, and time is left."""
+    """List the places that no hand reaches, with the obstacle, if there is no plan and time is left."""
     if outcome.plan is None and deadline.left != 0:
         from confab.reaching import unreached
         from confab.reasoner.limits import LimitError, within
@@ -58,11 +58,11 @@ def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
 
 
 NAMED = 3
-"""So many terms are named that a memory speaks of and a scene doesn't know."""
+"""Maximum number of unknown terms of a memory that are named."""
 
 
 def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
-    """Return the memory to plan with, if one was asked for."""
+    """Return the requested memory."""
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:
@@ -88,14 +88,14 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
 
 def json_file(path: Path) -> Path:
-    """Return the path of a plan or of verdicts to write, if it says that it is JSON."""
+    """Return the path of a plan or of verdicts to write, if its suffix is that of JSON."""
     if path.suffix.lower() != ".json" and path != STDOUT:
         raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
     return path
 
 
 def plan_in(path: Path, scene: Scene) -> Plan:
-    """Return the plan in a file: JSON of ours, else a list of actions as PDDL planners write it for our export."""
+    """Return the plan in a file: our JSON, or else a list of actions as PDDL planners write it for our export."""
     if path.suffix.lower() in (".json", ""):
         from confab.interchange import read_plan
 

@@ -1,4 +1,4 @@
-"""Memories: learned, shown, merged, trusted, renamed."""
+"""Commands for memories: learn, show, merge, trust, rename."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def learn(
 
 
 class InOrder(click.Group):
-    """A group whose help lists its commands as they stand here, the main one first."""
+    """A command group whose help lists its commands in the order of this module."""
 
     command_class = Command
 
@@ -127,7 +127,7 @@ def memory_app() -> None:
 @click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
 def migrate(memory: Path, renames: tuple[str, ...]) -> None:
-    """Rename terms in a memory, so that what was learned of them isn't lost."""
+    """Rename terms in a memory, so that experience about them isn't lost."""
     from confab.authoring import migrate as rename
 
     show_result(f"{memory}: {rename(memory, renames)} statements changed")
@@ -181,7 +181,7 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
 @click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
 def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
-    """Let what other replicas have counted lead the search, too."""
+    """Let the counts of other replicas lead the search, too."""
     from confab.memory import Memory, undisturbed
 
     with undisturbed(memory):

@@ -1,4 +1,4 @@
-"""What several commands take, declared once."""
+"""Options of several commands, declared once."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Output(click.Path):
 
 
 class Command(click.Command):
-    """A command none of whose outputs is an input or another output of the same call, and that reads stdin for one thing."""
+    """A command whose outputs differ from its inputs and from each other, and that reads stdin for at most one input."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command, unless one file stands for two things."""
@@ -95,7 +95,7 @@ def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
 
 
 def _same_file(path: Path, given: object, parameter: click.Parameter) -> bool:
-    """Return whether the value of a parameter leads to a file, by whichever links."""
+    """Return whether the value of a parameter leads to a file, through any links."""
     if not isinstance(given, str | Path):
         return False
     try:
@@ -125,7 +125,7 @@ def _verbose(context: click.Context, option: click.Parameter, wanted: bool) -> N
 
 
 def scene_names(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
-    """Return what a scene's name can go on with: shipped names, and files of ontologies."""
+    """Return the completions of a scene's name: shipped names, and ontology files."""
     folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
     found = sorted(folder.glob(f"{glob.escape(begun.rpartition('/')[2])}*"))
     files = [str(path) + "/" * path.is_dir() for path in found if path.is_dir() or path.suffix in ontology.SUFFIXES]
@@ -172,10 +172,10 @@ MODE = click.option(
 
 
 class Seconds(click.FloatRange):
-    """Seconds that a clock can wait for."""
+    """A number of seconds that a clock can wait for."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return them, if they are a number, and not too many."""
+        """Return the seconds, if they are a number within the maximum."""
         seconds = float(super().convert(value, param, ctx))
         if not seconds <= LONGEST:  # as 'nan' isn't
             self.fail(f"'{value}' is no time to wait; wanted seconds up to {LONGEST:,.0f}", param, ctx)
@@ -183,7 +183,7 @@ class Seconds(click.FloatRange):
 
 
 LONGEST = 1e9
-"""Seconds; without a limit there is no need for more."""
+"""Maximum number of seconds of a time limit; beyond it, leave the limit out."""
 TIME_LIMIT = click.option(
     "--time-limit",
     type=Seconds(min=0.0),

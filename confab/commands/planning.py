@@ -439,7 +439,7 @@ def _explained(
     against: str | None,
     plot: Path | None,
 ) -> Any:
-    """Return the reasons that were asked for; the result of planning where there is no plan."""
+    """Return the requested reasons; if there is no plan, the result of planning."""
     loaded = load_scene(scene)
     remembered = memory_for(memory, False, loaded)
     with progress("planning"):
@@ -460,7 +460,7 @@ def _explained(
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
-    """Return why memory prefers a step of a plan to another one, and draw it."""
+    """Return why memory prefers one step of a plan to another, and draw it."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
     from confab.why import find_step
