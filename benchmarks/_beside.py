@@ -24,14 +24,14 @@ HERE = Path(__file__).parent
 SHORT, LONG, PROVING = 60, 300, 20
 """CPU seconds for a planner's process (long: lama-first on the encoding by hand from 50 objects on), and for a proof of cost."""
 RUNS, QUICK = 3, 5.0
-"""Runs of which the median is taken, of what takes less than so many seconds."""
+"""Number of runs for the median, and the seconds below which runs are repeated."""
 
 Row = tuple[float | None, int | None, int]
 """CPU seconds and steps, or None without a plan; the seconds allowed."""
 
 
 class Rows:
-    """What was measured, by planner, encoding and size; kept in a file if `CONFAB_PEER_ROWS` names one."""
+    """Measurements by planner, encoding and size; kept in a file if `CONFAB_PEER_ROWS` names one."""
 
     def __init__(self) -> None:
         self.file = Path(os.environ["CONFAB_PEER_ROWS"]) if "CONFAB_PEER_ROWS" in os.environ else None

@@ -41,7 +41,7 @@ GOAL = "REACH_GOAL"
 
 
 def boxes(problem: Problem, rng: Random) -> Problem:
-    """Return a random problem of boxes in boxes: one or two goals about what is around what, or stored away."""
+    """Return a random problem of nested boxes, with one or two goals about defined situations."""
     rooms, count = ["hall", "vault"][: rng.choice((2, 2, 1))], rng.choice((2, 3, 3, 4))
     cases, things = [f"box{i}" for i in range(count)], ["ring"]
     initial = {}
@@ -105,7 +105,7 @@ def downward(domain: str, problem: str, command: list[str]) -> int | None:
 
 
 def deepest(problem: Problem) -> int:
-    """Return how many individuals stand in a row by what is transitive, in the initial state."""
+    """Return the length of the longest chain of a transitive situation in the initial state."""
     name = "INSIDE" if "INSIDE" in problem.domain.rules else "WAY"
     facts, (one, other) = Facts(problem, problem.initial), problem.domain.situations[name].arguments
     return max(sum(facts.value(name, (a, b)) == TRUE for b in problem.classes[other]) for a in problem.classes[one])

@@ -35,21 +35,20 @@ from confab.sim.verify import Rollout, expectations
 KEPT = Path("confab-out/bodies.jsonl")
 DEVELOPMENT, REPORTING = 7000, 80000
 NOISE = {4: 100, 0: 100, 8: 20}
-"""Millimetres of standard deviation on every perceived position, and how many rollouts of each task are wanted with it.
+"""Standard deviation in millimetres of every perceived position, with the number of rollouts per task.
 
-Rows are done in this order.
-"""
+Rows are measured in this order."""
 AGAIN = 2
-"""So many rollouts of a task are done again to find out whether other code does the same."""
+"""Number of rollouts of a task that are repeated to find out whether other code gives the same results."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
-"""What a rollout depends on most: where one of these is another one, rollouts begin anew."""
+"""Files on which a rollout depends most: when one of them changes, rollouts begin anew."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A task of the table: a scene, and what is done in it.
+    """A task of the table: a scene and its steps.
 
-    That are primitives, each a behaviour and its arguments, or the plan for the `goals`, or for those of the scene.
+    The steps are primitives (behaviour and arguments), or the plan for `goals`, or the plan for the scene's goals.
     """
 
     robot: str
@@ -108,7 +107,7 @@ def trial(name: str, noise: int) -> Trial:
 
 
 def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
-    """Return what is kept of a rollout."""
+    """Return the record of a rollout."""
     failure = rollout.failure
     return {
         "task": name,
@@ -144,7 +143,7 @@ def kept() -> list[dict[str, Any]]:
 
 
 def carry(names: Sequence[str]) -> None:
-    """Let rollouts of older code count for the code as it is, of tasks and noises of which the first ones come out the same."""
+    """Keep rollouts of older code, of tasks and noises whose first rollouts give the same results."""
     rows, now = read(), code()
     for name, noise in product(names, NOISE):
         older = [one for one in rows if (one["task"], one["noise"]) == (name, noise) and one["code"] != now]
@@ -156,7 +155,7 @@ def carry(names: Sequence[str]) -> None:
 
 
 def missing(names: Sequence[str], noises: Sequence[int]) -> Iterator[tuple[str, int, int]]:
-    """Yield task, noise and seed of what isn't rolled out yet, a row after another."""
+    """Yield task, noise and seed of the missing rollouts, row by row."""
     done = {(one["task"], one["noise"], one["seed"]) for one in kept()}
     for noise, name in product(noises, names):
         seeds = range(REPORTING, REPORTING + NOISE[noise])
@@ -164,7 +163,7 @@ def missing(names: Sequence[str], noises: Sequence[int]) -> Iterator[tuple[str, 
 
 
 def run(names: Sequence[str], noises: Sequence[int]) -> None:
-    """Roll out what is missing of some tasks, and keep a line for each rollout."""
+    """Roll out the missing cases of some tasks, and append a line for each."""
     KEPT.parent.mkdir(parents=True, exist_ok=True)
     now = code()
     for name, noise, seed in missing(names, noises):

@@ -76,7 +76,7 @@ DOMAINS = ("tearoom", "ferry", "served")
 
 
 def sources(folder: Path) -> None:
-    """Write what the cases begin with: three small domains with a scene each, a memory, a plan, what was observed."""
+    """Write the valid inputs of the cases: three small domains with a scene each, a memory, a plan, observed facts."""
     import confab
     from confab.authoring import new_domain
     from confab.memory import Memory
@@ -131,14 +131,14 @@ def delete(draw: random.Random, triples: Triples) -> None:
 
 
 def delete_node(draw: random.Random, triples: Triples) -> None:
-    """Drop all that is said of a node."""
+    """Delete all triples of a node."""
     if triples:
         node = triples[_any(draw, triples)].subject
         triples[:] = [t for t in triples if t.subject != node]
 
 
 def double(draw: random.Random, triples: Triples) -> None:
-    """Say all that is said of a node of another one, too, and perhaps name that wherever the first is named."""
+    """Copy all triples of a node to another one, and perhaps its uses."""
     if triples:
         node = triples[_any(draw, triples)].subject
         twin = ox.NamedNode(getattr(node, "value", "x") + "Twin") if isinstance(node, ox.NamedNode) else ox.BlankNode()
@@ -343,7 +343,7 @@ def validate(draw: random.Random, folder: Path) -> Call:
 
 
 def look(draw: random.Random, folder: Path) -> Call:
-    """Ask what its objects afford; draw, export, explain or learn from it."""
+    """Ask for affordances; draw, export, explain or learn."""
     scene, memory = _broken(draw, folder), str(folder / "memory.ttl")
     return draw.choice(
         [
@@ -614,7 +614,7 @@ def options(draw: random.Random, folder: Path) -> Call:
 
 
 def observed(draw: random.Random, folder: Path) -> Call:
-    """Start from what was seen, in a broken file."""
+    """Start from observed facts in a broken file."""
     draw.choice((mutated_triples, mutated_triples, mutated_bytes))(draw, folder / "observed.ttl")
     return [
         "plan",
@@ -667,7 +667,7 @@ def catalogs(draw: random.Random, folder: Path) -> Call:
 
 
 def urdf(draw: random.Random, folder: Path) -> Call:
-    """Compute what a robot reaches whose URDF file is broken."""
+    """Compute the reach of a robot with a broken URDF file."""
     from confab.authoring import new_domain
 
     bodies = folder / "bodies"
@@ -730,4 +730,4 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Call], int]] = {
 }
 """What breaks something, and how many of some thousand cases it gets: those that take long get fewer."""
 TARGETS = {"memory.ttl", "broken.ttl", "out", "out.ttl", "out.svg"}
-"""What a case may write."""
+"""Time limit and files of a case."""

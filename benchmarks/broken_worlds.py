@@ -117,7 +117,7 @@ STL = "\n".join(
 
 
 def sources(folder: Path) -> None:
-    """Write what the cases begin with: small worlds with definitions or amounts, in both forms; a memory of each."""
+    """Write the valid inputs of the cases: small worlds with definitions or amounts, in both forms, and a memory of each."""
     import confab
     from confab.memory import Memory
     from confab.reasoner.updates.converting import convert
@@ -291,7 +291,7 @@ def _regrouped(draw: random.Random, text: str) -> str:
 
 
 def edited(draw: random.Random, folder: Path) -> Call:
-    """Be led by rules that somebody edited: other conditions, roles, steps, counts."""
+    """Plan with edited rules: other conditions, roles, steps, counts."""
     file, scene = folder / "memory.ttl", str(folder / "scene.ttl")
     text = file.read_text()
     for _ in range(draw.choice((1, 1, 2, 4))):
@@ -319,7 +319,7 @@ def edited(draw: random.Random, folder: Path) -> Call:
 
 
 def meshes(draw: random.Random, folder: Path) -> Call:
-    """Compute what a robot reaches whose hand has a broken mesh."""
+    """Compute the reach of a robot whose hand has a broken mesh."""
     from benchmarks.broken_inputs import urdf
 
     call = urdf(random.Random(0), folder)  # the files; then those of the robot as they were

@@ -34,7 +34,7 @@ WORLDS: dict[str, Callable[[int], Problem]] = {
 
 
 def corrupted(certificate: Certificate, rng: Random) -> Iterator[tuple[str, Certificate]]:
-    """Yield what is left of a certificate when something of it is dropped, changed or said of another goal."""
+    """Yield versions of a certificate with a claim dropped or changed, or for another goal."""
     goal = certificate.unmet[0]
     other = Fact(Symbol(goal.symbol.situation, ("nothing",)), goal.value)
     yield "goal dropped", replace(certificate, unmet=())

@@ -38,12 +38,12 @@ ROOT = Path(__file__).resolve().parents[1]
 SIZES = (4, 10, 16, 40)
 FIRST = 4_000_000
 LENGTH, EFFORT, TIME = 0.002, 0.05, 0.4
-"""A change of so much, as a share, counts: of primitives, of expansions, and (which is noisy) of CPU seconds."""
+"""Minimum change that counts, as a share: of primitives, of expansions, and (noisy) of CPU seconds."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number in a module: its name, which of the numbers under that name, where it stands, and what is said of it there."""
+    """A constant in a module: its name, its position under that name, its line, and its description."""
 
     path: Path
     name: str
@@ -172,11 +172,11 @@ INSTRUMENTS: Mapping[str, tuple[Callable[[], Iterator[Row]], ...]] = {
     "paper": (on_paper,),
     "": (planned,),
 }
-"""What is planned to see what a room's constants do."""
+"""The problems that measure the constants of a room."""
 
 
 def measured(room: str) -> dict[str, float]:
-    """Return what planning all that a room is there for comes to."""
+    """Return the results of planning all problems of a room."""
     found: dict[str, float] = {"solved": 0, "unsolvable": 0, "gave-up": 0, "primitives": 0, "expansions": 0}
     begin = process_time()
     for instrument in INSTRUMENTS[room]:
@@ -188,7 +188,7 @@ def measured(room: str) -> dict[str, float]:
 
 
 def with_change(room: str, constant: Constant | None, factor: float) -> dict[str, float]:
-    """Return what is measured with a constant multiplied by a factor; nothing if that fails."""
+    """Return the results with a constant multiplied by a factor; None if that fails."""
     with TemporaryDirectory() as folder:
         for path in ROOT.iterdir():
             if path.is_dir() and not path.name.startswith(".") and path.name != "planner":
@@ -210,7 +210,7 @@ def with_change(room: str, constant: Constant | None, factor: float) -> dict[str
 
 
 def verdict(base: Mapping[str, float], found: Mapping[str, float]) -> str:
-    """Return what a change does, in a few words; nothing if that can't be measured."""
+    """Return the effect of a change in a few words; empty if it can't be measured."""
     if not found:
         return "fails"
     said = []
@@ -226,7 +226,7 @@ def verdict(base: Mapping[str, float], found: Mapping[str, float]) -> str:
 
 
 def main() -> None:
-    """Print a table for each room: each constant, what it trades, and what halving and doubling it changes."""
+    """Print a table for each room: each constant with its description and the effects of halving and doubling it."""
     file = Path(os.environ["CONFAB_ROWS"]) if "CONFAB_ROWS" in os.environ else None
     known: dict[str, dict[str, float]] = json.loads(file.read_text()) if file is not None and file.exists() else {}
 

@@ -77,10 +77,10 @@ def served(objects: int) -> Problem:
 
 
 def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
-    """Return something that a person could do in a situation: no two objects at one place, nothing unheard of.
+    """Return a plausible intervention for a situation.
 
-    What a place and what a content is, is taken from the domain: values that exist from a later level on (in the hand) mark the
-    situation type of places; the other one of the first level is that of contents.
+    Places and contents are recognised from the domain: values that exist from a later level on (in the hand) mark the situation
+    type of places; the other situation type of the first level is that of contents.
     """
     first = [s for s in problem.domain.situations.values() if s.level == 1 and not s.boolean]
     where = next(s for s in first if problem.value_levels.keys() & set(problem.classes[s.range]))
@@ -126,7 +126,7 @@ def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]
 
 
 def timed(intervention: Intervention, trial: Trial, position: int, inside: bool, second: float) -> Intervention:
-    """Say when it happens: at a second inside a primitive, or once one is done; what is wanted changes between primitives."""
+    """Return the time of an intervention: a second inside a primitive, or after a step; goals change between primitives."""
     if inside and intervention.of_world:
         return replace(intervention, at=second)
     return replace(intervention, after=trial.plan.primitives[position].path)
@@ -269,7 +269,7 @@ def _repair_row(objects: int, count: int) -> None:
 
 
 def after_intervention(before: Problem, intervention: Intervention) -> Problem:
-    """Return the situation and the goal after an intervention; of what is taken away nothing is wanted any more."""
+    """Return the situation and the goal after an intervention; goals about removed objects are dropped."""
     goal = dict(before.goal)
     if intervention.change is Change.GOAL:
         goal.update((fact.symbol, fact.value) for fact in intervention.facts)
@@ -288,7 +288,7 @@ def after_intervention(before: Problem, intervention: Intervention) -> Problem:
 
 
 def rest_after(plan: Plan, count: int) -> list[Step]:
-    """Return what is left of a plan after so many primitives."""
+    """Return the rest of a plan after so many primitives."""
     gone = {step.path for step in plan.primitives[:count]}
 
     def left(steps: Sequence[Step]) -> list[Step]:
@@ -454,7 +454,7 @@ def both_hands() -> None:
 
 
 def _right(episode: Episode) -> bool:
-    """Whether what the episode claims is so: what is wanted in the end holds; nothing is said to be impossible for no reason."""
+    """Whether the claims of an episode are true: the goals hold in the end, and no goal is called impossible without reason."""
     holds = all(episode.observed.get(s, FALSE) == v for s, v in episode.goal.items())
     return holds and (episode.status is End.REACHED) == (not episode.reasons)
 

@@ -38,7 +38,7 @@ class NoHistoryError(Exception):
 
 @dataclass(frozen=True)
 class Block:
-    """One block of figures; what its header lacks is empty."""
+    """One block of figures; missing fields of its header are empty."""
 
     page: Path
     name: str
@@ -61,11 +61,11 @@ class Block:
 
     @property
     def table(self) -> int:
-        """Which table of what is printed is meant; 0 for all that is printed."""
+        """The number of the table in the output; 0 for the whole output."""
         return next((int(field[6:]) for field in self.fields[1:] if field.startswith("table ")), 0)
 
     def faults(self, root: Path) -> Iterator[str]:
-        """Yield what is missing in the header."""
+        """Yield the missing fields of the header."""
         if not re.search(r"\bpython -m \w", self.fields[0]):
             yield f"{self}: no command, but '{self.fields[0]}'; wanted one with 'python -m …' first"
         if not self.commit:
@@ -79,7 +79,7 @@ class Block:
         )
 
     def since(self, root: Path) -> list[str]:
-        """Return the commits that have changed what is measured since it was measured, newest first."""
+        """Return the commits that changed the measured code since the measurement, newest first."""
         command = ["git", "-C", str(root), "log", "--format=%h", f"{self.commit}..HEAD", "--", *self.measures]
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -90,7 +90,7 @@ class Block:
         return done.stdout.split()
 
     def last(self, root: Path) -> str:
-        """Return the last commit that changed what is measured: unlike the head, it outlives a rebase of what came after."""
+        """Return the last commit that changed the measured code; unlike the head, it survives a rebase of later commits."""
         command = ["git", "-C", str(root), "log", "-1", "--format=%h", "--", *self.measures]
         return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
 
@@ -105,7 +105,7 @@ def blocks(root: Path = ROOT) -> list[Block]:
 
 
 def stale(root: Path = ROOT) -> list[str]:
-    """Return a line for each block that is older than the code that it measures, or of which that can't be told."""
+    """Return a line for each block that is older than the measured code, or whose age is unknown."""
     found = []
     for block in blocks(root):
         try:
@@ -119,7 +119,7 @@ def stale(root: Path = ROOT) -> list[str]:
 
 
 def printed(command: str) -> str:
-    """Run a command with this Python and return what it prints; empty if it fails."""
+    """Run a command with this Python and return its output; empty if it fails."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     env = {**os.environ, "PATH": path}
     done = subprocess.run(command, shell=True, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True, check=False)
@@ -135,7 +135,7 @@ def chosen(text: str, number: int) -> str:
 
 
 def write(wanted: Sequence[Block]) -> int:
-    """Measure anew, and put what comes into the pages at once; 1 if some of it didn't come."""
+    """Measure again and write each result into its page at once; return 1 if a result is missing."""
     failed = 0
     for command in dict.fromkeys(block.fields[0] for block in wanted):
         text = printed(command)

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
-    """Run a command; return its seconds, those of the processor, and what it printed."""
+    """Run a command; return its seconds, CPU seconds, and output."""
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")}
     begin, before = perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(

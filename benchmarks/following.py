@@ -66,7 +66,7 @@ BY_HAND = """
 
 
 def scene(cups: int, defined: bool) -> str:
-    """Return a scene: half of the cups in each room, every second one dirty, as many free places as cups."""
+    """Return a scene: half of the cups in each room, every second cup dirty, as many free places as cups."""
     lines = [HEAD, DEFINED if defined else BY_HAND]
     wanted = [f":task.goal{i}" for i in range(max(cups // 10, 1))]
     for i in range(2 * cups):

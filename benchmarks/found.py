@@ -1,4 +1,4 @@
-"""What broke once by hand, and what it answers now: each case is made anew from what is shipped, and run as people run it.
+"""Faults found by hand, and the present answers: each case is built from shipped files and run as a user would.
 
 python -m benchmarks.found    the table of docs/figures/promises.md; exit 1 if an answer isn't foreseen
 """

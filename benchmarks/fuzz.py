@@ -56,7 +56,7 @@ SECONDS, WAITING, MEGABYTES = 30, 600, 4_000
 """Of CPU time, and by the clock: a machine may be busy with other things."""
 TIME_IS_OVER = {signal.SIGPROF: f"{SECONDS} s of CPU time", signal.SIGALRM: f"{WAITING} s"}
 KEPT, ALIKE = 2, 70
-"""So many cases are kept that broke in the same words, by as many signs."""
+"""Maximum number of kept cases with the same message, and number of characters compared."""
 FEW_STATES, FEW_STEPS = 300, 60
 """A world of so few states and quantified behaviours is searched to the end, where the answer is that there is no plan."""
 
@@ -89,7 +89,7 @@ def run_case(door: str, seed: int, given: Path, keep: bool = False) -> Failure |
 
 
 def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) -> Iterator[Failure]:
-    """Run cases of a door in one process, and in another one what a crash has left; yield what broke."""
+    """Run cases of a door in one process, and continue in another one after a crash; yield the faults."""
     left = list(seeds)
     while left:
         reading, writing = os.pipe()
@@ -168,7 +168,7 @@ def _recorded() -> list[Result]:
 
 
 def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool) -> str:
-    """Draw a case, answer it, and return what is wrong with how it ended; nothing if all is well."""
+    """Draw a case, answer it, and return the fault of its ending; empty if there is none."""
     folder = Path(tempfile.mkdtemp(prefix="confab-fuzz-"))
     try:
         draw = random.Random(f"{door} {seed}")
@@ -195,7 +195,7 @@ def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool
 
 
 def _run(call: Call, case: Path, out: Path, err: Path, results: list[Result]) -> tuple[int, str]:
-    """Run a command and check what it answered; return its exit code and what is wrong."""
+    """Run a command and check its answer; return the exit code and the fault."""
     from confab.cli import main
 
     code = 99
@@ -222,7 +222,7 @@ def _run(call: Call, case: Path, out: Path, err: Path, results: list[Result]) ->
 
 
 def _judged(call: Call, code: int, said: str, printed: str, before: dict[str, bytes], after: dict[str, bytes]) -> str:
-    """Return what is wrong with how a command ended."""
+    """Return the fault of a command's ending."""
     if code not in (0, 1, 2, 3):
         return f"exit {code}: {said}"
     if "Traceback" in said + printed:
@@ -328,7 +328,7 @@ def _import_all() -> None:
 
 
 def known() -> Iterator[tuple[str, int, str]]:
-    """Yield the cases that broke once, and what the cause was, if it is mended."""
+    """Yield the kept cases with their causes, if corrected."""
     for line in SEEDS.read_text(encoding="utf-8").splitlines() if SEEDS.is_file() else ():
         if match := re.match(r"(\w+):(\d+)", line):
             yield match[1], int(match[2]), line.partition(" mended: ")[2].strip()
@@ -341,7 +341,7 @@ def tried() -> dict[str, list[int]]:
 
 
 def note(failure: Failure) -> None:
-    """Keep a case that broke, unless as many as that were kept that broke in the same words."""
+    """Keep a case that broke, unless enough cases with the same message are kept."""
     line = str(failure)
     words = line.partition("  ")[2][:ALIKE]
     if sum(words in kept for kept in SEEDS.read_text(encoding="utf-8").splitlines()) < KEPT:
@@ -350,7 +350,7 @@ def note(failure: Failure) -> None:
 
 
 def fuzz(cases: int, doors: Sequence[str]) -> int:
-    """Try so many more cases, each door by its share; note what was tried and what broke as it goes. Return how many broke."""
+    """Try so many cases, each door by its share; record results as they come. Return the number of faults."""
     shares = {door: DOORS[door][1] for door in doors}
     begin, done, broke = time.monotonic(), 0, sum(fell for _, fell in tried().values())
     before = broke
@@ -383,7 +383,7 @@ def fuzz(cases: int, doors: Sequence[str]) -> int:
 
 
 def table() -> None:
-    """Print what was tried at each door, what broke, and how many causes were mended."""
+    """Print the number of cases and faults of each door, and the number of corrected causes."""
     print("| door | cases tried | broke | causes corrected | open |\n|---|---|---|---|---|")
     cases, counts = list(known()), tried()
     for door, (run, _) in DOORS.items():
@@ -401,7 +401,7 @@ def table() -> None:
 
 
 def main() -> int:
-    """Run the cases that were asked for; return 1 if one broke."""
+    """Run the requested cases; return 1 if one broke."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int)
     parser.add_argument("--door", choices=DOORS, action="append")

@@ -1,4 +1,4 @@
-"""Writers of files, killed at any moment: what was acknowledged is still there, and every file is whole.
+"""Commands that write files, killed at random moments: acknowledged data have to survive, and every file has to be complete.
 
 python -m benchmarks.kills             100 SIGKILLs for each command, as docs/figures/promises.md quotes them
 python -m benchmarks.kills save 20     so many for one
@@ -45,7 +45,7 @@ COMMANDS = {
     "crowd": "learn`, one of eight at a time, by whichever path, `learn",
 }
 LEARNING = ("learn", "execute", "run")
-"""What adds an episode."""
+"""Commands that add an episode."""
 
 
 class Ended(NamedTuple):
@@ -59,7 +59,7 @@ class Ended(NamedTuple):
 def killed(
     write: Callable[[], object], after: float = math.inf, call: float = math.inf, sign: int = signal.SIGKILL
 ) -> Ended:
-    """Run something in a process of its own; signal it after so many seconds of CPU time, or at one of its calls."""
+    """Run a function in a process of its own; send it a signal after so many CPU seconds, or at one of its calls."""
     made = mmap.mmap(-1, 8)  # shared with the child
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
@@ -190,7 +190,7 @@ def rename(file: Path) -> str:
 def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -> tuple[int, int]:
     """Kill a command so many times; return how often it had answered, and how many acknowledged episodes and files were lost.
 
-    A process that ends of a SIGINT in another way than with exit 130 counts as lost, too.
+    A process that ends after SIGINT with another exit code than 130 also counts as lost.
     """
     draw, lost, done = random.Random(seed), 0, 0
     with tempfile.TemporaryDirectory() as name:

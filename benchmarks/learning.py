@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Path]]]]:
-    """Yield each domain with what there is to learn from, and what to test on by folder."""
+    """Yield each domain with its training problems, and its test problems by folder."""
     places: dict[Path, dict[str, list[Path]]] = {}
     for place, domain, problem in problems(folder):
         if place.rpartition("/")[2].startswith("testing"):
@@ -60,7 +60,7 @@ def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Pat
 
 
 def teach(domain: Path, training: list[Path], target: Path) -> str:
-    """Learn from problems as long as there is time, write what was learned, and say how much."""
+    """Learn from problems as long as there is time, write the memory, and print its size."""
     from confab.planner.experience.leading import rules_in
     from confab.planner.experience.lessons import teach as learn
     from confab.reasoner.memory.experience import Experience

@@ -25,7 +25,7 @@ SHOWN = 5
 
 
 def main() -> None:
-    """Print what each mode did, and what is wrong with it."""
+    """Print the results of each mode, and their faults."""
     first, count = int(os.environ.get("LEVELS_FROM", FIRST)), int(os.environ.get("LEVELS_COUNT", COUNT))
     outcomes: dict[str, list[Outcome]] = {mode: [] for mode in MODES}
     times: dict[str, list[float]] = {mode: [] for mode in MODES}

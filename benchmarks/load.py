@@ -56,14 +56,14 @@ MALFORMED_REQUESTS = (
 
 @dataclass
 class Load:
-    """What was sent to a port: the time of each honest answer, and how all requests were answered."""
+    """The requests sent to a port: the time of each honest answer, and the answers by kind of request."""
 
     port: int
     seconds: list[float] = field(default_factory=list)
     answers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     async def request(self, kind: str, content: bytes, leave: float | None = None, pause: float = 0.0) -> None:
-        """Send a request, byte by byte where there is a pause, and note its answer; leave after so many seconds."""
+        """Send a request, byte by byte if it has pauses, and record the answer; leave after so many seconds."""
         begin = perf_counter()
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         try:
@@ -128,7 +128,7 @@ def get(query: str) -> bytes:
 
 
 def measured(part: float) -> tuple[Load, Load, str]:
-    """Return the honest requests alone, then those beside the others, and what the server wrote to its log."""
+    """Return the results of honest requests alone and beside the others, and the server's log."""
     start = "from confab.start import main; main()"
     command = [sys.executable, "-c", start, "serve", "beverage-serving", "--port", "0", "--time-limit", "20"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:

@@ -245,7 +245,7 @@ def harm(seeds: int = 1) -> None:
 
 
 def files(links: int = 100_000) -> None:
-    """Print how long a memory of so many counters takes to save and load."""
+    """Print the times to save and load a memory of so many counters."""
     experience = Experience("robot")
     experience.merge(taught(FAMILIES).experience)
     kinds = [GoalKind("LOCATION", (f"Kind{i}",)) for i in range(100)]

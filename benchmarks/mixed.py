@@ -31,26 +31,26 @@ from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
 SHRUNK = 2
-"""So many worlds are made small for each thing that is wrong, by each process."""
+"""Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
 SAMPLE = 25
-"""Of one of so many worlds it is found out what its features decide."""
+"""One in so many worlds is examined for the effects of its features."""
 
 
 def signature(one: Complaint) -> str:
-    """Return what tells different faults apart, as far as that can be told."""
+    """Return a signature that distinguishes different faults, as far as possible."""
     detail = one.text.split(":")[0] if one.kind == "crash" else ""
     mode = one.mode.split(" ")[0] if one.mode.startswith("export") else one.mode
     return " | ".join(part for part in (one.kind, mode, detail) if part)
 
 
 def judged(seed: int, folder: Path, every: bool = False) -> Judged:
-    """Return what came of the world of a seed."""
+    """Return the result of judging the world of a seed."""
     return Judge(mixed(seed), folder, every).judged()
 
 
 def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
-    """Judge some worlds, make small those in which something is wrong, and return what came of them."""
+    """Judge some worlds, shrink those with faults, and return the results."""
     begin = time.process_time()
     found: dict[str, Any] = {
         "first": first, "count": count, "wrong": {}, "remarks": {}, "truth": Counter(), "lengths": Counter(),
@@ -71,7 +71,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
 
 
 def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
-    """Add what came of a world."""
+    """Add the result of a world."""
     for kind, ones in (("wrong", its.complaints), ("remarks", its.remarks)):
         for said in dict.fromkeys(map(signature, ones)):
             found[kind].setdefault(said, []).append(seed)
@@ -163,7 +163,7 @@ def _short(wrong: dict[str, list[int]]) -> str:
 
 
 def add(total: dict[str, Any], one: dict[str, Any]) -> None:
-    """Add what came of a stretch."""
+    """Add the results of a stretch of seeds."""
     for key in ("wrong", "remarks"):
         for said, seeds in one[key].items():
             total.setdefault(key, {}).setdefault(said, []).extend(seeds)
@@ -174,7 +174,7 @@ def add(total: dict[str, Any], one: dict[str, Any]) -> None:
 
 
 def table(total: dict[str, Any]) -> None:
-    """Print what came of all worlds."""
+    """Print the results of all worlds."""
     count = total["count"]
     truth, lengths = total["truth"], total["lengths"]
     print(
@@ -209,7 +209,7 @@ STATUS = ("solved", "unsolvable", "gave-up", "refused", "crash", "endless", "rea
 
 
 def main(arguments: Sequence[str] = ()) -> int:
-    """Judge the worlds that are asked for."""
+    """Judge the requested worlds."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mixed")
     parser.add_argument("--from", dest="first", type=int, default=FIRST)
     parser.add_argument("--count", type=int, default=COUNT)

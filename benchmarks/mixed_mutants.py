@@ -79,7 +79,7 @@ def hopeless(meant: Interpreter) -> bool:
 
 
 def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before: set[str]) -> set[str] | None:
-    """Return what is complained of with this text of a module: all of it, or the first that wasn't before; None if all breaks."""
+    """Return the faults found with this text of a module: all, or the first new one; None if everything breaks."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
@@ -110,7 +110,7 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
 
 
 def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
-    """Judge worlds in one mode, until a complaint is enough; return what was complained of, and how each call ended."""
+    """Judge worlds in one mode until a fault suffices; return the faults, and the ending of each call."""
     from worlds.judging import Judge
 
     found: set[str] = set()

@@ -56,13 +56,13 @@ TESTS: dict[str, tuple[str, ...]] = {
 }
 """The fast tests that are each module's own, those that notice most first."""
 SAME = ("Eq_Is", "Eq_IsNot")
-"""What is no fault here: names are interned, so that those that are equal are mostly identical."""
+"""Changes that are no faults: names are interned, so that equal ones are mostly identical."""
 Fault = tuple[str, int]
 """An operator of cosmic-ray, and at which of the places that it fits."""
 
 
 def faults(source: str, draw: random.Random) -> Iterator[tuple[Fault, str]]:
-    """Yield faults of a module's text that change what it does, each with the text that has it, in an order that is drawn."""
+    """Yield faults of a module's text that change its behaviour, each with the changed text, in random order."""
     import cosmic_ray.plugins
     from cosmic_ray.ast import ast_nodes, get_ast
     from cosmic_ray.mutating import mutate_code
@@ -84,7 +84,7 @@ def faults(source: str, draw: random.Random) -> Iterator[tuple[Fault, str]]:
 
 
 def meaning(source: str) -> str:
-    """Return what a module's text says without its annotations and docstrings."""
+    """Return the text of a module without annotations and docstrings."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.AnnAssign | ast.arg):
@@ -100,7 +100,7 @@ def meaning(source: str) -> str:
 
 
 class Record(TypedDict):
-    """What came of a module's faults."""
+    """The results for the faults of a module."""
 
     of: str
     noticed: list[str]
@@ -154,20 +154,20 @@ class Instead(Loader):
 
 
 def records() -> dict[str, Record]:
-    """Return for each module what came of its faults."""
+    """Return the results for each module."""
     found: dict[str, Record] = json.loads(RECORD.read_text("utf-8")) if RECORD.is_file() else {}
     return found
 
 
 def record(file: str, source: str) -> Record:
-    """Return what came of the faults of a module as it is now."""
+    """Return the results for a module as it is now."""
     of = hashlib.sha256(meaning(source).encode()).hexdigest()[:12]
     known = records().get(file)
     return known if known and known["of"] == of else Record(of=of, noticed=[], survived={}, same={})
 
 
 def try_out(file: str, many: int, again: bool) -> None:
-    """Draw faults of a module, try those that weren't yet, or those that survived, and note what came of each as it goes."""
+    """Draw faults of a module, test new ones or survivors, and record each result at once."""
     source = (ROOT / file).read_text("utf-8")
     its, used = record(file, source), os.times()
     wanted = set(its["survived"]) if again else None
@@ -210,7 +210,7 @@ def table() -> None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Try what is asked for."""
+    """Test the requested modules."""
     if "--table" in arguments:
         table()
         return

@@ -15,11 +15,11 @@ from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 SLOWEST = 60.0
-"""Seconds of the processor after which a notebook is too long for one who reads it."""
+"""CPU seconds after which a notebook is too slow for readers."""
 
 
 def execute(path: Path) -> tuple[float, float]:
-    """Execute a notebook in its folder and write it back with what it shows; return its seconds, and those of the processor."""
+    """Execute a notebook in its folder and save its outputs; return its seconds and CPU seconds."""
     book = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     begin, before = perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     client = NotebookClient(book, timeout=600, record_timing=False, resources={"metadata": {"path": str(path.parent)}})
@@ -36,7 +36,7 @@ def execute(path: Path) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Execute the notebooks whose names have a part that is wanted, or all."""
+    """Execute the notebooks whose names contain a given part, or all."""
     wanted = sys.argv[1:] if sys.argv[0].endswith("notebooks.py") else []
     print("| notebook | s | CPU s |\n|---|---|---|")
     for path in sorted(FOLDER.glob("*.ipynb")):

@@ -33,7 +33,7 @@ PART = re.compile(
     r"\n  UNION \{(?:(?!\n  UNION ).)*BIND\(\"(?:expression|axiom|swrl|range)\" AS \?part\)(?:(?!\n  UNION |\n\}).)*",
     re.DOTALL,
 )
-"""A part of the query for the schema that serves only what is derived or counted."""
+"""Parts of the schema query that only defined situations and amounts need."""
 COMPARING = (
     "confab.planner.hierarchical.chains",
     "confab.planner.hierarchical.refinement",
@@ -42,7 +42,7 @@ COMPARING = (
     "confab.planner.hierarchical.planner",
     "confab.planner.validation",
 )
-"""The modules that ask whether a value is as wanted."""
+"""Modules that test goal values."""
 
 
 @contextmanager

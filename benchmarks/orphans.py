@@ -30,7 +30,7 @@ GRACE = 2.0
 LONGEST = 1.5
 """Seconds of a command over which the moments are spread, from its start on."""
 MARK = "CONFAB_ORPHANS"
-"""The environment variable by which what a command started is found."""
+"""Environment variable that marks the processes of a command."""
 CROSS = "SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }"
 
 
@@ -42,7 +42,7 @@ IMPORTED = (
     "confab.sim.film",
     "confab.sim.rollouts",
 )
-"""What the commands import, once for all."""
+"""Imports of the commands, done once for all."""
 
 
 def commands(folder: Path) -> dict[str, Callable[[], object]]:
@@ -117,7 +117,7 @@ def marked(mark: str) -> list[int]:
 
 
 def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple[int, int]:
-    """End a command after so many seconds; return how many processes it had started, and how many it leaves."""
+    """End a command after so many seconds; return how many processes it had started, and how many are left."""
     mark = os.environ[MARK] = uuid4().hex
     child = begun(run)
     time.sleep(after)

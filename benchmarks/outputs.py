@@ -151,7 +151,7 @@ def prepare(folder: Path) -> None:
 
 
 def answers(door: Door, whole: Path, there: tuple[str, ...] = THERE) -> Iterator[tuple[str, str]]:
-    """Yield for each thing that may be there what a door does with it: ``refused``, ``replaced``, ``made`` or what is wrong."""
+    """Yield for each kind of existing file the result of a command: ``refused``, ``replaced``, ``made`` or a fault."""
     for what in there:
         if door.physics and (what in ("its own", "empty", "none") or KIND_OF.get(what) == door.kind):
             continue
@@ -205,7 +205,7 @@ def _put(what: str, out: Path) -> None:
 
 
 def _state(file: Path) -> tuple[int, bytes | None] | None:
-    """Return which file it is and what it holds."""
+    """Return the identity and the content of a file."""
     if not os.path.lexists(file):
         return None
     return file.lstat().st_ino, file.read_bytes() if file.is_file() else None

@@ -37,7 +37,7 @@ SCENES = {
 VALIDATED = ("1,000 objects", "10,000 objects")
 EASY, TABLE = "200 objects", "the paper's table"
 SERVED = (EASY, "1,000 objects", "10,000 objects")
-"""Scenes in which a cup can be asked for, and that the memory is about."""
+"""Scenes with goals about a cup, for which there is a memory."""
 LARGE = ("10,000 objects", "100,000 irrelevant objects")
 BODIES = (EASY, "three cups", TABLE)
 """Scenes that physics can carry out."""
@@ -136,12 +136,12 @@ class Ended:
         return self.after is not None or self.code == 3
 
     def share(self, seconds: float) -> str:
-        """Return what was used after the limit as a share of it, with the exit code."""
+        """Return the time used after the limit as a share of the limit, with the exit code."""
         return f"{(self.after or 0.0) / seconds:.0%} ({self.code})" if self.measured else f"before ({self.code})"
 
 
 def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
-    """Run a code in a process of its own until it ends; it has to look at a limit of so many seconds."""
+    """Run code in a process of its own until it ends; the code has to obey a limit of so many seconds."""
     told, tell = os.pipe()
     with subprocess.Popen(
         [sys.executable, "-c", (BEGUN + code).replace("SECONDS", repr(seconds)), *arguments],

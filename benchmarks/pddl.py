@@ -105,7 +105,7 @@ def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
 
 
 def _measured(place: str) -> bool:
-    """Return whether a folder's problems belong to the benchmark: those to learn from only where all are asked for."""
+    """Return whether the problems of a folder belong to the benchmark; training problems only on request."""
     return place.startswith("testing") or ("CONFAB_ALL" in os.environ and place.startswith("training"))
 
 
@@ -147,7 +147,7 @@ def planners(python: str | None) -> dict[str, list[str]]:
 
 
 def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
-    """Return what a planner does on a problem, from an earlier benchmark if neither has changed; a plan of ours is judged."""
+    """Return the result of a planner on a problem, from an earlier run if neither has changed; our plans are validated."""
     ours = name in OURS
     code = [file.read_bytes() for pattern in OURS.get(name, ()) for file in sorted(ROOT.glob(pattern))]
     texts = [*code, domain.read_bytes(), problem.read_bytes(), f"{name} {SECONDS} {BYTES}".encode()]
@@ -172,7 +172,7 @@ def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
 
 
 def run(command: Sequence[str], domain: Path, problem: Path, cap: int = SECONDS) -> Run:
-    """Run one planner on one problem, within the limits: so many CPU seconds for each of its processes."""
+    """Run one planner on one problem within limits of CPU seconds per process."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "problem.pddl"  # pyperplan writes its plan beside the problem
         copy.write_text(problem.read_text())
@@ -277,7 +277,7 @@ TRUCKS = """(define (domain trucks) (:requirements :strips :typing)
 
 
 def trucks(size: int) -> str:
-    """Return a problem with some trucks, and a dozen times as many parcels and places, all places joined by roads."""
+    """Return a problem with some trucks, and twelve times as many parcels and places, all connected by roads."""
     vehicles, places, parcels = range(size), range(12 * size), range(12 * size)
     roads = " ".join(f"(road p{a} p{b})" for a in places for b in places if a != b)
     at = " ".join([*(f"(at t{i} p0)" for i in vehicles), *(f"(at x{i} p{i})" for i in parcels)])

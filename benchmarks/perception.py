@@ -33,7 +33,7 @@ LOOKS = 4
 """How often everything is looked at, per moment and level of noise."""
 
 AT_REST = {"perceive_held": "nothing", "perceive_hand_position": "raised", "perceive_hand_tilt": "upright"}
-"""What is true of a hand at rest, by perceiver: the special value."""
+"""For each perceiver the special value of a hand at rest."""
 
 Truth = dict[Symbol, str | None]
 
@@ -163,7 +163,7 @@ def _taken(world: World, truth: Truth, rng: np.random.Generator, reach: SkillUse
 
 
 def _set(embodiment: Embodiment, truth: Truth, kind: str, subject: str, value: str) -> None:
-    """Set what is true of a subject, for the situation types that a perceiver reads."""
+    """Set the true values of a subject for the situation types of a perceiver."""
     for symbol in truth:
         use = embodiment.perceivers[symbol.situation]
         if use.perceiver == kind and symbol.arguments == (subject,):

@@ -62,7 +62,7 @@ def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> str:
 
 
 def least(action: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Return the least time of some repetitions; few of what takes long."""
+    """Return the least time of some repetitions, fewer for slow functions."""
     best = float("inf")
     for _ in range(repeats):
         begin = perf_counter()
@@ -74,7 +74,7 @@ def least(action: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def measured(*arguments: object) -> dict[str, Any]:
-    """Return what a part of this module prints when it runs as a process of its own."""
+    """Return the output of a part of this module that runs in a process of its own."""
     command = [sys.executable, "-m", "benchmarks.quantification", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     if done.returncode:
@@ -97,7 +97,7 @@ def scene(folder: Path, objects: int = 4, clutter: int = 0) -> Path:
 
 
 def calls(folder: Path) -> None:
-    """Print what a call costs from the file to the plan, and the command beside the import of rdflib."""
+    """Print the time of a call from the file to the plan, and of the command beside the import of rdflib."""
     found = [measured("call", scene(folder, objects), scene(folder, CALLS[1])) for objects in CALLS]
     names = ("load", "plan", "whole")
     rows = [[objects, one["steps"], *(one[name] for name in names)] for objects, one in zip(CALLS, found, strict=True)]
@@ -232,7 +232,7 @@ def plan(source: str) -> dict[str, float | str]:
 
 @contextmanager
 def oxigraph(path: Path) -> Iterator[str]:
-    """Run the Oxigraph server on loopback with a scene and what it imports, and yield its address."""
+    """Run the Oxigraph server on loopback with a scene and its imports, and yield its address."""
     import urllib3
 
     from confab.reasoner.graph.knowledge import load

@@ -313,7 +313,7 @@ def random_tables() -> None:
 
 
 def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Return what is true of a table and what the planner said; nothing of one that isn't of the size, or needs no step."""
+    """Return the truth about a table and the planner's answer; None for a table of another size or without a step."""
     problem = random_table(seed)
     if seed % 3:  # on two of three tables the hands reach less, so that more are unsolvable
         rng = Random(f"reach {seed}")
@@ -372,7 +372,7 @@ def budget(seconds: float) -> Iterator[None]:
 
 
 def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
-    """Return the outcome of a planning call that has so many CPU seconds."""
+    """Return the outcome of a planning call limited to so many CPU seconds."""
     try:
         with budget(seconds):
             return variant()
@@ -389,7 +389,7 @@ class Forgetful(dict[str, list[Template]]):
 
 
 def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome]]:
-    """Return planning calls by what they do without."""
+    """Return planning calls, by the part that each leaves out."""
     limits, level = Limits(expansions=10**7), problem.domain.levels[-1]
     only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
     flat = replace(problem, domain=Domain(problem.domain.situations, only, problem.domain.first_ids))
@@ -417,7 +417,7 @@ def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome
 
 
 def parts() -> None:
-    """Switch each part off in turn, `BUDGET` CPU seconds each, to see what it contributes."""
+    """Switch each part off in turn, for `BUDGET` CPU seconds each, to measure its contribution."""
     experience = Experience("lessons")
     for family, objects, seed in product(("served", "swap", "full"), (4, 6), (100, 101)):
         teach(experience, lesson(family, objects, seed))

@@ -57,7 +57,7 @@ def physics(folder: Path) -> None:
 
 
 def soak(episode: Callable[[Path], None], many: int) -> str:
-    """Live so many episodes; return a row of what was there after a tenth of them and at the end."""
+    """Run so many episodes; return a row with the state after a tenth of them and at the end."""
     times = []
     tenth = max(many // 10, 1)
     with tempfile.TemporaryDirectory() as name:

@@ -1,4 +1,4 @@
-"""What the paper's equations are worth on the paper's table: expansions by episode, with memory, and without levels."""
+"""The paper's equations on the paper's table: expansions by episode, with memory, and without levels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FLAT = 200_000
 
 
 def flat(scene: confab.Scene) -> Outcome:
-    """Return what the paper's search does where primitives are the only level."""
+    """Return the result of the paper's search with primitives as the only level."""
     problem = scene.problem
     lowest = problem.domain.levels[-1]
     behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level == lowest}

@@ -1,4 +1,4 @@
-"""What a reader of one planning call opens: the files that it enters, and how long they are, traced by `sys.settrace`."""
+"""The files that one planning call enters, with their lengths, traced by `sys.settrace`."""
 
 from __future__ import annotations
 

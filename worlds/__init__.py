@@ -1,1 +1,1 @@
-"""What tests and benchmarks both need: worlds as values, the truth about them, and programs to hold ours against."""
+"""Worlds for tests and benchmarks: problems as values, exhaustive searches of them, and independent programs for comparison."""

@@ -1,6 +1,6 @@
-"""Whether planners agree on a world, and with the truth.
+"""Agreement of planners on a world, with each other and with an exhaustive search.
 
-The truth is what a search through all states of the lowest level finds, by whichever reading of behaviours it is given.
+The search visits all states of the lowest level, by a given reading of behaviours.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from worlds.writing import quantified
 
 State = Mapping[Symbol, str]
 Successors = Callable[[Problem], Callable[[State], Iterable[tuple[float, State]]]]
-"""Of a problem, what leads from a state to others, each with what it costs."""
+"""Returns for a problem the function from a state to its successors with their costs."""
 
 
 def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
-    """Return a function of a state to those that behaviours of the lowest level lead to, as the checker reads them."""
+    """Return the function from a state to its successors on the lowest level, as the checker reads behaviours."""
     rules = Rules(problem)
     steps = list(quantified(problem, problem.domain.levels[-1]))
 
@@ -40,9 +40,10 @@ def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, 
 
 
 def cheapest(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> float | None:
-    """Return what steps of the lowest level cost at least that reach the goal with all that was touched at rest.
+    """Return the least cost of steps of the lowest level that reach the goal with all changed symbols at rest.
 
-    Infinity if there are none, None above so many states. What is defined is worked out, and amounts are compared, by the checker.
+    Infinity if there are none, None if there are more states than allowed. The checker derives defined situations and compares
+    amounts.
     """
     after = successors(problem)
     rests = {
@@ -50,7 +51,7 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
     }
 
     def restless(before: State, state: State, old: frozenset[Symbol]) -> frozenset[Symbol]:
-        """Return what was touched and isn't at rest."""
+        """Return the changed symbols that aren't at rest."""
         return frozenset(s for s, r in rests.items() if state[s] != r and (s in old or state[s] != before[s]))
 
     def reached(state: State) -> bool:
@@ -78,13 +79,16 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
 
 
 def solvable(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> bool | None:
-    """Return whether some steps of the lowest level reach the goal with all that was touched at rest; None above so many states."""
+    """Return whether steps of the lowest level reach the goal with all changed symbols at rest.
+
+    None above the allowed number of states.
+    """
     least = cheapest(problem, successors, most)
     return None if least is None else least < math.inf
 
 
 def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool | None) -> list[str]:
-    """Return what is wrong with an outcome, given that of the paper's mode and whether there is a plan, where that is known."""
+    """Return the faults of an outcome, given that of the paper's mode and, if known, whether there is a plan."""
     found = []
     if outcome.plan is not None:
         found += [f"invalid: {fault.text}" for fault in validate(problem, outcome.plan)]
@@ -99,7 +103,7 @@ def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool |
 
 
 def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
-    """Whether steps of lower levels stand in a plan because it is shorter so, and break nothing that a level above asks."""
+    """Whether steps of lower levels stand in a plan because it is shorter, without violating a condition of a level above."""
     if outcome.plan is None or other.plan is None or outcome.given_up:
         return False
     whole = any(left.broken for left in levels_left(problem, outcome.plan))
@@ -107,5 +111,5 @@ def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
 
 
 def on_top(problem: Problem, outcome: Outcome) -> bool:
-    """Whether a plan consists of steps of the most abstract level."""
+    """Whether all top steps of a plan are of the most abstract level."""
     return outcome.plan is not None and all(step.level == problem.domain.levels[0] for step in outcome.plan.steps)

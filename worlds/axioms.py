@@ -18,7 +18,7 @@ State: TypeAlias = frozenset[Fact]
 
 MEMBERS = {"a": ("a1", "a2"), "b": ("b1", "b2", "b3")}
 CONSTANTS = {"a": ("a1",), "b": ("b1",)}
-"""Those that the domain may name."""
+"""Constants that the domain may name."""
 CHANGED: Mapping[str, tuple[str, ...]] = {"f": (), "p": ("a",), "q": ("b",), "r": ("a", "b"), "s": ("b", "b")}
 STATIC: Mapping[str, tuple[str, ...]] = {"e": ("b", "b")}
 HEAD = "(:requirements :adl :derived-predicates) (:types a b - object) (:constants a1 - a b1 - b)"
@@ -40,7 +40,7 @@ class Formulas:
         self.rng, self.known, self.own, self.names = rng, known, own, 0
 
     def variable(self, bound: dict[str, str]) -> str:
-        """Return a new variable, which is added to those that are bound."""
+        """Return a new variable, added to the bound ones."""
         self.names += 1
         bound[name := f"?x{self.names}"] = self.rng.choice(sorted(MEMBERS))
         return name
@@ -51,7 +51,7 @@ class Formulas:
         return self.rng.choice(free) if free and self.rng.random() < 0.93 else self.rng.choice(CONSTANTS[kind])
 
     def formula(self, bound: Mapping[str, str], depth: int = 2, helps: bool = True) -> str:
-        """Return a formula over some variables; `helps` is whether its holding is what is wanted of it."""
+        """Return a formula over some variables; `helps` tells whether the formula should rather be true."""
         rng, deeper = self.rng, depth - 1
         match rng.choice((*("atom",) * 8, "same", "and", "or", "not", "imply", "exists", "forall")):
             case "same":
@@ -78,7 +78,7 @@ class Formulas:
         return f"(not {said})" if negated else said
 
     def body(self, bound: Mapping[str, str]) -> str:
-        """Return what holds together of some variables and perhaps of others that there have to be, or any formula."""
+        """Return a conjunction over some variables and possibly further quantified ones, or any formula."""
         inner, rng = dict(bound), self.rng
         new = [self.variable(inner) for _ in range(rng.choice((0, 0, 1, 1, 2)))]
         parts = [self.formula(inner, rng.choice((0, 0, 0, 1, 2))) for _ in range(rng.choice((1, 2, 2, 3)))]
@@ -86,7 +86,7 @@ class Formulas:
         return f"(exists ({' '.join(f'{name} - {inner[name]}' for name in new)}) {said})" if new else said
 
     def atom(self, name: str, bound: Mapping[str, str]) -> str:
-        """Return a predicate of some terms."""
+        """Return an atom over some terms."""
         kinds = {**CHANGED, **self.known, **self.own}[name]
         return f"({' '.join([name, *(self.term(bound, kind) for kind in kinds)])})"
 
@@ -115,7 +115,7 @@ def axioms(rng: Random) -> tuple[str, str]:
 
 
 def _wanted(rng: Random, plain: Plain, state: State, rows: Sequence[Fact]) -> list[str]:
-    """Return two to four facts that shall or shall not be so, mostly as they come to be on a random walk."""
+    """Return two to four literals as a goal, mostly true at the end of a random walk."""
     first = now = plain.derived(state)
     for _ in range(rng.choice((4, 8, 16))):
         after = sorted(set(plain.successors(state)), key=sorted)
@@ -128,7 +128,7 @@ def _wanted(rng: Random, plain: Plain, state: State, rows: Sequence[Fact]) -> li
 
 
 def _strata(rng: Random) -> list[dict[str, tuple[str, ...]]]:
-    """Return derived predicates in groups that need each other."""
+    """Return derived predicates in mutually recursive groups."""
     kinds = [(), ("a",), ("b",), ("b", "b"), ("a", "b")]
     return [
         {f"d{stratum}{number}": rng.choice(kinds) for number in range(rng.choice((1, 1, 2)))}
@@ -141,7 +141,7 @@ def _declared(name: str, kinds: Sequence[str]) -> str:
 
 
 def _action(rng: Random, name: str, known: Mapping[str, tuple[str, ...]]) -> str:
-    """Return an action: what it asks for, and one to three changes, some under conditions, some of all of a type."""
+    """Return an action with preconditions and one to three effects, some conditional, some on all objects of a type."""
     formulas = Formulas(rng, known, {})
     bound = {f"?v{place}": rng.choice(sorted(MEMBERS)) for place in range(rng.choice((0, 1, 2, 2, 3)))}
     head = " ".join(f"{name} - {kind}" for name, kind in bound.items())
@@ -167,7 +167,7 @@ def _said(row: Fact) -> str:
 
 
 class Plain:
-    """A plain reading of what `axioms` writes: it tries all individuals, and works out all that follows in every state."""
+    """A plain evaluator of these domains: it tries all individuals and derives all axioms in every state."""
 
     def __init__(self, domain: str) -> None:
         parts = parsed(domain)[2:]
@@ -178,7 +178,7 @@ class Plain:
                 self.strata.setdefault(part[1][0][:2], []).append(part[1:])
 
     def derived(self, state: State) -> State:
-        """Return a state with all that follows, stratum by stratum."""
+        """Return a state with all derived atoms, stratum by stratum."""
         found = set(state)
         for _, axioms_ in sorted(self.strata.items()):
             size = -1
@@ -201,7 +201,7 @@ class Plain:
                     yield (state - ended) | {row for row, becomes in made if becomes}
 
     def shortest(self, problem: str) -> int | None:
-        """Return the length of the shortest plan, None if there is none."""
+        """Return the length of a shortest plan; None if there is none."""
         *_, init, goal = parsed(problem)
         layer, seen, length = {frozenset(map(tuple, init[1:]))}, set[State](), 0
         while layer:
@@ -256,7 +256,7 @@ def _bindings(declared: Sequence[str]) -> Iterator[dict[str, str]]:
 
 
 def _changes(effect: Any, terms: Mapping[str, str], state: State) -> Iterator[tuple[Fact, bool]]:
-    """Yield what an effect makes of each fact that it speaks of."""
+    """Yield the changes of each fact that an effect makes."""
     word, *parts = effect
     match word:
         case "and":

@@ -1,4 +1,4 @@
-"""Plans that are probably none: something is left out of one, exchanged or added; or steps are drawn at random."""
+"""Probably invalid plans: a valid plan with an omission, exchange or addition; or random steps."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _changed(steps: tuple[Step, ...], path: tuple[int, ...], problem: Problem, r
 
 
 def random_steps(meant: Interpreter, rng: Random) -> Plan:
-    """Return a few steps of the lowest level, most of which can be done."""
+    """Return a few random steps of the lowest level, most of them applicable."""
     level, state, steps = meant.problem.domain.levels[-1], meant.initial, list[Step]()
     actions = meant.actions(level)
     for _ in range(rng.randint(1, 4)):

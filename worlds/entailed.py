@@ -55,14 +55,14 @@ def atoms(*said: str) -> str:
 
 
 def implies(head: str, *body: str) -> str:
-    """Return a SWRL rule with what declares its variables."""
+    """Return a SWRL rule with the declarations of its variables."""
     variables = sorted({w[1:] for atom in (head, *body) for w in atom.split() if w.startswith("?")})
     declared = "".join(f"<urn:swrl:var#{v}> a swrl:Variable .\n" for v in variables)
     return f"{declared}[ a swrl:Imp ; swrl:body {atoms(*body)} ; swrl:head {atoms(head)} ] .\n"
 
 
 def two(filler: str, many: str) -> str:
-    """Return what counts values, for a restriction: ``many`` is like ``min 2``."""
+    """Return a cardinality restriction; ``many`` is like ``min 2``."""
     name, number = many.split()
     capital = "qualifiedCardinality" if name == "exactly" else f"{name}QualifiedCardinality"
     return f'owl:{capital} "{number}"^^xsd:nonNegativeInteger ; owl:onClass {filler}'
@@ -83,9 +83,9 @@ DEFINED = {
     "DEEP": (":Deep", every(":Thing", some(":isInside", f"owl:someValuesFrom {every(':Box', ':Heavy')}"))),
     "FOUND": (":Found", every(":Place", some("[ owl:inverseOf :leadsTo ]", "owl:someValuesFrom :Hand"))),
 }  # fmt: skip
-"""Situation types that hold of classes, and how these are defined."""
+"""Situation types with `holdsOf`, and the definitions of their classes."""
 CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched", "SOUGHT": ":Sought"}
-"""Situation types that hold of classes that SWRL rules conclude."""
+"""Situation types with `holdsOf` whose classes SWRL rules conclude."""
 PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked", "leadsTo", "endsOn")
 LOGIC = f"""
 :Place a owl:Class . :Thing a owl:Class . :Floor a owl:Class . :Hand a owl:Class . :Cleanliness a owl:Class .
@@ -172,7 +172,7 @@ def random_state(rng: Random) -> list[tuple[str, str, str]]:
 
 
 def asserted(facts: Sequence[tuple[str, str, str]]) -> str:
-    """Return a state as axioms in Turtle, closed: what counts its values, has no more of them."""
+    """Return a state as axioms in Turtle, closed: individuals whose values are counted have no other values."""
     said = {(one, prop, f'"{other}"^^xsd:decimal' if prop == "weight" else f":{other}") for one, prop, other in facts}
     lines = [f":{one} :{prop} {other} ." for one, prop, other in sorted(said)]
     lines += [f":{name} a owl:NamedIndividual, :{name[:-1].title()} ." for name in ALL]
@@ -186,7 +186,7 @@ def asserted(facts: Sequence[tuple[str, str, str]]) -> str:
 
 
 def plainly(facts: Sequence[tuple[str, str, str]]) -> set[tuple[str, ...]]:
-    """Return what `LOGIC` makes of a state, in plain Python that reads neither Turtle nor knows of rules: a judge of its own."""
+    """Return the consequences of `LOGIC` in a state, computed in plain Python without Turtle and rules, as an independent judge."""
     of: dict[str, set[tuple[str, str]]] = {
         prop: set() for prop in ("liesIn", "holds", "near", "partOf", "cleanliness", "weight")
     }
@@ -226,7 +226,7 @@ def plainly(facts: Sequence[tuple[str, str, str]]) -> set[tuple[str, ...]]:
 
 
 def _closed(pairs: set[tuple[str, str]]) -> set[tuple[str, str]]:
-    """Return pairs with all that follow, one behind the other."""
+    """Return the transitive closure of some pairs."""
     found: set[tuple[str, str]] = set()
     while found != (found := found | pairs | {(x, z) for x, y in found for w, z in pairs if w == y}):
         pass
@@ -234,7 +234,7 @@ def _closed(pairs: set[tuple[str, str]]) -> set[tuple[str, str]]:
 
 
 def entailed(states: Sequence[str]) -> list[set[tuple[str, ...]]]:
-    """Return what HermiT entails in some states, by local names: classes with an individual, properties with two."""
+    """Return the entailments of HermiT in some states, by local names: classes with an individual, properties with two."""
     classes = [kind[1:] for kind, _ in DEFINED.values()] + [kind[1:] for kind in CONCLUDED.values()]
     asked = {"logic": LOGIC, "states": [*states], "classes": classes, "properties": PROPERTIES}
     done = subprocess.run(
@@ -244,7 +244,7 @@ def entailed(states: Sequence[str]) -> list[set[tuple[str, ...]]]:
 
 
 def _answers(asked: dict[str, Any]) -> Iterator[list[list[str]]]:
-    """Yield what HermiT entails, state by state."""
+    """Yield the entailments of HermiT, state by state."""
     from org.semanticweb.HermiT import ReasonerFactory
     from org.semanticweb.owlapi.apibinding import OWLManager
     from org.semanticweb.owlapi.io import StringDocumentSource
@@ -276,7 +276,7 @@ def _local(individual: Any) -> str:
 
 
 def main() -> None:
-    """Answer what stdin asks."""
+    """Answer the request on stdin."""
     import jpype
     import jpype.imports
 

@@ -1,4 +1,4 @@
-"""What a random world has in it, and whether it decides whether the goal can be reached, or at what cost."""
+"""The features of a random world, and whether each of them decides reachability of the goal or its cost."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from worlds.phrases import ANYONE, EACH
 from worlds.shrinking import without_individual
 
 MOST = 2_000
-"""So many nodes are searched without a feature."""
+"""Maximum number of nodes of a search without a feature."""
 
 
 def _kept(conditions: tuple[Condition, ...], drop: Callable[[Condition], bool]) -> tuple[Condition, ...]:
@@ -97,7 +97,7 @@ def _without_rules(drop: Callable[[World, str], bool]) -> Callable[[World], Prob
 
 
 def _negative(world: World, name: str) -> bool:
-    """Return whether a situation type has a rule of a single negated condition."""
+    """Return whether a situation type has a rule with a single, negated condition."""
     rules = world.problem.domain.rules[name]
     return name not in world.axioms and any(len(r.conditions) == 1 and r.conditions[0].negated for r in rules)
 
@@ -126,7 +126,7 @@ def _different(world: World) -> Problem:
 
 
 def _named_only(world: World) -> Problem:
-    """Return a problem without the individuals that nothing names."""
+    """Return a problem without unused individuals."""
     for one in (*world.problem.classes["A"], *world.problem.classes["B"]):
         world = without_individual(world, one) or world
     return world.problem
@@ -186,7 +186,7 @@ FEATURES: Mapping[str, Callable[[World], Problem]] = {
 
 
 def features(world: World, least: float | None) -> Iterator[tuple[str, bool]]:
-    """Yield the features of a world, and whether the least cost is another one without each."""
+    """Yield the features of a world, and whether the least cost differs without each."""
     for name, without in FEATURES.items():
         other = without(world)
         if other == world.problem:

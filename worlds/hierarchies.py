@@ -31,7 +31,7 @@ from confab.reasoner.symbols import (
 from worlds.writing import becomes, behavior, has, lacks, world
 
 SMALL = 4_000
-"""So many states, reachable or not, may a world have on its lowest level."""
+"""Maximum number of states, reachable or not, on the lowest level of a world."""
 
 
 def hierarchy(seed: int) -> Problem:
@@ -44,7 +44,7 @@ def hierarchy(seed: int) -> Problem:
 
 
 def states(problem: Problem) -> int:
-    """Return how many states a problem has, reachable or not, if each thing held is counted once."""
+    """Return the number of states of a problem, reachable or not, if each held thing is counted once."""
     held = len(problem.classes["Hand"])
     return prod(
         2 if problem.domain.situations[s.situation].boolean
@@ -150,20 +150,20 @@ class _Draft:
         return [has("ROBOT_AT", "robot", spot)] if self.drives else []
 
     def beside(self, cover: str) -> list[Condition]:
-        """Return that the robot is where a cover is."""
+        """Return the condition that the robot is at a cover."""
         inside = (RelationCondition("covers", (cover, "?w")), has("ROBOT_AT", "robot", "?w"))
         return [Witness("?w", "Spot", inside)] if self.drives else []
 
     def may(self, item: str, spot: str) -> list[Condition]:
-        """Return that an item fits a spot."""
+        """Return the condition that an item fits a spot."""
         return [RelationCondition("fits", (item, spot))] if self.fits else []
 
     def unlit(self, a: str, b: str) -> list[ValueEffect]:
-        """Return that a move turns a lamp on where it ends, and off where it begins."""
+        """Return the effects that a move turns a lamp on where it ends, and off where it begins."""
         return [becomes("LIT", b, TRUE), becomes("LIT", a, FALSE)] if self.lamp else []
 
     def burnt(self) -> list[ValueEffect]:
-        """Return that a way takes one unit of fuel."""
+        """Return the effect that a route takes one unit of fuel."""
         return [
             becomes("FUEL", "robot", f"fuel{i - 1}", when=(has("FUEL", "robot", f"fuel{i}"),))
             for i in range(1, self.fuel + 1)

@@ -45,15 +45,15 @@ Terms = Mapping[str, str]
 State = tuple[Any, ...]
 Node = tuple[State, frozenset[int]]
 NOTHING = math.nan
-"""The number that isn't there: it compares with nothing, and all that is calculated from it isn't there either."""
+"""The missing number: comparisons with it are false, and calculations with it are missing."""
 
 
 class TooManyStatesError(Exception):
-    """More states than allowed can be reached."""
+    """More states than allowed are reachable."""
 
 
 def divided(one: Any, other: Any) -> Any:
-    """Return a quotient; nothing where the divisor is zero or isn't there."""
+    """Return a quotient; the missing number for a divisor that is zero or missing."""
     if other == 0 or other != other or one != one:
         return NOTHING
     result = Fraction(one) / Fraction(other)
@@ -67,7 +67,7 @@ def number(text: str | Fraction) -> Any:
 
 
 def variables(condition: Condition) -> set[str]:
-    """Return the variables that a condition has to have bound: those inside `AnyOf` and `Witness` are their own."""
+    """Return the variables that a condition needs bound; those inside `AnyOf` and `Witness` are their own."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms = {*arguments, value}
@@ -95,7 +95,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Truth:
-    """All that can be reached on a level: each node with its least cost, and the least cost of a node that is wanted."""
+    """The reachable part of a level: each node with its least cost, and the least cost of a goal node."""
 
     costs: Mapping[Node, Any]
     least: Any | None
@@ -139,7 +139,7 @@ class Interpreter:
         self._named: dict[tuple[str, tuple[str, ...]], Action] = {}
 
     def unsettled(self) -> dict[int, str]:
-        """Return the rest values that have to hold in the end, where the goal says nothing else."""
+        """Return the rest values that have to hold in the end, unless the goal says otherwise."""
         return {
             i: rest
             for symbol, i in self.slots.items()
@@ -156,7 +156,7 @@ class Interpreter:
     # ------------------------------------------------------------------------------------------------------ conditions
 
     def bindings(self, conditions: Iterable[Condition], kinds: Terms, terms: Terms) -> Iterator[Terms]:
-        """Yield the ways to bind what a conjunction mentions and isn't bound yet."""
+        """Yield the bindings of the unbound variables in a conjunction."""
         free = sorted(set().union(*map(variables, conditions)) - terms.keys())
         for values in product(*(self.problem.classes.get(kinds[name], ()) for name in free)):
             yield {**terms, **dict(zip(free, values, strict=True))}
@@ -166,7 +166,7 @@ class Interpreter:
         return _joined([self.condition(one, terms, kinds) for one in conditions], "and", "True", "False")
 
     def some(self, conditions: Sequence[Condition], terms: Terms, kinds: Terms) -> str:
-        """Return that a conjunction holds for some binding of what only it mentions."""
+        """Return that a conjunction holds for some binding of its unbound variables."""
         ways = [self.all_of(conditions, trial, kinds) for trial in self.bindings(conditions, kinds, terms)]
         return _joined(ways, "or", "False", "True")
 
@@ -226,7 +226,7 @@ class Interpreter:
     # ------------------------------------------------------------------------------------------------------- behaviours
 
     def derivations(self, names: Iterable[str]) -> list[tuple[int, Any]]:
-        """Return the symbols of a group of rules that need each other, each with when it is true."""
+        """Return the symbols of a group of mutually dependent rules, each with the expression for its truth."""
         ways: dict[int, list[str]] = {}
         for rule in (rule for name in names for rule in self.problem.domain.rules[name]):
             kinds = {one.name: one.kind for one in (*rule.parameters, *rule.variables)}
@@ -238,13 +238,13 @@ class Interpreter:
         return [(slot, eval(f"lambda s: {_joined(said, 'or', 'False', 'True')}", NAMES)) for slot, said in ways.items()]
 
     def recursive(self, names: Iterable[str]) -> bool:
-        """Return whether rules of a group may need what others of it, or they themselves, conclude."""
+        """Return whether rules of a group may depend on the group's own conclusions."""
         group = set(names)
         rules = [rule for name in group for rule in self.problem.domain.rules[name]]
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
     def closed(self, values: list[Any]) -> State:
-        """Return a state with all that follows from it: group by group, from nothing upwards."""
+        """Return a state with all derived values, group by group, beginning with none."""
         for slot in range(self.stated, len(values)):
             values[slot] = FALSE
         for group, recursive in self.rules:
@@ -281,7 +281,7 @@ class Interpreter:
         return Action(one, arguments, tuple(outcomes))
 
     def outcome(self, one: Behavior, asked: str, terms: Terms, kinds: Terms) -> Any:
-        """Return a function from a state to the next one with its cost, or None where the behaviour can't be done."""
+        """Return a function from a state to the next one with its cost, or None where the behaviour isn't applicable."""
         lines = ["def outcome(s):", f" if not ({asked}): return None", " t = list(s)"]
         for effect in sorted(one.effects, key=lambda effect: effect.value != FALSE):
             for when, symbol, value in self.instances(effect, terms, kinds):
@@ -305,7 +305,7 @@ class Interpreter:
     def instances(
         self, effect: ValueEffect | AmountEffect, terms: Terms, kinds: Terms
     ) -> Iterator[tuple[str, Symbol, str]]:
-        """Yield for each symbol that an effect changes when it does so, as the beginning of a line, and to or by what."""
+        """Yield for each symbol that an effect changes the condition, as the beginning of a line, and the new value."""
         each = effect.each or Parameter("?each", "")
         for one in self.problem.classes.get(each.kind, ()) if effect.each else ("",):
             for trial in self.bindings(effect.when, {**kinds, each.name: each.kind}, {**terms, each.name: one}):
@@ -319,7 +319,7 @@ class Interpreter:
                     yield "" if when == "True" else f" if {when}:", symbol, said
 
     def limit(self, symbol: Symbol, amount: str) -> str:
-        """Return that an amount is one of those that it may be."""
+        """Return that an amount is within its bounds."""
         quantity = self.kinds[symbol.situation].quantity
         assert quantity is not None
         said = [
@@ -333,7 +333,7 @@ class Interpreter:
         return " and ".join(said)
 
     def done(self, name: str, arguments: tuple[str, ...], state: State) -> Iterator[tuple[Any, State]]:
-        """Yield what comes of a behaviour in a state, with what it costs."""
+        """Yield the results of a behaviour in a state, with their costs."""
         behavior = self.problem.domain.behaviors.get(name)
         if behavior is None:
             return
@@ -350,7 +350,7 @@ class Interpreter:
         return all(self.meets(state, symbol, value) for symbol, value in self.problem.goal.items())
 
     def meets(self, state: State, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol is as wanted."""
+        """Return whether a symbol has its goal value."""
         got = self.value(state, symbol)
         if got is None or self.kinds[symbol.situation].quantity is None:
             return (FALSE if got is None else got) == value
@@ -366,7 +366,7 @@ class Interpreter:
         return state[self.slots[symbol]] if symbol in self.slots else self.constants.get(symbol)
 
     def explored(self, level: int, most: int, rests: bool = True) -> Truth:
-        """Return what behaviours of a level can reach; what was changed has to be at rest in the end, unless told otherwise.
+        """Return the states that behaviours of a level can reach; changed symbols have to be at rest in the end, by default.
 
         Raises
         ------
@@ -415,7 +415,7 @@ class Interpreter:
 
 
 def _joined(parts: Sequence[str], word: str, empty: str, decisive: str) -> str:
-    """Return expressions joined by `and` or `or`, without those that decide nothing."""
+    """Return expressions joined by `and` or `or`, without redundant ones."""
     if decisive in parts:
         return decisive
     left = [part for part in dict.fromkeys(parts) if part != empty]
@@ -431,4 +431,4 @@ def _negated(said: str, negated: bool) -> str:
 
 
 NAMES: dict[str, Any] = {"nan": NOTHING, "divided": divided, "Fraction": Fraction}
-"""What the expressions may name beside the state."""
+"""Names in the expressions besides the state."""

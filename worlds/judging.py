@@ -1,7 +1,7 @@
-"""A small world in every mode, held against all that can happen in it.
+"""A small world planned in every mode, and judged by an exhaustive search.
 
-What can happen is found by `worlds.interpreter`, in the problem as it is meant; the program gets a scene's file. Each call has a
-limit of its own CPU time.
+`worlds.interpreter` searches the problem as a value; the program receives the scene's file. Each call has its own limit of CPU
+time.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ from worlds.scenes import scene
 from worlds.walking import cost, faults
 
 SECONDS, CPU = 3.0, 4.0
-"""The time limit of a call, and the CPU time after which it is taken for one that doesn't return."""
+"""Time limit of a call, and CPU seconds after which the call counts as endless."""
 MOST = 5_000
-"""So many nodes are searched for the truth."""
+"""Maximum number of nodes of the exhaustive search."""
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3, 2, 3, 8, 6, 8, 250, 4
-"""One of so many worlds is planned in optimally, by the paper's mode, without leaving levels, and with a memory; is exported, and
-read by unified-planning; is carried out; and has its plan denied by certificates of tasks that lack a behaviour."""
+"""One in so many worlds is planned optimally, in the paper's mode, strictly, and with a memory; is exported, and read by
+unified-planning; is executed; and is checked with certificates of tasks that lack a behaviour."""
 LEFT_OUT, CERTIFYING = 3, 100_000
-"""Number of behaviours left out for that, one after the other, and the tests for a certificate of each."""
+"""Number of behaviours left out for that, one after the other, and the work to certify each task."""
 MOST_ACTIONS = 1_500
-"""So many quantified behaviours may what was exported and imported have, if it is to be searched."""
+"""Maximum number of quantified behaviours of an imported export for the exhaustive search."""
 T = TypeVar("T")
 
 
 class EndlessError(BaseException):
-    """A call has used up its CPU time; no part of the program catches it."""
+    """A call has used up its CPU time; no part of the program catches this."""
 
 
 @dataclass(frozen=True)
 class Complaint:
-    """What is wrong: a kind, in which mode, and the particulars."""
+    """A fault: its kind, the mode, and the particulars."""
 
     kind: str
     mode: str
@@ -64,7 +64,7 @@ class Complaint:
 
 @dataclass
 class Judged:
-    """What came of a world."""
+    """The result of judging a world."""
 
     complaints: list[Complaint] = field(default_factory=list)
     remarks: list[Complaint] = field(default_factory=list)
@@ -78,7 +78,7 @@ class Judged:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise `EndlessError` after so much CPU time."""
+    """Raise `EndlessError` after so many CPU seconds."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise EndlessError
@@ -110,17 +110,17 @@ class Judge:
         self.reached: list[State] = []
 
     def complain(self, kind: str, mode: str, text: object = "") -> None:
-        """Note that something is wrong."""
+        """Record a fault."""
         self.found.complaints.append(Complaint(kind, mode, str(text)[:400]))
 
     def sampled(self, one_of: int, what: str, *modes: str) -> bool:
-        """Return whether a world is among those of which something costly is asked."""
+        """Return whether a world belongs to the sample for an expensive check."""
         if self.only:
             return self.only.startswith(modes)
         return self.every or zlib.crc32(f"{what} {self.world.seed}".encode()) % one_of == 0
 
     def judged(self) -> Judged:
-        """Return what came of the world."""
+        """Return the result of judging the world."""
         self.truth()
         file = self.folder / f"w{self.world.seed}.ttl"
         file.write_text(scene(self.world), encoding="utf-8")
@@ -131,7 +131,7 @@ class Judge:
         return self.found
 
     def truth(self) -> None:
-        """Work out what the goal costs at least; `self.surely` is less where it is open what counts as touched."""
+        """Compute the least cost of the goal; `self.surely` is lower where it is open which symbols count as changed."""
         level, found = self.world.problem.domain.levels[-1], self.found
         begin = process_time()
         try:
@@ -150,7 +150,7 @@ class Judge:
         found.seconds["truth"] = process_time() - begin
 
     def call(self, mode: str, made: Callable[[], T]) -> T | None:
-        """Return what a call returns; note it if it doesn't, or raises what nobody expects."""
+        """Return the result of a call; record it if the call doesn't return or raises an unexpected error."""
         begin = process_time()
         try:
             with limited(CPU):
@@ -176,7 +176,7 @@ class Judge:
         return None
 
     def modes(self, file: Path) -> None:
-        """Ask for plans in every mode, and for what follows from one."""
+        """Plan in every mode, and do the checks that depend on a plan."""
         read = self.call("load", lambda: load(file))
         if read is None:
             return
@@ -211,7 +211,7 @@ class Judge:
             self.execution(read, guarded)
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
-        """Plan, and judge what comes of it."""
+        """Plan, and judge the outcome."""
         result = self.call(name, lambda: plan(read, engine=NO_ENGINE, time_limit=SECONDS, **options))
         if result is None:
             return None
@@ -221,7 +221,7 @@ class Judge:
         return outcome
 
     def judge(self, mode: str, outcome: Outcome) -> None:
-        """Hold an outcome against the truth."""
+        """Compare an outcome with the exhaustive search."""
         least, surely, known = self.found.least, self.surely, self.found.known
         if outcome.plan is not None:
             wrong = faults(self.meant, outcome.plan)
@@ -251,7 +251,7 @@ class Judge:
                 self.found.remarks.append(Complaint("unproved", mode, f"{outcome.bound} … {own}"))
 
     def certificate(self, mode: str, outcome: Outcome) -> None:
-        """Hold what proves that there is no plan against all states that can be reached."""
+        """Compare a certificate with all reachable states."""
         certificate = getattr(outcome, "certificate", None)
         if not hasattr(outcome, "certificate"):
             return
@@ -268,7 +268,7 @@ class Judge:
                 return
 
     def checker(self, read: Scene, plans: Sequence[Plan]) -> None:
-        """Hold the checker of plans against the interpreter, in plans that are mostly none."""
+        """Compare the checker of plans with the interpreter, on mostly invalid plans."""
         problem = read.reading.problem
         drawn = [corrupted(plan, problem, self.rng) for plan in plans for _ in range(2)]
         for steps in [*drawn, random_steps(self.meant, self.rng)]:
@@ -282,7 +282,10 @@ class Judge:
                 return
 
     def false_certificates(self, read: Scene) -> None:
-        """Hold the checker of certificates against those of tasks that lack a behaviour: where there is a plan, none is right."""
+        """Check the checker of certificates with certificates of tasks that lack a behaviour.
+
+        If there is a plan, none is valid.
+        """
         from confab.planner.certificate_checks import refusal
         from confab.planner.certifying import certify
 
@@ -315,7 +318,7 @@ class Judge:
     # ------------------------------------------------------------------------------------------------------------- PDDL
 
     def export(self, read: Scene, level: int) -> None:
-        """Export a level and import it; as a problem of its own it has to be solvable where the level is."""
+        """Export a level and import it; as a problem of its own it has to be solvable if the level is."""
         from confab.reasoner.pddl.exporting import to_pddl
         from confab.reasoner.pddl.importing import imported
         from confab.reasoner.pddl.syntax import PddlError, parse
@@ -363,7 +366,7 @@ class Judge:
             self.complain("export means something else", mode, f"least {wanted}, exported {got}")
 
     def read_by_unified_planning(self, mode: str, domain: str, problem: str) -> None:
-        """Complain if unified-planning can't read what was exported."""
+        """Record a fault if unified-planning can't read the export."""
         from unified_planning.io import PDDLReader
 
         try:
@@ -376,7 +379,7 @@ class Judge:
     # -------------------------------------------------------------------------------------------------------- execution
 
     def execution(self, read: Scene, first: Outcome | None) -> None:
-        """Carry the task out, now and then with a fact that changes on the way."""
+        """Execute the task, sometimes with a fact that changes on the way."""
         texts: list[str] = []
         if first is not None and first.plan is not None and self.rng.random() < 0.7:
             steps = [step for step in first.plan.primitives if len(step.path) > 1]
@@ -420,14 +423,17 @@ class Judge:
             self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
 
     def alone(self, situation: str) -> bool:
-        """Return whether no other situation type has a value of this one: else a change takes objects from where they were."""
+        """Return whether a situation type shares no values with others.
+
+        Otherwise a change takes objects away from where they were.
+        """
         members = self.world.problem.members
         others = [kind for name, kind in self.meant.kinds.items() if name != situation and not kind.boolean]
         own = members(self.meant.kinds[situation].range)
         return self.meant.kinds[situation].boolean or not any(own & members(kind.range) for kind in others)
 
     def fact(self) -> str:
-        """Return a fact that may come to hold, or nothing."""
+        """Return a fact that may become true; None if there is none."""
         symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and self.alone(s.situation)]
         if not symbols:
             return ""

@@ -60,7 +60,7 @@ DEFINED = {
     "ABOVE": SituationType("ABOVE", ("Thing", "Thing"), "Truth", boolean=True),
     "LOST": SituationType("LOST", ("Cup",), "Truth", boolean=True),
 }
-"""Situation types that have random rules; the first two need each other, the last one may need their being false."""
+"""Situation types with random rules; the first two are mutually dependent, the last one may depend on their negations."""
 RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 
@@ -105,7 +105,7 @@ class Writer:
         )  # fmt: skip
 
     def rule(self, situation: str) -> Rule:
-        """Return a rule of a situation type that is defined."""
+        """Return a rule of a defined situation type."""
         wanted = DEFINED[situation].arguments
         parameters = [self.fresh(self.rng.choice((kind, kind, "Cup"))) for kind in wanted]
         conditions = self.conditions(list(parameters), self.rng.randint(1, 3), DEPTH)
@@ -119,15 +119,18 @@ class Writer:
         return term
 
     def term(self, bound: list[str]) -> str:
-        """Return a term that is bound, or an individual."""
+        """Return a bound term, or an individual."""
         return self.rng.choice(bound) if bound and self.rng.random() < 0.8 else self.rng.choice(CLASSES["Thing"])
 
     def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
-        """Return a conjunction; `bound` grows by what it determines."""
+        """Return a conjunction; the variables that it determines are added to `bound`."""
         return [self.condition(bound, depth) for _ in range(most)]
 
     def condition(self, bound: list[str], depth: int) -> Condition:
-        """Return a random condition, with others nested in it to some depth; `bound` grows by what it determines."""
+        """Return a random condition with nested conditions up to a depth.
+
+        The variables that it determines are added to `bound`.
+        """
         rng = self.rng
         negated = rng.random() < 0.4
         match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any", "amount")):
@@ -166,7 +169,7 @@ class Writer:
         return ValueCondition(situation, arguments, value, negated)
 
     def amount(self, bound: list[str], depth: int) -> Expression:
-        """Return an amount of terms that are bound, sometimes one that isn't there; linear in what changes."""
+        """Return an amount of bound terms, sometimes a missing one; linear in the changing amounts."""
         rng = self.rng
         match rng.choice(
             ("constant", "amount", "amount", "measure", "sum", "product") if depth else ("constant", "amount")
@@ -192,7 +195,7 @@ class Writer:
         return AmountEffect(situation, arguments, self.rng.choice(OPERATIONS), self.amount(bound, 1), when)
 
     def effect(self, bound: list[str], when: tuple[Condition, ...]) -> ValueEffect:
-        """Return a random effect on terms that are bound."""
+        """Return a random effect on bound terms."""
         rng = self.rng
         situation = rng.choice(sorted(SITUATIONS))
         kind = SITUATIONS[situation].range

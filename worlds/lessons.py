@@ -24,7 +24,7 @@ def as_it_is(text: str) -> str:
 
 
 def reading_of(text: str) -> Reading:
-    """Return what a scene written as Turtle says."""
+    """Return the problem of a scene in Turtle."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(text)
@@ -41,7 +41,7 @@ def problem(
 
 @lru_cache(maxsize=64)
 def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Problem:
-    """Return what of a generated scene its task can need, as ``confab plan`` sees it."""
+    """Return the part of a generated scene that its task can need, as ``confab plan`` reads it."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(generate(family, objects, clutter=clutter, seed=seed))
@@ -55,7 +55,10 @@ def single_level(problem: Problem, level: int) -> Problem:
 
 
 def backwards(rule: Rule) -> Rule:
-    """Return a rule that promises what its behaviour takes away, if it takes away anything; else one that asks for half as much."""
+    """Return a rule that promises the opposite of its behaviour's effect, if possible.
+
+    Otherwise one with half of its conditions.
+    """
     for c in rule.asks:
         same = isinstance(c, ValueCondition) and (c.situation, c.arguments) == (
             rule.goal.situation,

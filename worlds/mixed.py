@@ -38,27 +38,27 @@ from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
 
 MOST = 300
-"""So many nodes of the lowest level may be reachable in most worlds."""
+"""Maximum number of reachable nodes of the lowest level in most worlds."""
 UNBOUNDED = 0.03
-"""The share of worlds that may be larger: there the truth may stay unknown."""
+"""Share of worlds that may be larger; their exhaustive search may remain open."""
 FEW = 8
 """Worlds with fewer states are mostly drawn again."""
 EXCLUDED = 0.33
-"""In this share of worlds it is tried to want what no state has."""
+"""Share of worlds for which a goal that no state satisfies is looked for."""
 TRIES = 8
 NEAR = 0.25
-"""The share of goals one step away that are kept."""
+"""Share of one-step goals that are kept."""
 UPDATES = 0.15
-"""In this share of worlds some behaviours are written as SPARQL updates, which take long to read."""
+"""Share of worlds in which some behaviours are written as SPARQL updates, which take long to read."""
 
 
 @dataclass(frozen=True)
 class World:
-    """A problem as it is meant, and how a scene says it.
+    """A problem as a value, and how its scene is written.
 
-    `pairs` are the situation types whose property takes several values, `owners` the classes that have a situation type; `axioms`
-    has for a situation type that is defined by property axioms what stands in place of its rules; `updates` are the behaviours
-    that are written as SPARQL updates.
+    `pairs` are the situation types whose property takes several values, `owners` the classes that have a situation type. `axioms`
+    has the property axioms that define a situation type in place of rules. `updates` are the behaviours that are written as SPARQL
+    updates.
     """
 
     seed: int
@@ -97,7 +97,7 @@ def drawn(seed: int) -> tuple[World, Interpreter]:
 
 
 class _Wishes:
-    """Draws what is wanted."""
+    """Draws the goal."""
 
     def __init__(self, rng: Random, interpreter: Interpreter, costs: Mapping[State, Any]) -> None:
         self.rng, self.of, self.costs = rng, interpreter, costs
@@ -108,7 +108,7 @@ class _Wishes:
                 self.first.setdefault(fact, costs[state])
 
     def goal(self, excluded: bool) -> dict[Symbol, str]:
-        """Return a goal that doesn't hold at first, one that no state has if that is asked for and found; or nothing."""
+        """Return a goal that doesn't hold initially; on request one that no state satisfies, if found; None if there is none."""
         for _ in range(3 * TRIES if excluded else TRIES):
             kind = "random" if self.rng.random() < 0.12 else "two" if excluded else "one"
             goal = self.drawn(kind)
@@ -125,11 +125,11 @@ class _Wishes:
         return {}
 
     def has(self, state: State, goal: Mapping[Symbol, str]) -> bool:
-        """Return whether a state is as wanted."""
+        """Return whether a state satisfies a goal."""
         return all(self.of.meets(state, symbol, value) for symbol, value in goal.items())
 
     def drawn(self, kind: str) -> dict[Symbol, str]:
-        """Return what some states have: one, two mixed, or any values at all."""
+        """Return values of states: of one state, of two mixed, or any."""
         rng = self.rng
         sources = [rng.choice(self.states[-1 - len(self.states) // 6 :])]
         sources += [rng.choice(self.states), rng.choice(self.states)] if kind == "two" else []
@@ -167,7 +167,7 @@ class _Wishes:
 
 
 class _Draft(Vocabulary):
-    """One draw of a world without what is wanted."""
+    """One draw of a world without its goal."""
 
     def __init__(self, rng: Random, seed: int) -> None:
         super().__init__(rng)
@@ -213,7 +213,7 @@ class _Draft(Vocabulary):
     # --------------------------------------------------------------------------------------------------- situation types
 
     def situation(self, number: int) -> None:
-        """Draw a situation type with what holds of it at first."""
+        """Draw a situation type with its initial values."""
         rng = self.rng
         kind = rng.choice("FFFPPRRQGNNM")
         name = f"{kind}{number}"
@@ -294,7 +294,7 @@ class _Draft(Vocabulary):
                 self.initial[Symbol(name, row)] = str(rng.randint(0, 2))
 
     def static(self) -> None:
-        """Draw what no behaviour changes: relations between individuals, and numbers of individuals."""
+        """Draw static relations between individuals, and numbers of individuals."""
         if self.chance(0.4):
             ends = (self.rng.choice(("A", "B", "A1")), self.rng.choice(("A", "B")))
             rows = frozenset(row for row in product(*(self.classes[of] for of in ends)) if self.chance(0.5))
@@ -306,7 +306,7 @@ class _Draft(Vocabulary):
             self.ends["size"] = ("A",)
 
     def defined(self, number: int) -> None:
-        """Draw a situation type that follows from others."""
+        """Draw a defined situation type."""
         rng, name = self.rng, f"D{number}"
         properties = [one for one in sorted(self.pairs) if one not in self.rules]
         if properties and self.chance(0.35):
@@ -330,7 +330,7 @@ class _Draft(Vocabulary):
         self.rules[name] = tuple(rules)
 
     def along(self, name: str, base: str) -> None:
-        """Draw a situation type that follows along a property: a transitive one above it, or a chain with a relation."""
+        """Draw a situation type defined by its property: a transitive superproperty, or a chain with a relation."""
         situation = self.situations[base]
         owner, target = situation.arguments
         base_property, own_property = base.lower(), name.lower()
@@ -367,7 +367,7 @@ class _Draft(Vocabulary):
     # -------------------------------------------------------------------------------------------------------- behaviours
 
     def behaviors(self) -> list[Behavior]:
-        """Return behaviours: those of a lower level mostly do what one of the level above does, and something besides."""
+        """Return behaviours: those of a lower level mostly do what one of the level above does, and more."""
         rng, found = self.rng, list[Behavior]()
         above: list[Behavior] = []
         for level in range(1, self.levels + 1):
@@ -382,7 +382,7 @@ class _Draft(Vocabulary):
         return found or [self.behavior("L1_0", 1, True)]
 
     def behavior(self, name: str, level: int, sure: bool = False) -> Behavior:
-        """Return a behaviour of its own."""
+        """Return a behaviour that is independent of the level above."""
         rng, writer = self.rng, Phrases(self, level)
         parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2, 2)))]
         bound = list(parameters)
@@ -417,7 +417,7 @@ class _Draft(Vocabulary):
         )  # fmt: skip
 
     def refining(self, upper: Behavior, level: int, count: int) -> list[Behavior]:
-        """Return behaviours of the next level that can do together what an upper one does, or nearly so."""
+        """Return behaviours of the next level that together have the effects of an upper one, or almost."""
         writer = Phrases(self, level)
         writer.kinds = {**upper.kinds}
         parameters = [p.name for p in upper.parameters]

@@ -1,7 +1,7 @@
-"""Random problems with numbers, and all that can be done in them in plain Python: a search that knows no behaviour judges plans.
+"""Random problems with numbers, and their transitions in plain Python, for an exhaustive search that judges plans.
 
-`jugs`   water is filled in, poured away, and poured over as far as it fits, until jugs hold what is wanted
-`rounds` a van brings parcels about; it carries so much, and a way costs its length times what is carried on it
+`jugs`   water is filled in, poured away, and poured over as far as it fits, until jugs hold the goal amounts `rounds` a van
+delivers parcels; it has a capacity, and a drive costs its length times the load
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from confab.reasoner.symbols import (
 from worlds.writing import becomes, has, world
 
 State: TypeAlias = Any
-"""Whatever can be a key."""
+"""Any hashable state."""
 Next: TypeAlias = "Callable[[State], Iterator[tuple[Fraction, State]]]"
-"""Yields what can be done in a state: what it costs, and the state after it."""
+"""Yields the transitions of a state: cost and successor."""
 
 
 def cheapest(start: State, after: Next, wanted: Callable[[State], bool]) -> Fraction | None:
-    """Return what the cheapest way to a wanted state costs, None if there is none."""
+    """Return the least cost of reaching a goal state; None if none is reachable."""
     best, waiting, count = {start: Fraction(0)}, [(Fraction(0), 0, start)], 0
     while waiting:
         spent, _, state = heapq.heappop(waiting)
@@ -48,7 +48,7 @@ def cheapest(start: State, after: Next, wanted: Callable[[State], bool]) -> Frac
 
 
 def jugs(rng: Random) -> tuple[Problem, Fraction | None]:
-    """Return a random problem of jugs, and the least number of steps."""
+    """Return a random problem of jugs, and the length of a shortest plan."""
     names = [f"jug{i}" for i in range(rng.choice((2, 2, 3)))]
     sizes = {name: Fraction(rng.choice((3, 4, 5, 6, 7, 9)), rng.choice((1, 1, 2))) for name in names}
     first = {name: rng.choice((Fraction(0), sizes[name])) for name in names}
@@ -103,7 +103,7 @@ def jugs(rng: Random) -> tuple[Problem, Fraction | None]:
 
 
 def rounds(rng: Random) -> tuple[Problem, Fraction | None]:
-    """Return a random problem of a van, and what the cheapest plan costs; some ways don't exist, or have a length below zero."""
+    """Return a random problem of a van, and the least cost of a plan; some drives don't exist or have a negative length."""
     places, names, most = (
         ("yard", "north", "south", "hill"),
         tuple(f"parcel{i}" for i in range(rng.choice((1, 2, 3)))),

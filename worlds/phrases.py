@@ -1,4 +1,4 @@
-"""Random conditions and effects over what a world has, nested in one another."""
+"""Random conditions and effects over the content of a world, nested in one another."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from confab.reasoner.symbols import (
 )
 
 EACH, ANYONE = "?each", "?anyone"
-"""The variables of conditions that a scene says by a class in the place of an individual, and by an absence."""
+"""Variables of conditions that a scene writes as a class in the place of an individual, and as an absence condition."""
 
 
 MOST_TERMS = 3
-"""An effect gets a parameter of its own where there are fewer terms and none fits."""
+"""Minimum number of terms; with fewer, and none that fits, an effect gets a parameter of its own."""
 CONDITIONS = (
     *("value", "value", "value", "binding", "near", "class", "equal", "witness", "absence", "every", "any"),
     *("amount", "amount"),
@@ -39,7 +39,7 @@ CONDITIONS = (
 
 
 class Vocabulary:
-    """What conditions and effects may speak of; `values` has the values of lower levels, `ends` the classes of relations."""
+    """The vocabulary of conditions and effects; `values` has the values of lower levels, `ends` the classes of relations."""
 
     def __init__(self, rng: Random) -> None:
         self.rng = rng
@@ -77,7 +77,7 @@ class Phrases:
         return term
 
     def seen(self, quantity: bool = False, changeable: bool = False) -> list[SituationType]:
-        """Return the situation types that a behaviour of this level may speak of."""
+        """Return the situation types that a behaviour of this level may use."""
         return [
             one
             for one in self.draft.situations.values()
@@ -96,11 +96,11 @@ class Phrases:
         return self.rng.choice(bound) if bound else None
 
     def kinds_of(self, term: str) -> tuple[str, ...]:
-        """Return the individuals that a term can stand for."""
+        """Return the individuals that a term can denote."""
         return self.draft.classes.get(self.inner.get(term) or self.kinds.get(term, ""), ())
 
     def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
-        """Return a conjunction; `bound` grows by what it determines."""
+        """Return a conjunction; the variables that it determines are added to `bound`."""
         return [self.condition(bound, depth) for _ in range(most)]
 
     def visible(self, values: Sequence[str]) -> list[str]:
@@ -108,7 +108,7 @@ class Phrases:
         return [value for value in values if self.draft.values.get(value, 1) <= self.level]
 
     def value(self, bound: Sequence[str], about: str | None = None) -> Condition:
-        """Return a condition on the value of something; `about` has to be among its arguments, where it can."""
+        """Return a condition on a value; `about` is among its arguments if possible."""
         rng = self.rng
         seen = self.seen()
         if not seen:
@@ -133,12 +133,12 @@ class Phrases:
         return ValueCondition(one.name, terms, value, negated=rng.random() < 0.4)
 
     def same(self, bound: Sequence[str]) -> Condition:
-        """Return that something is itself, where there is nothing better to say."""
+        """Return the trivial condition that an individual is itself."""
         one = self.rng.choice([*bound, *self.draft.objects])
         return EqualityCondition(one, one)
 
     def condition(self, bound: list[str], depth: int) -> Condition:
-        """Return a condition; `bound` grows by the variable that it determines, if any."""
+        """Return a condition; the variable that it determines, if any, is added to `bound`."""
         rng, draft = self.rng, self.draft
         negated = rng.random() < 0.35
         kind = rng.choice(CONDITIONS)
@@ -200,7 +200,7 @@ class Phrases:
         return self.value(bound)
 
     def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
-        """Return a comparison of numbers; nothing if there are none."""
+        """Return a comparison of numbers; None if there are none."""
         left = self.number(bound, 1)
         if not isinstance(left, Amount | Calculation):
             return None
@@ -212,7 +212,7 @@ class Phrases:
         )
 
     def number(self, bound: Sequence[str], depth: int) -> Expression | None:
-        """Return a calculation; nothing if there are no numbers."""
+        """Return a calculation; None if there are no numbers."""
         rng, seen = self.rng, self.seen(quantity=True)
         if not seen:
             return None
@@ -234,7 +234,10 @@ class Phrases:
         return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
 
     def link(self, bound: Sequence[str], effect: ValueEffect) -> Condition | None:
-        """Return that what another behaviour makes so is so, of some individuals; nothing if this level doesn't see it."""
+        """Return the condition that an effect of another behaviour holds for some individuals.
+
+        None if this level doesn't see it.
+        """
         situation = self.draft.situations[effect.situation]
         terms = [self.term(bound, kind) for kind in situation.arguments]
         if situation.level > self.level or None in terms or self.draft.values.get(effect.value, 1) > self.level:
@@ -246,7 +249,7 @@ class Phrases:
     # ----------------------------------------------------------------------------------------------------------- effects
 
     def effect(self, bound: list[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
-        """Draw an effect, unless it would contradict one that is there already."""
+        """Draw an effect, unless it would contradict an existing one."""
         rng, draft = self.rng, self.draft
         of_numbers = self.seen(quantity=True)
         one = rng.choice([*self.seen(changeable=True), *of_numbers] or [None])
@@ -299,7 +302,7 @@ class Phrases:
 
 
 def _mentions_twice(condition: Condition) -> bool:
-    """Return whether a condition names each of a class more than once, which a class in its place can't say."""
+    """Return whether a condition mentions each member of a class more than once, which a class in its place can't express."""
     match condition:
         case ValueCondition(_, arguments, value):
             return (*arguments, value).count(EACH) > 1 or value == EACH
@@ -313,7 +316,7 @@ def contrary(condition: Condition) -> Condition:
 
 
 def named(conditions: Sequence[Condition]) -> set[str]:
-    """Return the situation types that conditions speak of."""
+    """Return the situation types in conditions."""
     found: set[str] = set()
     for one in conditions:
         match one:

@@ -1,4 +1,4 @@
-"""A random world as one Turtle file: domain, scene and task, in all the ways in which a scene may say a thing."""
+"""A random world as one Turtle file: domain, scene and task, in all the forms that a scene may use."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ class _Scene:
         yield from self.nodes
 
     def as_update(self, one: Behavior) -> str | None:
-        """Return a behaviour as a SPARQL update; None if updates can't say it."""
+        """Return a behaviour as a SPARQL update; None if an update can't express it."""
         properties = {
             name: name.lower()
             for name, its in self.situations.items()
@@ -213,7 +213,7 @@ class _Scene:
         return [f"c:{name} {self.put(term)}" for name, term in zip(ARGUMENTS, terms, strict=False)]
 
     def said(self, situation: str, arguments: Sequence[str], value: str) -> list[str]:
-        """Return what says a value, and whether it is false."""
+        """Return the properties of a value, and whether it is false."""
         first = f"c:situationType :{situation}"
         if situation in self.world.pairs:
             subject, target = arguments
@@ -225,7 +225,7 @@ class _Scene:
         return said if value == TRUE else [*said, f"c:value {self.put(value)}"]
 
     def condition(self, one: Condition) -> str:
-        """Write a condition with what is inside it, and return its IRI."""
+        """Write a condition with its nested conditions, and return its IRI."""
         no = ["c:negated true"] if one.negated else []
         match one:
             case ValueCondition(situation, arguments, value):
@@ -274,7 +274,7 @@ class _Scene:
         return inside[0] if len(inside) == 1 else self.part("AllOf", f"c:condition {', '.join(inside)}")
 
     def side(self, name: str, one: Expression) -> str:
-        """Return what leads to a number."""
+        """Return the property for a number."""
         if name == "right" and isinstance(one, Fraction):
             return f"c:amount {_decimal(one)}"
         return f"c:{name} {self.calculation(one)}"
@@ -316,7 +316,7 @@ class _Scene:
             yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {' '.join(sorted(map(_iri, [*everyone, *own])))} ) ] ."
 
     def facts(self) -> Iterator[str]:
-        """Yield what no property of an individual says."""
+        """Yield the facts that no property of an individual expresses."""
         number = 0
         for symbol, value in self.problem.initial.items():
             situation = self.situations[symbol.situation]

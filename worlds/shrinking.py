@@ -1,4 +1,4 @@
-"""A smaller world of which the same is true: parts are left out one by one, as long as something still holds of the rest."""
+"""Shrinking of worlds: parts are left out one by one, as long as a predicate still holds."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from worlds.mixed import World
 
 
 def shrunk(world: World, still: Callable[[World], bool], seconds: float = 60.0) -> World:
-    """Return a world from which nothing can be left out without `still` being false, or the best one within CPU seconds."""
+    """Return a world of which no part can be left out without `still` becoming false, or the best one within CPU seconds."""
     end = process_time() + seconds
     again = True
     while again:
@@ -40,7 +40,7 @@ def shrunk(world: World, still: Callable[[World], bool], seconds: float = 60.0) 
 
 
 def smaller_worlds(world: World) -> Iterator[World]:
-    """Yield worlds with one part less, those that lack much first."""
+    """Yield worlds without one part, largest parts first."""
     problem = world.problem
     domain = problem.domain
     for name in domain.behaviors:
@@ -127,7 +127,7 @@ def _smaller_behaviors(one: Behavior) -> Iterator[Behavior]:
 
 
 def _pruned(one: Behavior) -> Behavior:
-    """Return a behaviour without the parameters and variables that nothing names any more."""
+    """Return a behaviour without unused parameters and variables."""
     parts = one.preconditions, one.effects, one.amounts
     parameters = tuple(p for p in one.parameters if _occurs(p.name, parts))
     return replace(one, parameters=parameters, variables=tuple(p for p in one.variables if _occurs(p.name, parts)))
@@ -175,7 +175,7 @@ def _without_situation(world: World, name: str) -> World:
 
 
 def without_individual(world: World, individual: str) -> World | None:
-    """Return a world without an individual that nothing names and that is nobody's value."""
+    """Return a world without an individual that is neither named nor a value."""
     problem = world.problem
     if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
         return None
@@ -191,7 +191,7 @@ def without_individual(world: World, individual: str) -> World | None:
 
 
 def _mentioned(name: str, world: World) -> bool:
-    """Return whether something speaks of a situation type."""
+    """Return whether a situation type is used."""
     problem = world.problem
     domain = problem.domain
     rules = [rule.conditions for other, its in domain.rules.items() if other != name for rule in its]

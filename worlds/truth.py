@@ -28,33 +28,33 @@ FEW = 200
 
 
 class TooManyError(Exception):
-    """More states than asked for, or a state doesn't fit into 63 bits."""
+    """There are more states than allowed, or a state needs more than 63 bits."""
 
 
 @dataclass
 class Truth:
-    """`states` can be reached in all; `shortest` is the least number of steps to the goal, or None if it can't be reached."""
+    """`states` is the number of reachable states; `shortest` is the length of a shortest plan, or None if there is none."""
 
     states: int
     shortest: int | None
 
 
 class Asked(Facts):
-    """A state that notes what is looked at."""
+    """A state that records which symbols are read."""
 
     def __init__(self, problem: Problem, values: dict[Symbol, str]) -> None:
         super().__init__(problem, values)
         self.values, self.looked = values, dict[Symbol, str]()
 
     def value(self, situation: str, arguments: tuple[str, ...]) -> str | None:
-        """Return a symbol's value, and note it."""
+        """Return a symbol's value, and record the symbol."""
         symbol = Symbol(situation, arguments)
         if symbol in self.values:
             self.looked.setdefault(symbol, self.values[symbol])
         return super().value(situation, arguments)
 
     def holders(self, situation: str, value: str) -> Iterator[tuple[str, ...]]:
-        """Yield the arguments of the symbols with a value, each noted when it is looked at."""
+        """Yield the arguments of the symbols with a value; each symbol that is read is recorded."""
         for symbol in self.values:
             if symbol.situation == situation and self.value(situation, symbol.arguments) == value:
                 yield symbol.arguments
@@ -62,7 +62,7 @@ class Asked(Facts):
 
 @dataclass
 class Node:
-    """Where the interpreter looks at a symbol next; `known` says of each of its values whether it was seen, and leads on."""
+    """A node of a decision tree: the symbol that the interpreter reads next; `known` maps its values to the next node."""
 
     symbol: int
     known: NDArray[np.int8]
@@ -113,7 +113,7 @@ class World:
         return ((codes >> self.shifts[symbol]) & self.widths[symbol]).astype(np.int64)
 
     def explore(self, most: int) -> Truth:
-        """Go through all states, whether or not the goal comes on the way."""
+        """Visit all states, whether or not the goal is reached on the way."""
         layer: Codes = np.zeros(1, np.uint64)
         known, depth, shortest = layer, 0, None
         while len(layer):
@@ -173,7 +173,7 @@ class World:
                 waiting.append((tree.after[rank], rows if len(present) == 1 else rows[ranks == rank]))
 
     def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
-        """Ask the interpreter about one state, and return the tree with its answer."""
+        """Ask the interpreter about one state, and return the tree extended by its answer."""
         ranks = [(int(code) >> shift) & mask for shift, mask in self.places]
         asked = Asked(self.problem, {s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
         changes = self.rules.changes(*self.steps[number], asked)
@@ -205,5 +205,5 @@ class World:
 
 
 def _breadth(condition: Condition) -> int:
-    """Return whether a condition looks at many symbols: in what order a conjunction is asked for doesn't matter."""
+    """Return whether a condition reads many symbols; the order of a conjunction is free."""
     return 2 * isinstance(condition, Witness | AnyOf) + isinstance(condition, ValueCondition)

@@ -1,4 +1,4 @@
-"""Whether a tree of steps is a plan by docs/levels.md, by the plain interpreter alone."""
+"""Whether a tree of steps is a plan by docs/levels.md, by the plain interpreter only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from worlds.interpreter import NOTHING, Interpreter, State
 
 
 def faults(of: Interpreter, plan: Plan) -> list[str]:
-    """Return what is wrong with a plan by docs/levels.md; nothing if it is one."""
+    """Return the faults of a plan by docs/levels.md; empty if it is valid."""
     walk = _Walk(of)
     end = walk.sequence(plan.steps, 0, of.initial, False)
     if end is not None and not of.wanted(end):
@@ -19,7 +19,7 @@ def faults(of: Interpreter, plan: Plan) -> list[str]:
 
 
 def cost(of: Interpreter, plan: Plan) -> Any:
-    """Return what the steps of the lowest level of a plan cost, done one after the other."""
+    """Return the cost of a plan's steps of the lowest level."""
     state, total = of.initial, 0
     for step in plan.at_level(of.problem.domain.levels[-1]):
         made = next(of.done(step.behavior, step.arguments, state), None)
@@ -30,7 +30,7 @@ def cost(of: Interpreter, plan: Plan) -> Any:
 
 
 class _Walk:
-    """A plan carried out step by step."""
+    """A plan under execution, step by step."""
 
     def __init__(self, interpreter: Interpreter) -> None:
         self.of, self.problem = interpreter, interpreter.problem
@@ -39,7 +39,7 @@ class _Walk:
         self.rests = [slot for slot, symbol in enumerate(self.of.symbols) if kinds[symbol.situation].rest is not None]
 
     def sequence(self, steps: Sequence[Step], above: int, state: State, inside: bool) -> State | None:
-        """Carry out the steps that refine one of level `above` (0: the task); return the state in which they end."""
+        """Execute the steps that refine a step of level `above` (0: the task); return the final state."""
         level = next((level for level in self.levels if level > above), None)
         if level is None:
             if steps:
@@ -72,7 +72,7 @@ class _Walk:
         return state
 
     def step(self, step: Step, state: State) -> State | None:
-        """Carry out a step with its refinement; return the state in which it ends."""
+        """Execute a step with its refinement; return the final state."""
         made = list(self.of.done(step.behavior, step.arguments, state))
         if not made:
             self.faults.append(f"{step} can't be done")
@@ -89,7 +89,7 @@ class _Walk:
         return end
 
     def as_said(self, level: int, before: State, said: State, end: State) -> bool:
-        """Return whether a refinement leaves what a level sees as the step says."""
+        """Return whether a refinement leaves what a level sees as the step determines."""
         for slot in range(self.of.stated):
             symbol = self.of.symbols[slot]
             seen = self.problem.first_level(symbol) <= level

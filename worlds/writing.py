@@ -1,4 +1,4 @@
-"""Short hands to write worlds as values."""
+"""Short functions for writing worlds as values."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def has(situation: str, *terms: str) -> ValueCondition:
 
 
 def lacks(situation: str, *terms: str) -> ValueCondition:
-    """Return that this isn't so."""
+    """Return the negation of a condition."""
     return ValueCondition(situation, terms[:-1], terms[-1], negated=True)
 
 
 def becomes(situation: str, *terms: str, when: tuple[Condition, ...] = ()) -> ValueEffect:
-    """Return the effect that this is so afterwards, if it was so before that `when`."""
+    """Return the effect that a condition holds afterwards, if `when` held before."""
     return ValueEffect(situation, terms[:-1], terms[-1], when)
 
 
@@ -77,7 +77,7 @@ def world(
 
 
 def quantified(problem: Problem, level: int) -> Iterator[tuple[Behavior, tuple[str, ...]]]:
-    """Yield the behaviours of a level with all arguments that fit."""
+    """Yield the quantified behaviours of a level."""
     for one in problem.domain.at_level(level):
         for arguments in product(*(problem.classes.get(parameter.kind, ()) for parameter in one.parameters)):
             yield one, arguments

@@ -37,12 +37,12 @@ class Belief:
 
     @property
     def state(self) -> dict[Symbol, str]:
-        """The situation as it was last seen."""
+        """The situation as last observed."""
         return dict(self.problem.initial)
 
     @property
     def goal(self) -> dict[Symbol, str]:
-        """What is wanted now."""
+        """The present goal."""
         return dict(self.problem.goal)
 
     @property
@@ -55,11 +55,11 @@ class Belief:
         self.problem = replace(self.problem, goal=dict(sorted(goal.items())))
 
     def boolean(self, symbol: Symbol) -> bool:
-        """Return whether a symbol is true or false, so that not to see it is to see that it is false."""
+        """Return whether a symbol is boolean, so that not observing it means that it is false."""
         return self.problem.domain.situations[symbol.situation].boolean
 
     def take_in(self, expected: State, seen: State) -> tuple[Surprise, ...]:
-        """Believe what is seen, and of what can't be seen what is expected; return the differences from what is expected."""
+        """Believe the observation, and the expectation for symbols that can't be observed; return the differences between them."""
         if self.unseen is None:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
@@ -95,7 +95,7 @@ class Belief:
         self._apply_doubts()
 
     def without_obstacles(self, goal: Mapping[Symbol, str]) -> Problem:
-        """Return the task of reaching a goal as if every obstacle could be moved."""
+        """Return the task of reaching a goal as if every obstacle were movable."""
         return replace(self.problem, domain=self.unobstructed, relations=self.certain.relations, goal=dict(goal))
 
     # ------------------------------------------------------------------------------------------------- doubts
@@ -119,7 +119,7 @@ class Belief:
 
 
 def _moving(problem: Problem, found: Discovery) -> Iterable[Refutation]:
-    """Yield the refutations of all behaviours that would change where a fixed thing is, or take hold of it."""
+    """Yield the refutations of all behaviours that would move or take a fixed thing."""
     for behavior in problem.domain.behaviors.values():
         values = (effect for effect in behavior.effects if isinstance(effect, ValueEffect))
         changed = {term for effect in values for term in (*effect.arguments, effect.value)}

@@ -23,12 +23,12 @@ Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
 
 DOUBTFUL = 0.5
-"""A fact whose probability of failure is above this isn't relied on."""
+"""Maximum probability of failure of a fact that plans may depend on."""
 
 
 @dataclass(frozen=True)
 class Caution:
-    """How often each static fact was relied on, and how often in vain.
+    """How often each static fact was relied on, and how often it failed.
 
     >>> reach = ("canReach", ("hand", "shelf"))
     >>> round(Caution({reach: (3, 2)}).doubt(reach), 2)
@@ -80,7 +80,7 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
 def refuted_by(
     problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
 ) -> tuple[Refutation, ...]:
-    """Return what is refuted when a primitive can't be done while some facts hold: it, and what is above it with its arguments.
+    """Return the refutations after a primitive failed under some facts: the primitive, and the behaviours above it.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield behaviours of levels above that do what a refuted one does, if only those that are refuted `likewise` do it."""
+    """Yield behaviours of levels above that have the effect of a refuted one, if only behaviours in `likewise` have it."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:
@@ -125,12 +125,12 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
 
 
 def _alike(one: ValueEffect, other: ValueEffect) -> bool:
-    """Tell whether two effects make the same true."""
+    """Return whether two effects make the same fact true."""
     return (one.situation, one.value) == (other.situation, other.value)
 
 
 def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
-    """Return the step of a plan at a path, behind all that is above it."""
+    """Return the step of a plan at a path, after all its ancestors."""
     return tuple(step for step in plan.walk() if step.path == path[: len(step.path)])
 
 

@@ -34,18 +34,18 @@ from confab.reasoner.limits import LimitError, within
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1
-"""A repair that costs more than replanning by more than this factor gives way to it."""
+"""Maximum ratio of the cost of a repair to that of a new plan; beyond it, the new plan is taken."""
 
 MOST = 5_000
-"""So many expansions a repair may take, before the whole is planned anew."""
+"""Maximum number of expansions of a repair, before everything is planned anew."""
 
 SHARE = 0.5
-"""Of the time a repair may take, so that as much is left for planning anew."""
+"""Share of the time for a repair; the rest is left for a new plan."""
 
 
 @dataclass(frozen=True)
 class Mended:
-    """What is to be done from now on, and how it came about. `steps` is None if nothing was found."""
+    """The steps to do from now on, and how they were found. `steps` is None if nothing was found."""
 
     kind: str
     steps: tuple[Step, ...] | None
@@ -55,7 +55,7 @@ class Mended:
 
 @dataclass(frozen=True)
 class Repaired:
-    """What repair found: the steps, their cost, and the `least` that any plan for the open goals costs."""
+    """The result of a repair: the steps, their cost, and `least`, a lower bound of the cost of any plan for the open goals."""
 
     steps: tuple[Step, ...]
     cost: float
@@ -71,7 +71,7 @@ def mend(
     in_progress: bool = True,
     limits: Limits = Limits(),  # noqa: B008 - frozen
 ) -> Mended:
-    """Return what to do from a situation that isn't the one that a plan was made for.
+    """Return the steps from a situation that differs from the one for which a plan was made.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def repair(
 
 
 def changed_individuals(planned: Problem, now: Problem) -> set[str]:
-    """Return the individuals that are named by what differs between two situations and their goals."""
+    """Return the individuals named by the differences of two situations and their goals."""
     touched: set[str] = set()
     for old, new in ((planned.initial, now.initial), (planned.goal, now.goal)):
         for symbol in old.keys() | new.keys():
@@ -159,7 +159,7 @@ def changed_individuals(planned: Problem, now: Problem) -> set[str]:
 def replan(
     problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
-    """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
+    """Return steps planned from scratch: bring the hands to rest, then plan."""
     first: tuple[Step, ...] = ()
     now, end = problem, limits.end()
     call = Call(problem, using, end, limits.expansions)
@@ -189,9 +189,9 @@ def rejected(problem: Problem, steps: Sequence[Step]) -> Reason | None:
 
 
 def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> list[tuple[Symbol, Reason]]:
-    """Return the goals that can't hold because what they are about is gone, or lies where no fact speaks of it, and why.
+    """Return the goals that can't hold because their object is gone or at no perceived place, with the reason.
 
-    `why` says of an object why it has no perceived place, if it can.
+    `why` returns for an object why it has no perceived place, if that is known.
     """
     return [
         (
@@ -210,7 +210,7 @@ def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> li
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
     """Return how many primitives of the old steps are dropped, and how many of the new ones are added.
 
-    What is done in another order is dropped at one place and added at the other: the two sequences are compared.
+    The two sequences are compared: a primitive at another position counts as dropped and added.
     """
     before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
     same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
@@ -242,7 +242,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
 
 
 def _restore(call: Call, pending: Sequence[Step]) -> None:
-    """Achieve first, where one step does it, the open goals that no pending step is for: something happened to them."""
+    """Achieve first the open goals for which no step is pending, where one step does it: something happened to them."""
     planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
     before = order(call) if orphans else {}
@@ -252,7 +252,7 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
 
 
 def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
-    """Do as many of the pending steps as can be done, in their order where that is possible; whether none was dropped."""
+    """Do as many pending steps as possible, in their order if possible; return whether none was dropped."""
     progress, whole = True, True
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
@@ -310,14 +310,14 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
-    """Where another value is wanted now than the one that a step gives, give that, if one step does it."""
+    """Replace the value that a step gives by the present goal value, if one step achieves that."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
             call.achieve(call.program.levels[0], cell, ONE_STEP)
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
-    """Whether all that is changed, as far as the first level knows of it, was wanted once and isn't any more."""
+    """Whether all changes that the first level sees were goals once and no longer are."""
     situations, first = call.problem.domain.situations, call.program.levels[0]
     return all(
         call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value
@@ -327,7 +327,7 @@ def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
 
 
 def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapping[str, str]) -> dict[Cell, str]:
-    """Return the values that a step gives to symbols, whether it is applicable or not."""
+    """Return the values that a step gives to symbols, whether or not it is applicable."""
     lifted = call.problem.domain.behaviors[behavior]
     env = {p.name: argument for p, argument in zip(lifted.parameters, arguments, strict=True)}
     env |= {f"?{name}": value for name, value in bindings.items()}
@@ -339,9 +339,9 @@ def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapp
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of the steps that are the last to give a goal that was open its value.
+    """Return the positions of the steps that last give an open goal its value.
 
-    Steps below the first level that follow each other serve one purpose.
+    Consecutive steps below the first level serve one purpose.
     """
     start, variables, first = call.problem.initial, call.program.variables, call.program.levels[0]
     last: dict[Cell, int] = {}
