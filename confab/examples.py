@@ -42,6 +42,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab serve beverage-serving",
         "curl http://127.0.0.1:7879/sparql --data-urlencode 'query=SELECT ?o ?where WHERE { ?o k:location ?where }'",
         "confab execute beverage-serving --world pybullet --serve 7879",
+        "confab execute scene.ttl --on pyrobosim:world.yaml",
     ),
     "mcp": ("confab mcp .",),
     "learn": (
@@ -72,7 +73,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab generate swap --objects 6 -o swap.ttl",
         "confab generate full --objects 8 --hands 3 --seed 7 -o full.ttl",
     ),
-    "import": ("confab import domain.pddl problem.pddl -o scene.ttl",),
+    "import": ("confab import domain.pddl problem.pddl -o scene.ttl", "confab import world.yaml -o scene.ttl"),
     "convert": (
         "confab convert mine.ttl --behaviors sparql",
         "confab convert mine.ttl --behaviors individuals -o mine.ttl",

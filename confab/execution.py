@@ -476,7 +476,8 @@ def execute(
         What to begin with.
     interventions : iterable of str or Intervention
         Each like ``after=28 cup2 LOCATION location8``.
-    world : {'symbolic', 'pybullet'} or World
+    world : {'symbolic', 'pybullet'}, World, or str
+        A text like ``pyrobosim:world.yaml`` names an interface of the scene and where its robot is found.
     planner : callable, optional
         Plans from scratch; the fast planner if left out.
     seed : int
@@ -509,11 +510,18 @@ def execute(
         raise KnowledgeError("both hands at once: only in the world pybullet, and without interventions")
     if world == "symbolic":
         world = SymbolicWorld(problem)
+    elif isinstance(world, str) and ":" in world:
+        from confab.connecting import connected
+
+        world, stated = connected(scene, problem, world, seed)
+        patience = stated if patience == Patience() else patience
     if not isinstance(world, str):
         with possible():
             return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
     if world != "pybullet":
-        raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
+        raise KnowledgeError(
+            f"unknown world '{world}'; wanted {', '.join(WORLDS)}, or a robot like pyrobosim:world.yaml"
+        )
     from confab.physics import require_skills
     from confab.sim.live import LiveWorld
     from confab.sim.staging import Perturbation

@@ -189,20 +189,32 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 
 
 @command("import", epilog=examples("import"))
-@click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
-@click.argument("problem", type=PATH, metavar="PROBLEM.pddl")
+@click.argument("source", metavar="DOMAIN.pddl|WORLD.yaml")
+@click.argument("problem", type=PATH, required=False, metavar="[PROBLEM.pddl]")
 @click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
     "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
 )
 @TIME_LIMIT
-def import_(domain: Path, problem: Path, out: Path, level: int, time_limit: float | None) -> None:
-    """Turn a PDDL problem into a scene."""
+def import_(source: str, problem: Path | None, out: Path, level: int, time_limit: float | None) -> None:
+    """Turn a PDDL problem, or the world of a robot (INTERFACE:ADDRESS or a world file), into a scene."""
     from confab.authoring import turtle_path
-    from confab.pddl_commands import import_pddl
+    from confab.reasoner.graph.knowledge import KnowledgeError
 
+    if problem is None and source.endswith(".pddl"):
+        raise KnowledgeError(
+            f"{source} is a domain or a problem alone; give both: confab import DOMAIN.pddl PROBLEM.pddl"
+        )
     with limited(time_limit):
-        imported = import_pddl(domain, problem, turtle_path(out), level)
+        if problem is None:
+            from confab.connecting import scene_of_world
+
+            count = scene_of_world(source, turtle_path(out))
+            print(f"{out}: {count} individuals; plan in it with: confab plan {out} --goal FACT")
+            return
+        from confab.pddl_commands import import_pddl
+
+        imported = import_pddl(Path(source), problem, turtle_path(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
     told(out, f"{behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 

@@ -263,6 +263,9 @@ def verify(
 @SCENE
 @click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
 @click.option(
+    "--on", metavar="INTERFACE:ADDRESS", help="Act on a robot, e.g. pyrobosim:world.yaml; instead of --world."
+)
+@click.option(
     "--intervene", multiple=True, metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."
 )
 @click.option("--plan", type=PATH, metavar="PLAN.json", help="What to begin with.")
@@ -299,6 +302,7 @@ def verify(
 def execute(
     scene: str,
     world: str,
+    on: str | None,
     intervene: tuple[str, ...],
     plan: Path | None,
     goal: tuple[str, ...],
@@ -339,7 +343,7 @@ def execute(
         execution = loaded.execute(
             plan,
             intervene or (),
-            world,
+            on or world,
             goal or (),
             remembered,
             mode,
@@ -349,7 +353,7 @@ def execute(
             noise=noise,
             both_hands=both_hands,
         )
-    if execution.episode.refuted:
+    if execution.episode.refuted and on is None:  # a robot's refusals are no geometry of the scene
         from confab.refuting import keep
 
         met = {found.individual for found, _ in execution.episode.discovered}  # of which no other episode knows

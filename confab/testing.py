@@ -1,0 +1,277 @@
+"""Conformance test of a world in which the executive shall act: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
+
+Each check says what was found, with numbers. The primitives of a plan are executed for real: let nobody stand beside the robot.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from threading import Thread
+from time import perf_counter, sleep
+from typing import Any
+
+from confab.planner.acting.world import INTERRUPTED, Guarded, Verdict, World, WorldError
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.plan import Limits, Step
+from confab.planner.validation import successor
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+
+LOOKS = 5
+"""Number of observations of which the latency is measured."""
+
+SOON = 1.0
+"""Seconds within which an observation, and `stop`, should return."""
+
+STOPPED_WITHIN = 10.0
+"""Seconds within which `execute` should return after `stop`."""
+
+BEGUN = 0.05
+"""Seconds after which a primitive counts as begun, and is stopped."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A check: its name, whether it passed (None: it could not be made), and what was found."""
+
+    name: str
+    passed: bool | None
+    found: str
+
+    def __str__(self) -> str:
+        """Return it as a line."""
+        return f"{'ok  ' if self.passed else '-   ' if self.passed is None else 'FAIL'} {self.name:<14} {self.found}"
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """What the checks found."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return all(check.passed is not False for check in self.checks)
+
+    def __getitem__(self, name: str) -> Check:
+        """Return the check of a name."""
+        return next(check for check in self.checks if check.name == name)
+
+    def __str__(self) -> str:
+        """Return a line for each check."""
+        return "\n".join(map(str, self.checks))
+
+
+def check_world(
+    world: World, problem: Problem, steps: Sequence[Step] | None = None, stopped_within: float = STOPPED_WITHIN
+) -> Conformance:
+    """Check a world against the protocol of `confab.planner.acting.world`.
+
+    Parameters
+    ----------
+    world : World
+        In the initial situation of the problem, or near it.
+    problem : Problem
+        A scene's: its primitives are executed, and its symbols are known.
+    steps : sequence of Step, optional
+        Primitives to execute, in order; those of a plan for the problem's goal from what is observed, if left out.
+    stopped_within : float
+        Seconds within which `execute` should return after `stop`.
+
+    Returns
+    -------
+    Conformance
+
+    Examples
+    --------
+    >>> import confab
+    >>> from confab.planner.acting.symbolic_world import SymbolicWorld
+    >>> problem = confab.load("beverage-serving").problem
+    >>> check_world(SymbolicWorld(problem), problem).passed
+    True
+    """
+    guarded = Guarded(world)
+    checks: list[Check] = []
+    try:
+        first = _observed(guarded, problem, checks)
+        if steps is None:
+            now = {**problem.initial, **first}
+            plan = fast_plan(replace(problem, initial=now), limits=Limits(seconds=20.0)).plan
+            steps = plan.primitives if plan is not None else ()
+        checks.append(_refusal(guarded, first))
+        rest = _stopped(guarded, problem, steps, stopped_within, checks)
+        _executed(guarded, problem, rest, checks)
+    except WorldError as error:
+        checks.append(Check("exceptions", False, str(error)))
+    return Conformance(tuple(checks))
+
+
+# ------------------------------------------------------------------------------------------------------------- observation
+
+
+def _observed(world: Guarded, problem: Problem, checks: list[Check]) -> State:
+    """Check observation and the clock; return the last observation."""
+    times, seen, before = [], [], world.seconds
+    for _ in range(LOOKS):
+        begin = perf_counter()
+        seen.append(dict(world.observe()))
+        times.append(perf_counter() - begin)
+    after = world.seconds
+    slowest = max(times)
+    checks.append(
+        Check("latency", slowest <= SOON, f"observe() took {slowest * 1000:.0f} ms at most, of {LOOKS} times")
+    )
+    strange = sorted({f"{s}={v}" for look in seen for s, v in look.items() if not _known(problem, s, v)})
+    text = f"unknown: {', '.join(strange[:3])}" if strange else f"{len(seen[-1])} symbols, all of the scene"
+    checks.append(Check("symbols", not strange and bool(seen[-1]), text))
+    moving = sorted({str(s) for look in seen for s in look.keys() | seen[0].keys() if look.get(s) != seen[0].get(s)})
+    text = f"changed with nothing done: {', '.join(moving[:3])}" if moving else "the same each time"
+    checks.append(Check("steadiness", not moving, text))
+    checks.append(Check("clock", after >= before, f"from {before:.3f} to {after:.3f} s"))
+    return seen[-1]
+
+
+def _known(problem: Problem, symbol: Symbol, value: str) -> bool:
+    kind = problem.domain.situations.get(symbol.situation)
+    if kind is None or len(kind.arguments) != len(symbol.arguments):
+        return False
+    members = zip(symbol.arguments, kind.arguments, strict=True)
+    if any(individual not in problem.classes.get(name, ()) for individual, name in members):
+        return False
+    if kind.quantity is not None:
+        return True
+    return value in (("true", "false") if kind.boolean else problem.classes.get(kind.range, ()))
+
+
+# ------------------------------------------------------------------------------------------------------------- execution
+
+
+def _refusal(world: Guarded, before: State) -> Check:
+    """Check that a primitive that doesn't exist fails, says so, and changes nothing."""
+    verdict = world.execute(Step((0,), 0, 1, "no such behaviour", ()))
+    after = world.observe()
+    changed = sorted(str(s) for s in after.keys() | before.keys() if after.get(s) != before.get(s))
+    if verdict.ok:
+        return Check("refusal", False, "a primitive that doesn't exist is reported as done")
+    if changed:
+        return Check("refusal", False, f"a primitive that doesn't exist changed {', '.join(changed[:3])}")
+    return Check(
+        "refusal", bool(verdict.code), f"a primitive that doesn't exist fails: {verdict.code} ({verdict.message})"
+    )
+
+
+def _stopped(
+    world: Guarded, problem: Problem, steps: Sequence[Step], within: float, checks: list[Check]
+) -> Sequence[Step]:
+    """Check that `stop` ends a primitive, and harms none that comes later; return the steps that are still to be executed."""
+    begin = perf_counter()
+    world.stop()
+    took = perf_counter() - begin
+    checks.append(Check("idle stop", took <= SOON, f"stop() with nothing running took {took * 1000:.0f} ms"))
+    if not steps:
+        checks.append(Check("cancellation", None, "no plan, so that nothing could be executed"))
+        return steps
+    answers: list[Verdict | Exception] = []
+    running = Thread(target=_noting(answers, lambda: world.execute(steps[0])), daemon=True)
+    running.start()
+    sleep(BEGUN)
+    if not running.is_alive():
+        checks.append(Check("cancellation", None, f"{steps[0]} took less than {BEGUN * 1000:.0f} ms"))
+    else:
+        begin = perf_counter()
+        world.stop()
+        asked = perf_counter() - begin
+        running.join(within)
+        took = perf_counter() - begin
+        if running.is_alive():
+            checks.append(Check("cancellation", False, f"{steps[0]} went on for {within:g} s after stop()"))
+            raise WorldError("execute() doesn't return after stop(), so that nothing else could be checked")
+        ended = answers[0]
+        if isinstance(ended, Exception):
+            raise ended
+        said = ended.code if not ended.ok else "done"
+        fine = asked <= SOON and (ended.ok or ended.code == INTERRUPTED)
+        checks.append(Check("cancellation", fine, f"execute() returned {took * 1000:.0f} ms after stop(): {said}"))
+    now = world.observe()
+    behavior = problem.domain.behaviors[steps[0].behavior]
+    left = successor(problem, behavior, steps[0].arguments, {**problem.initial, **now})
+    return steps if left is not None else steps[1:]
+
+
+def _noting(answers: list[Verdict | Exception], work: Callable[[], Verdict]) -> Callable[[], None]:
+    def run() -> None:
+        try:
+            answers.append(work())
+        except Exception as error:
+            answers.append(error)
+
+    return run
+
+
+def _executed(world: Guarded, problem: Problem, steps: Iterable[Step], checks: list[Check]) -> None:
+    """Check verdicts against observations, primitive by primitive."""
+    done, failed, lies, understated, nameless, times = 0, 0, list[str](), list[str](), list[str](), list[float]()
+    for step in steps:
+        before = {**problem.initial, **world.observe()}
+        expected = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, before)
+        if expected is None:
+            break  # an earlier one failed: the rest of the plan has no preconditions
+        begin = perf_counter()
+        verdict = world.execute(step)
+        times.append(perf_counter() - begin)
+        missing = _missing(problem, before, expected, world.observe())
+        if verdict.ok:
+            done += 1
+            lies += [f"{step}: {missing}"] if missing else []
+        else:
+            failed += 1
+            understated += [str(step)] if not missing else []
+            nameless += [str(step)] if not isinstance(verdict.code, str) or not verdict.code else []
+    longest = f", the longest in {max(times):.2f} s" if times else ""
+    checks.append(Check("execution", done > 0 or None, f"{done} primitives done, {failed} failed{longest}"))
+    text = f"done by the verdict, and not seen: {'; '.join(lies[:3])}" if lies else "what was reported as done was seen"
+    checks.append(Check("effects", not lies if done else None, text))
+    text = f"failed without a code: {', '.join(nameless[:3])}" if nameless else "every failure has a code"
+    checks.append(Check("failures", not nameless if failed else None, text if failed else "nothing failed"))
+    if understated:
+        checks.append(Check("understated", None, f"reported as failed, but done as seen: {', '.join(understated[:3])}"))
+
+
+def _missing(problem: Problem, before: State, expected: Mapping[Symbol, str], seen: State) -> str:
+    """Return the first expected change that was not seen, as text; amounts and unperceived symbols are left out."""
+    for symbol, value in sorted(expected.items()):
+        kind = problem.domain.situations[symbol.situation]
+        if before.get(symbol) == value or kind.quantity is not None:
+            continue
+        found = seen.get(symbol, FALSE if kind.boolean else None)
+        if found is not None and found != value:
+            return f"{symbol} is {found}, not {value}"
+    return ""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Check the robot of a scene; return the exit code."""
+    from confab.connecting import connected
+    from confab.reasoner.graph.knowledge import KnowledgeError
+    from confab.scene import load
+
+    if len(arguments) < 2:
+        print("wanted: python -m confab.testing SCENE INTERFACE:ADDRESS [GOAL …]", file=sys.stderr)
+        return 2
+    try:
+        scene: Any = load(arguments[0])
+        for goal in arguments[2:]:
+            scene = scene.with_goal(goal)
+        world, _ = connected(scene, scene.problem, arguments[1])
+    except KnowledgeError as error:
+        print(error, file=sys.stderr)
+        return 2
+    report = check_world(world, scene.problem)
+    print(report)
+    return 0 if report.passed else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

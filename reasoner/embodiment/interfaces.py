@@ -1,0 +1,164 @@
+"""Read the interfaces of robots from the knowledge graph: actions, arguments, answers, and readings of the world model.
+
+The vocabulary is that of ``ontology/embodiment.ttl``, section *Interfaces of robots*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import pyoxigraph as ox
+
+from confab.reasoner.embodiment.facts import EmbodimentError, rows
+from confab.reasoner.names import local_name, nearest
+
+INTERFACES = """
+SELECT DISTINCT ?node ?transport ?query ?attempts ?failures WHERE {
+  ?node a :Interface ; :transport ?transport .
+  OPTIONAL { ?node :sceneQuery ?query } OPTIONAL { ?node :attempts ?attempts } OPTIONAL { ?node :failures ?failures }
+} ORDER BY ?node"""
+ACTIONS = """
+SELECT DISTINCT ?node ?name ?seconds ?behavior WHERE {
+  ?interface :action ?node . ?node :actionName ?name ; :carriesOut ?behavior .
+  OPTIONAL { ?node :timeLimit ?seconds } FILTER(STR(?interface) = %s)
+} ORDER BY ?node ?behavior"""
+ARGUMENTS = """
+SELECT DISTINCT ?name ?position ?constant WHERE {
+  ?action :argument ?node . ?node :argumentName ?name FILTER(STR(?action) = %s)
+  OPTIONAL { ?node :constant ?constant }
+  OPTIONAL { ?node :takes ?parameter . ?behavior c:parameter ?parameter . FILTER(STR(?behavior) = %s)
+             { SELECT ?behavior ?parameter (COUNT(?before) AS ?position) WHERE {
+                 ?behavior c:parameter ?parameter . ?parameter c:index ?index .
+                 OPTIONAL { ?behavior c:parameter ?before . ?before c:index ?earlier FILTER(?earlier < ?index) }
+               } GROUP BY ?behavior ?parameter } }
+} ORDER BY ?name"""
+ANSWERS = """
+SELECT DISTINCT ?status ?success ?code ?situation WHERE {
+  ?interface :answer ?node . ?node :status ?status FILTER(STR(?interface) = %s)
+  OPTIONAL { ?node :success ?success } OPTIONAL { ?node :code ?code } OPTIONAL { ?node :refutedWhile ?situation }
+} ORDER BY ?status ?situation"""
+READINGS = """
+SELECT DISTINCT ?situation ?field ?absent ?step WHERE {
+  ?interface :reading ?node . ?node :reads ?situation ; :field ?field FILTER(STR(?interface) = %s)
+  OPTIONAL { ?node :valueIfAbsent ?absent } OPTIONAL { ?node :step ?step }
+} ORDER BY ?situation"""
+NAMES = "SELECT DISTINCT ?node ?name WHERE { ?node :robotName ?name } ORDER BY ?node ?name"
+
+TIME_LIMIT = 60.0
+"""Seconds after which an action that states no time limit is stopped."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """The action that carries out a behaviour. Of each argument: the position among the behaviour's parameters, or a constant."""
+
+    action: str
+    arguments: Mapping[str, int | str]
+    seconds: float = TIME_LIMIT
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a status means: success, or a failure code; and the situation types that must change before repeating makes sense."""
+
+    success: bool
+    code: str
+    refuted_while: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a situation type is read: the field of the entity that its first argument names."""
+
+    situation: str
+    field: str
+    absent: str | None = None
+    step: str | None = None
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The interface of a robot: calls by behaviour, meanings by status; `robot_names` has the names that differ from ours."""
+
+    iri: str
+    name: str
+    transport: str
+    calls: Mapping[str, Call]
+    meanings: Mapping[str, Meaning]
+    readings: tuple[Reading, ...]
+    robot_names: Mapping[str, str] = field(default_factory=dict)
+    scene_query: str = ""
+    attempts: int | None = None
+    failures: int | None = None
+
+
+def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) -> Interface:
+    """Return the interface of a name.
+
+    Parameters
+    ----------
+    store : pyoxigraph.Store
+        A scene, or an interface alone, with its imports.
+    names : callable
+        Function from an IRI to the short name that plans use.
+    wanted : str
+        Local name of the interface.
+
+    Raises
+    ------
+    EmbodimentError
+        There is no such interface, an argument has neither a parameter nor a constant, or a behaviour has two actions.
+    """
+    found = {local_name(row[0]): row for row in rows(store, INTERFACES)}
+    if wanted not in found:
+        known = f" (interfaces: {', '.join(found)})" if found else ", and no other interface; let the scene import one"
+        raise EmbodimentError(f"no interface '{wanted}'{nearest(wanted, found)}{known}")
+    iri, transport, query, attempts, failures = found[wanted]
+    calls: dict[str, Call] = {}
+    for node, action, seconds, behavior in rows(store, ACTIONS % _literal(iri)):
+        if names(behavior) in calls:
+            raise EmbodimentError(f"{behavior} has two actions of {wanted}; one of them is {node}", node)
+        arguments = {
+            name: _argument(node, name, position, constant)
+            for name, position, constant in rows(store, ARGUMENTS % (_literal(node), _literal(behavior)))
+        }
+        calls[names(behavior)] = Call(action, arguments, float(seconds or TIME_LIMIT))
+    meanings: dict[str, Meaning] = {}
+    for status, success, code, situation in rows(store, ANSWERS % _literal(iri)):
+        known_so_far = meanings[status].refuted_while if status in meanings else ()
+        meanings[status] = Meaning(
+            success == "true", code or status, (*known_so_far, names(situation)) if situation else known_so_far
+        )
+    readings = tuple(
+        Reading(names(situation), name, names(absent) if absent else None, step or None)
+        for situation, name, absent, step in rows(store, READINGS % _literal(iri))
+    )
+    renamed = {names(node): name for node, name in rows(store, NAMES)}
+    return Interface(
+        iri,
+        wanted,
+        transport,
+        calls,
+        meanings,
+        readings,
+        renamed,
+        query,
+        int(attempts) if attempts else None,
+        int(failures) if failures else None,
+    )
+
+
+def _argument(action: str, name: str, position: str, constant: str) -> int | str:
+    if position:
+        return int(position)
+    if constant:
+        return constant
+    raise EmbodimentError(
+        f"the argument {name} of {action} has neither a parameter of the behaviour nor a constant; state e:takes or e:constant",
+        action,
+    )
+
+
+def _literal(text: str) -> str:
+    return str(ox.Literal(text))

@@ -1,0 +1,215 @@
+"""The world of a robot that others control: an interface says what is called and read, a transport does it.
+
+Rule 1: nothing is believed that the world model doesn't show. What it shows and the scene doesn't know is left out.
+Rule 2: an action that takes longer than its time limit, or is stopped, is cancelled; its answer is ignored when it comes.
+Rule 3: a robot that doesn't answer a cancellation is busy, and is told nothing more until it has ended the action.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from fractions import Fraction
+from threading import Condition, Thread
+from time import monotonic
+from typing import Any, TypeVar
+
+from confab.planner.acting.world import INTERRUPTED, Report
+from confab.planner.plan import Step
+from confab.reasoner.amounts import written
+from confab.reasoner.embodiment.interfaces import Call, Interface, Reading
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
+from confab.sim.robots.transports import Model, RobotError, Transport
+
+GRACE = 5.0
+"""Seconds that a robot is given to end a cancelled action."""
+
+LOOKS = 3
+"""Number of times that the world model is asked for before the robot counts as out of reach."""
+
+T = TypeVar("T")
+
+
+class InterfaceWorld:
+    """A `World` (`confab.planner.acting.world`) of an interface and a transport.
+
+    Parameters
+    ----------
+    interface : Interface
+    transport : Transport
+    problem : Problem
+        Its symbols are perceived; its individuals are the ones that are known.
+    """
+
+    def __init__(self, interface: Interface, transport: Transport, problem: Problem) -> None:
+        self.interface, self.transport, self.problem = interface, transport, problem
+        self.begun = monotonic()
+        self.changed = Condition()
+        self.running: object | None = None
+        self.stopping = False
+        names = {individual for members in problem.classes.values() for individual in members}
+        self.robot_name = {name: interface.robot_names.get(name, name.rpartition(":")[2]) for name in sorted(names)}
+        self.own_name = {theirs: ours for ours, theirs in self.robot_name.items()}
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the world was connected."""
+        return monotonic() - self.begun
+
+    # --------------------------------------------------------------------------------------------------- perception
+
+    def observe(self) -> State:
+        """Return the facts that the world model shows.
+
+        Raises
+        ------
+        RobotError
+            The world model can't be had, or isn't one.
+        """
+        model = self._model()
+        return {symbol: value for reading in self.interface.readings for symbol, value in self._read(reading, model)}
+
+    def _model(self) -> Model:
+        for attempt in range(LOOKS):
+            try:
+                model = self.transport.model()
+                break
+            except RobotError:
+                if attempt == LOOKS - 1:
+                    raise
+        if not isinstance(model, Mapping) or not all(isinstance(fields, Mapping) for fields in model.values()):
+            raise RobotError(f"the world model of {self.interface.name} is {model!r:.60}; wanted fields by entity")
+        return model
+
+    def _read(self, reading: Reading, model: Model) -> Iterator[tuple[Symbol, str]]:
+        """Yield the symbols of a situation type with their values."""
+        kind = self.problem.domain.situations.get(reading.situation)
+        if kind is None:
+            return
+        for own in self.problem.classes.get(kind.arguments[0], ()):
+            fields = model.get(self.robot_name[own])
+            if fields is None or reading.field not in fields:
+                continue
+            shown = fields[reading.field]
+            if kind.boolean and len(kind.arguments) == 2:
+                listed = shown if isinstance(shown, list | tuple) else [shown]
+                second = {*self.problem.classes.get(kind.arguments[1], ())}
+                for other in filter(None, (self._own(one) for one in listed)):
+                    if other in second:
+                        yield Symbol(kind.name, (own, other)), TRUE
+            elif kind.boolean:
+                if isinstance(shown, bool):
+                    yield Symbol(kind.name, (own,)), TRUE if shown else FALSE
+            elif kind.quantity is not None:
+                if (amount := _amount(shown, reading.step)) is not None:
+                    yield Symbol(kind.name, (own,)), amount
+            else:
+                value = reading.absent if shown is None else self._own(shown)
+                if value is not None and value in self.problem.classes.get(kind.range, ()):
+                    yield Symbol(kind.name, (own,)), value
+
+    def _own(self, theirs: Any) -> str | None:
+        return self.own_name.get(theirs) if isinstance(theirs, str) else None
+
+    # --------------------------------------------------------------------------------------------------- action
+
+    def execute(self, step: Step) -> Report:
+        """Execute a primitive: call its action, and wait for the answer, for the time limit, or for `stop`."""
+        call = self.interface.calls.get(step.behavior)
+        if call is None:
+            return Report(False, "no action", (), f"no action of {self.interface.name} carries {step.behavior} out")
+        if not self._idle():
+            return Report(False, "busy", step.arguments, "the robot still executes an action that was cancelled")
+        arguments = {
+            name: self.robot_name.get(step.arguments[given], step.arguments[given]) if isinstance(given, int) else given
+            for name, given in call.arguments.items()
+        }
+        answers: list[tuple[str, str] | Exception] = []
+        self._begin(lambda: self.transport.call(call.action, arguments), answers)
+        ended = self._wait(lambda: bool(answers), call.seconds)
+        if not ended:
+            return self._cancelled(step, call)
+        answer = answers[0]
+        if isinstance(answer, Exception):
+            return Report(False, "no answer", step.arguments, str(answer))
+        return self._meaning(step, call, *answer)
+
+    def stop(self) -> None:
+        """Stop the running action."""
+        with self.changed:
+            self.stopping = self.running is not None
+            self.changed.notify_all()
+
+    def _begin(self, work: Callable[[], T], results: list[T | Exception]) -> None:
+        """Do some work in a thread of its own, and note its result or its exception."""
+        token = object()
+
+        def run() -> None:
+            try:
+                result: T | Exception = work()
+            except Exception as error:
+                result = error
+            with self.changed:
+                results.append(result)
+                if self.running is token:
+                    self.running = None
+                self.changed.notify_all()
+
+        with self.changed:
+            self.running, self.stopping = token, False
+        Thread(target=run, daemon=True, name=f"action of {self.interface.name}").start()
+
+    def _wait(self, over: Callable[[], bool], seconds: float) -> bool:
+        """Wait until something is over, time has passed, or the world is stopped; return whether it is over."""
+        with self.changed:
+            self.changed.wait_for(lambda: over() or self.stopping, seconds)
+            return over()
+
+    def _idle(self) -> bool:
+        """Return whether no action runs any more, after the time that a robot is given to end one."""
+        with self.changed:
+            return self.changed.wait_for(lambda: self.running is None, GRACE)
+
+    def _cancelled(self, step: Step, call: Call) -> Report:
+        """Cancel the running action and return why."""
+        stopped = self.stopping
+        ignored: list[Exception | None] = []
+        Thread(target=self._cancel, args=(ignored,), daemon=True, name=f"cancelling of {self.interface.name}").start()
+        idle = self._idle()
+        said = "" if idle else "; the robot didn't end it"
+        if stopped:
+            return Report(False, INTERRUPTED, step.arguments, f"it was stopped{said}")
+        return Report(False, "timed out", step.arguments, f"{call.action} took longer than {call.seconds:g} s{said}")
+
+    def _cancel(self, ignored: list[Exception | None]) -> None:
+        try:
+            self.transport.cancel()
+        except Exception as error:
+            ignored.append(error)
+
+    def _meaning(self, step: Step, call: Call, status: str, message: str) -> Report:
+        meaning = self.interface.meanings.get(status)
+        if meaning is None:
+            known = ", ".join(self.interface.meanings)
+            text = f"{call.action} was answered with the status '{status}', which {self.interface.name} doesn't have ({known})"
+            return Report(False, "unknown answer", step.arguments, text)
+        if meaning.success:
+            return Report(True)
+        facts: tuple[Fact, ...] = ()
+        if meaning.refuted_while:
+            facts = tuple(
+                Fact(symbol, value)
+                for symbol, value in self.observe().items()
+                if symbol.situation in meaning.refuted_while and symbol.arguments[0] in step.arguments
+            )
+        return Report(False, meaning.code, step.arguments, message or f"{call.action}: {status}", facts)
+
+
+def _amount(shown: Any, step: str | None) -> str | None:
+    """Return a number as amounts are written, rounded down to a multiple of `step`; None if it is no finite number."""
+    if isinstance(shown, bool) or not isinstance(shown, int | float) or not math.isfinite(shown):
+        return None
+    exact = Fraction(str(shown))
+    if step is not None and (grain := Fraction(step)) > 0:
+        exact = (exact / grain).__floor__() * grain
+    return written(exact)

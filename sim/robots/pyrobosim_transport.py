@@ -1,0 +1,188 @@
+"""pyrobosim as a robot: its actions, and its world as a model of entities and fields (the extra `pyrobosim` installs it)."""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections.abc import Iterator, Mapping
+from itertools import chain, product
+from pathlib import Path
+from typing import Any
+
+import networkx
+import numpy as np
+
+from confab.sim.robots.transports import Model, RobotError
+
+AS_FAST_AS_POSSIBLE = -1.0
+"""Factor of pyrobosim between simulated and real time."""
+
+DETOUR = 1.5
+"""Ratio of the longest path that a sampling planner finds to the shortest along the axes."""
+
+USES = ("navigate", "pick", "place", "open", "close", "detect")
+"""The kinds of battery usage that a world file states."""
+
+
+class Pyrobosim:
+    """A transport (`confab.sim.robots.transports.Transport`) to a simulated world without a window.
+
+    Parameters
+    ----------
+    where : str
+        World file (YAML).
+    seed : int
+        Seed of all failures, paths and samples.
+
+    Raises
+    ------
+    RobotError
+        pyrobosim isn't installed, or the file can't be read.
+    """
+
+    def __init__(self, where: str, seed: int = 0) -> None:
+        try:
+            logging.getLogger("pyrobosim").setLevel(logging.WARNING)
+            from pyrobosim.core.yaml_utils import WorldYamlLoader
+        except ImportError as error:
+            raise RobotError(f"pyrobosim isn't installed ({error}); pip install 'confab[pyrobosim]'") from error
+        random.seed(seed)
+        np.random.seed(seed % 2**32)
+        try:
+            self.world: Any = WorldYamlLoader().from_file(Path(where))
+        except Exception as error:
+            raise RobotError(f"{where}: pyrobosim can't read this world ({type(error).__name__}: {error})") from error
+        self.running: Any = None
+        self.searched: set[str] = set()
+        self._quiet()
+        for number, robot in enumerate(self.world.robots):
+            for kind, options in sorted(robot.action_execution_options.items()):
+                options.rng = np.random.default_rng([seed, number, *kind.encode()])
+
+    def _quiet(self) -> None:
+        """Let pyrobosim log nothing but errors: failures are told by verdicts."""
+        for owner in (self.world, *self.world.robots):
+            owner.logger.setLevel(logging.ERROR)
+
+    def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
+        """Let a robot, the argument `robot` or the only one, execute an action."""
+        from pyrobosim.planning.actions import TaskAction
+
+        robot = self._robot(arguments.get("robot", ""))
+        rest = {name: value for name, value in arguments.items() if name != "robot"}
+        try:
+            wanted = TaskAction(action, **rest)
+        except TypeError as error:
+            raise RobotError(f"pyrobosim's actions take no such argument: {error}") from error
+        self.running, robot.last_detected_objects = robot, None
+        try:
+            result = robot.execute_action(wanted, realtime_factor=AS_FAST_AS_POSSIBLE)
+        finally:
+            self.running = None
+        if result.is_success() and robot.last_detected_objects is not None:
+            self._note_search(robot)
+        return result.status.name, result.message or ""
+
+    def _note_search(self, robot: Any) -> None:
+        """Note that the robot has looked for things where it is, if it knows all that are there."""
+        there = {thing.name for thing in getattr(robot.location, "children", ())}
+        if there <= {thing.name for thing in robot.get_known_objects()}:
+            self.searched.add(robot.location.name)
+
+    def _robot(self, name: str) -> Any:
+        found = [robot for robot in self.world.robots if name in ("", robot.name)]
+        if not found:
+            known = ", ".join(robot.name for robot in self.world.robots)
+            raise RobotError(f"pyrobosim has no robot '{name}' (robots: {known})")
+        return found[0]
+
+    def cancel(self) -> None:
+        """End the running action."""
+        robot = self.running
+        if robot is not None:
+            robot.cancel_actions()
+
+    def model(self) -> Model:
+        """Return rooms, hallways, locations with their spawns, objects as far as the robots know them, robots, and ways."""
+        world = self.world
+        known = {thing.name for robot in world.robots for thing in robot.get_known_objects()}
+        spots = [spot for location in world.locations for spot in location.children]
+        found: dict[str, dict[str, Any]] = {}
+        for room in world.rooms:
+            found[room.name] = {"kind": "room"}
+        for hall in world.hallways:
+            ends = [hall.room_start.name, hall.room_end.name]
+            found[hall.name] = {"kind": "hallway", "open": hall.is_open, "locked": hall.is_locked, "rooms": ends}
+        for location in world.locations:
+            found[location.name] = {
+                "kind": "location",
+                "category": location.category,
+                "open": location.is_open,
+                "locked": location.is_locked,
+                "room": location.parent.name,
+            }
+        for spot in spots:
+            charger = spot.parent.is_charger
+            found[spot.name] = {"kind": "charger" if charger else "spot", "location": spot.parent.name}
+            found[spot.name]["room"] = spot.parent.parent.name
+        for thing in world.objects:
+            seen = thing.name in known
+            found[thing.name] = {
+                "kind": "object",
+                "category": thing.category,
+                "at": thing.parent.name if seen else None,
+                "may_be_at": [] if seen else [spot.name for spot in spots if spot.name not in self.searched],
+            }
+        for robot in world.robots:
+            options = robot.action_execution_options
+            found[robot.name] = {
+                "kind": "robot",
+                "at": getattr(robot.location, "name", None),
+                "room": self._room_of(robot),
+                "battery": float(robot.battery_level),
+                **{f"{kind}_use": options[kind].battery_usage if kind in options else 0.0 for kind in USES},
+            }
+        return found
+
+    def _room_of(self, robot: Any) -> str | None:
+        """Return the room of a robot; in a hallway, the one at the nearer end."""
+        here = robot.location
+        if hasattr(here, "room_start"):
+            place = robot.get_pose()
+            ends = [(here.nav_poses[0], here.room_start), (here.nav_poses[-1], here.room_end)]
+            return str(min(ends, key=lambda end: end[0].get_linear_distance(place))[1].name)
+        while here is not None and here not in self.world.rooms:
+            here = getattr(here, "parent", None)
+        return None if here is None else str(here.name)
+
+    def scene_model(self) -> Model:
+        """Return the model with the ways between rooms: the longest between any two of their places, in metres."""
+        return {**self.model(), **dict(self._ways())}
+
+    def _ways(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        world = self.world
+        graph: networkx.Graph[tuple[str, tuple[float, float]]] = networkx.Graph()
+        inside: dict[str, list[tuple[float, float]]] = {}
+        for room in world.rooms:
+            spots = (spot for location in room.locations for spot in location.children)
+            halls = world.get_hallways_attached_to_room(room)
+            poses = chain(room.nav_poses, *(each.nav_poses for each in chain(spots, halls)))
+            points = sorted({(round(pose.x, 3), round(pose.y, 3)) for pose in poses})
+            inside[room.name] = points or [tuple(room.centroid)]
+            for one, other in product(inside[room.name], repeat=2):
+                graph.add_edge((room.name, one), (room.name, other), way=_apart(one, other))
+        for hall in world.hallways:
+            ends = [(round(pose.x, 3), round(pose.y, 3)) for pose in (hall.nav_poses[0], hall.nav_poses[-1])]
+            for one, other in product(ends, repeat=2):
+                graph.add_edge((hall.room_start.name, one), (hall.room_end.name, other), way=_apart(one, other))
+        lengths = dict(networkx.all_pairs_dijkstra_path_length(graph, weight="way"))
+        for begin, end in product(sorted(inside), repeat=2):
+            ways = [lengths[begin, one].get((end, other), 0.0) for one, other in product(inside[begin], inside[end])]
+            yield (
+                f"way.{begin}.{end}",
+                {"kind": "way", "begin": begin, "end": end, "metres": round(DETOUR * max(ways), 1)},
+            )
+
+
+def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
+    return abs(one[0] - other[0]) + abs(one[1] - other[1])

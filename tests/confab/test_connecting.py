@@ -1,0 +1,251 @@
+"""Robots that others control: the protocol, the conformance test, interfaces as data, and a robot behind HTTP."""
+
+import asyncio
+import random
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.connecting import connected, scene_text
+from confab.execution import Execution, execute
+from confab.planner.acting.asynchronous import Synchronous
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.acting.world import INTERRUPTED, Report
+from confab.planner.plan import Step
+from confab.reasoner.embodiment.interfaces import read_interface
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import within
+from confab.reasoner.symbols import Problem, State
+from confab.scene import Scene
+from confab.sim.robots.adapter import InterfaceWorld
+from confab.sim.robots.http_transport import HttpRobot
+from confab.testing import check_world
+from tests.sim.robot_server import Fault, Robot, interface, served
+
+GOALS = ("ball THING_AT chest_inside", "chest OPEN false")
+CATALOG = """<?xml version="1.0"?><catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+<uri name="https://example.org/rover" uri="rover.ttl"/></catalog>"""
+
+
+@pytest.fixture(scope="module")
+def rover(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """Return the scene that the robot's own world model makes, with its interface."""
+    folder = tmp_path_factory.mktemp("rover")
+    (folder / "rover.ttl").write_text(interface())
+    (folder / "catalog-v001.xml").write_text(CATALOG)
+    alone = confab.load(str(folder / "rover.ttl"))
+    found = read_interface(alone.knowledge.store, alone.names.short, "rover")
+    (folder / "scene.ttl").write_text(scene_text(found, Robot().model(), "scene", "Two rooms")[0])
+    return confab.load(str(folder / "scene.ttl")).with_goal(*GOALS)
+
+
+@contextmanager
+def acting(scene: Scene, fault: Fault, seconds: float = 5.0) -> Iterator[tuple[InterfaceWorld, Robot]]:
+    """Yield the world of a served robot in which an action may take some seconds, and the robot."""
+    robot = Robot(fault)
+    with served(robot) as address:
+        world, _ = connected(scene, scene.problem, f"rover:{address}")
+        calls = {name: replace(call, seconds=seconds) for name, call in world.interface.calls.items()}
+        yield InterfaceWorld(replace(world.interface, calls=calls), HttpRobot(address), scene.problem), robot
+
+
+def fine(action: str, arguments: dict[str, str]) -> str:
+    return ""
+
+
+def run(scene: Scene, fault: Fault, seconds: float = 5.0) -> tuple[Execution, Robot]:
+    with acting(scene, fault, seconds) as (world, robot):
+        return execute(scene, scene.problem, world=world), robot
+
+
+# ------------------------------------------------------------------------------------------------------------- interfaces
+
+
+def test_a_robot_is_planned_for_and_driven_by_what_turtle_says_of_its_interface(rover: Scene) -> None:
+    with served(robot := Robot()) as address:
+        done = rover.execute(world=f"rover:{address}")
+    assert done.reached
+    assert robot.where["ball"] == "chest_inside"
+    assert not robot.open["chest"]
+    assert robot.called == len(done.episode.events)
+
+
+def test_a_robot_that_keeps_to_the_protocol_passes_every_check(rover: Scene) -> None:
+    with acting(rover, fine) as (world, _):
+        found = check_world(world, rover.problem)
+    assert found.passed, str(found)
+    assert found["execution"].passed
+    assert found["effects"].passed
+
+
+def test_a_lie_about_an_effect_is_found_and_not_believed(rover: Scene) -> None:
+    def lies(action: str, arguments: dict[str, str]) -> str:
+        return "lie" if action == "grab" else ""
+
+    with acting(rover, lies) as (world, _):
+        found = check_world(world, rover.problem)
+    assert not found.passed
+    assert "B2_PICK" in found["effects"].found
+    done, robot = run(rover, lies)
+    assert not done.reached
+    assert robot.where["ball"] == "shelf_top"
+    assert all(fact.value != "rover" for fact in done.episode.course if fact.symbol.situation == "THING_AT")
+
+
+def test_an_action_that_hangs_is_cancelled_at_its_time_limit(rover: Scene) -> None:
+    hung: list[str] = []
+
+    def hangs(action: str, arguments: dict[str, str]) -> str:
+        hung.append(action)
+        return "hang" if len(hung) == 2 else ""
+
+    done, _ = run(rover, hangs, seconds=0.2)
+    assert done.reached
+    assert [failure.code for failure in done.episode.failures] == ["timed out"]
+
+
+def test_the_deadline_of_a_call_stops_an_action_that_hangs(rover: Scene) -> None:
+    with within(1.0), acting(rover, lambda *_: "hang", seconds=60.0) as (world, robot):
+        begin = time.monotonic()
+        done = execute(rover, rover.problem, world=world)
+        assert time.monotonic() - begin < 5.0
+        assert robot.cancelled.is_set()
+    assert not done.reached
+
+
+def test_answers_that_say_nothing_are_failures_with_a_code(rover: Scene) -> None:
+    for wrong, code in (("half", "no answer"), ("garbage", "unknown answer"), ("refuse", "refused")):
+        once = iter([wrong])
+        done, _ = run(rover, lambda *_, once=once: next(once, ""))  # type: ignore[misc]  # a default closes over the loop
+        assert done.reached
+        assert [failure.code for failure in done.episode.failures] == [code]
+
+
+def test_a_world_model_that_cannot_be_read_ends_the_episode_with_its_reason(rover: Scene) -> None:
+    with acting(rover, fine) as (world, robot):
+        robot.garbled = True
+        done = execute(rover, rover.problem, world=world)
+    assert not done.reached
+    assert "no JSON" in done.summary()
+
+
+def test_what_the_model_names_and_the_scene_does_not_know_is_left_out(rover: Scene) -> None:
+    with acting(rover, fine) as (world, robot):
+        robot.where["ball"] = "moon"
+        robot.at = 17  # type: ignore[assignment]
+        seen = {str(symbol): value for symbol, value in world.observe().items()}
+    assert not any("ball" in symbol or "ROBOT_AT" in symbol for symbol in seen)
+    assert any("book" in symbol for symbol in seen)
+
+
+def test_with_random_faults_nothing_hangs_and_what_is_claimed_is_so(rover: Scene) -> None:
+    draw = random.Random(41)
+    actions = 0
+    for _ in range(12):
+
+        def faulty(action: str, arguments: dict[str, str]) -> str:
+            return draw.choice(["hang", "half", "lie", "garbage", "refuse", *[""] * 12])
+
+        done, robot = run(rover, faulty, seconds=0.1)
+        actions += robot.called
+        there = robot.where["ball"] == "chest_inside" and not robot.open["chest"]
+        assert done.reached == there, done.summary()
+    assert actions > 100
+
+
+def test_an_interface_that_is_not_there_or_lacks_an_action_is_refused_by_name(rover: Scene, tmp_path: Path) -> None:
+    for on, said in (
+        ("rovr:http://x", "did you mean 'rover'"),
+        ("rover", "INTERFACE:ADDRESS"),
+        ("rover:ftp://x", "no address"),
+    ):
+        with pytest.raises(KnowledgeError, match=said):
+            rover.execute(world=on)
+    lacking = (
+        interface()
+        .replace("e:carriesOut r:B2_PICK ;", "e:carriesOut r:B2_PLACE ;", 1)
+        .replace("e:carriesOut r:B2_PLACE ; e:argument :drop", "e:carriesOut r:B2_GO2 ; e:argument :drop")
+    )
+    (tmp_path / "rover.ttl").write_text(lacking)
+    (tmp_path / "catalog-v001.xml").write_text(CATALOG)
+    scene = Path(str(rover.iri.rsplit("/", 1)[-1])).name
+    alone = confab.load(str(tmp_path / "rover.ttl"))
+    assert scene
+    with pytest.raises(KnowledgeError, match="B2_PICK"):
+        connected(alone, alone.problem, "rover:http://127.0.0.1:1")
+
+
+# ------------------------------------------------------------------------------------------------------------- the protocol
+
+
+@dataclass
+class Slow:
+    """An asynchronous robot that moves symbols, and takes its time."""
+
+    problem: Problem
+    pause: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.inner = SymbolicWorld(self.problem)
+        self.ended = asyncio.Event()
+
+    @property
+    def seconds(self) -> float:
+        return self.inner.seconds
+
+    async def observe(self) -> State:
+        return self.inner.observe()
+
+    async def execute(self, step: Step) -> Report:
+        self.ended.clear()
+        try:
+            await asyncio.wait_for(self.ended.wait(), self.pause)
+        except asyncio.TimeoutError:
+            return self.inner.execute(step)
+        return Report(False, INTERRUPTED, step.arguments, "it was stopped")
+
+    async def stop(self) -> None:
+        self.ended.set()
+
+
+def test_an_asynchronous_robot_acts_and_passes_every_check() -> None:
+    scene = confab.load("beverage-serving")
+    with Synchronous(Slow(scene.problem, 0.002)) as world:
+        assert scene.execute(world=world).reached
+    with Synchronous(Slow(scene.problem, 0.1)) as world:
+        found = check_world(world, scene.problem, scene.plan().plan.primitives[:2])
+    assert found.passed, str(found)
+    assert "interrupted" in found["cancellation"].found
+
+
+def test_the_deadline_stops_an_asynchronous_robot() -> None:
+    scene = confab.load("beverage-serving")
+    with Synchronous(Slow(scene.problem, 60.0)) as world:
+        begin = time.monotonic()
+        done = scene.execute(world=world, time_limit=1.0)
+    assert time.monotonic() - begin < 5.0
+    assert not done.reached
+
+
+def test_a_world_that_does_not_stop_or_goes_backwards_fails_the_test() -> None:
+    problem = confab.load("beverage-serving").problem
+
+    class Stubborn(SymbolicWorld):
+        def execute(self, step: Step) -> Report:
+            time.sleep(0.4)
+            return super().execute(step)
+
+    found = check_world(Stubborn(problem), problem, stopped_within=0.1)
+    assert found["cancellation"].passed is False
+
+    class Backwards(SymbolicWorld):
+        def observe(self) -> State:
+            self.seconds -= 1.0
+            return super().observe()
+
+    assert check_world(Backwards(problem), problem)["clock"].passed is False
