@@ -189,6 +189,7 @@ def _turtle(iri: str, imported: ox.NamedNode, found: list[ox.Triple], title: str
         ox.Triple(ox.NamedNode(iri), ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
         ox.Triple(ox.NamedNode(iri), ox.NamedNode(OWL + "imports"), imported),
         ox.Triple(ox.NamedNode(iri), ox.NamedNode(DCTERMS + "title"), ox.Literal(title, language="en")),
+        ox.Triple(ox.NamedNode(iri), ox.NamedNode(CORE + "symbolicOnly"), ox.Literal(True)),
     ]
     labels = [
         ox.Triple(

@@ -34,14 +34,14 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, mend, replan, vanished
 from confab.planner.acting.step_trees import all_steps, first_chain, tree_of, without_first
-from confab.planner.acting.world import INTERRUPTED, Guarded, Verdict, World, WorldError
+from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Report, Verdict, World, WorldError
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.validation import open_goals, successor
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 
 @dataclass(frozen=True)
@@ -250,6 +250,9 @@ class _Run:
         verdict = self.world.execute(step)
         self.note_what_happened_by_the_clock()
         seen = self.world.observe()
+        if verdict.ok and self.without_effect(changes, seen):
+            text = f"{step} was reported as done, but {changes[0]} is not seen"
+            verdict = Report(False, WITHOUT_EFFECT, step.arguments, text)
         there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
         done = verdict.ok or (there and verdict.code != INTERRUPTED)
         surprises = self.look(expected if done else dict(before), seen)
@@ -264,6 +267,15 @@ class _Run:
         if len(record.events) >= self.most:
             self.give_up(Reason(f"stopped at the limit of {self.most} primitives"))
         return chain, before, verdict
+
+    def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
+        """Return whether some of the expected changes can be perceived, and none of these is seen."""
+        found = [
+            seen.get(fact.symbol, FALSE) == fact.value
+            for fact in changes
+            if fact.symbol in seen or self.belief.boolean(fact.symbol)
+        ]
+        return bool(found) and not any(found)
 
     def look(self, expected: dict[Symbol, str], seen: State | None = None) -> tuple[Surprise, ...]:
         """Observe the world if that isn't `seen` yet, believe what is seen, and return what isn't as expected."""

@@ -59,8 +59,8 @@ class SymbolicWorld:
             if happening.of_world:
                 self.disturb(happening)
                 disturbed = True
-        behavior = self.problem.domain.behaviors[step.behavior]
-        after = successor(self.problem, behavior, step.arguments, self.state)
+        behavior = self.problem.domain.behaviors.get(step.behavior)
+        after = None if behavior is None else successor(self.problem, behavior, step.arguments, self.state)
         if after is None:
             lost = "its precondition was lost in the meantime" if disturbed else "its precondition doesn't hold"
             return Report(False, INTERRUPTED if disturbed else "not applicable", step.arguments, lost)

@@ -27,6 +27,9 @@ logger = logging.getLogger(__name__)
 INTERRUPTED = "interrupted"
 """The code of a primitive that was stopped: no failure, so nothing is learned from it."""
 
+WITHOUT_EFFECT = "without effect"
+"""The code of a primitive that was reported as done, though none of its effects is seen."""
+
 
 class WorldError(Exception):
     """The world itself broke: it raised an exception, or answered with something that is no observation or verdict."""

@@ -140,20 +140,17 @@ def interface(name: str = "rover", seconds: float = 5.0) -> str:
             f"e:carriesOut {', '.join('r:' + one for one in behaviors.split())} ; e:argument {arguments} .\n"
         )
 
-    readings = (
-        ("THING_AT", "at"),
-        ("OPEN", "open"),
-        ("DOOR_OPEN", "open"),
-        ("ROBOT_AT", "at"),
-        ("ROBOT_IN", "room"),
-        ("BATTERY", "battery"),
-    )
+    readings = [("THING_AT", "at"), ("OPEN", "open"), ("DOOR_OPEN", "open"), ("ROBOT_AT", "at"), ("ROBOT_IN", "room")]
+    readings += [("BATTERY", "battery")]
     return (
-        f"""@prefix : <https://example.org/{name}#> . @prefix r: <https://w3id.org/confab/rooms#> . @prefix e: <https://w3id.org/confab/embodiment#> .
-@prefix owl: <http://www.w3.org/2002/07/owl#> .
-<https://example.org/{name}> a owl:Ontology ; owl:imports <https://w3id.org/confab/embodiment>, <https://w3id.org/confab/rooms> .
-:{name} a owl:NamedIndividual, e:Interface ; e:transport "http" ; e:sceneQuery "rooms-from-pyrobosim.rq" ; e:attempts 5 ; e:failures 40 ;
-  e:action :drive, :grab, :drop, :open, :close, :look ; e:answer :yes, :no, :stopped ; e:reading {", ".join(":read_" + s for s, _ in readings)} .
+        f"""@prefix : <https://example.org/{name}#> . @prefix r: <https://w3id.org/confab/rooms#> .
+@prefix e: <https://w3id.org/confab/embodiment#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+<https://example.org/{name}> a owl:Ontology ;
+  owl:imports <https://w3id.org/confab/embodiment>, <https://w3id.org/confab/rooms> .
+:{name} a owl:NamedIndividual, e:Interface ; e:transport "http" ; e:sceneQuery "rooms-from-pyrobosim.rq" ;
+  e:attempts 5 ; e:failures 40 ; e:answer :yes, :no, :stopped ;
+  e:action :drive, :grab, :drop, :open, :close, :look ;
+  e:reading {", ".join(":read_" + situation for situation, _ in readings)} .
 :yes a owl:NamedIndividual, e:Answer ; e:status "yes" ; e:success true .
 :no a owl:NamedIndividual, e:Answer ; e:status "no" ; e:code "refused" .
 :stopped a owl:NamedIndividual, e:Answer ; e:status "stopped" ; e:code "interrupted" .
