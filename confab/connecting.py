@@ -1,35 +1,20 @@
-"""Robots that others control, at the front desk: connected to a scene, and their world model made a scene."""
+"""Robots that others control, connected to a scene."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import pyoxigraph as ox
-
-from confab import ontology
 from confab.planner.acting.executive import Patience
 from confab.reasoner.embodiment.interfaces import Interface, read_interface
-from confab.reasoner.files import as_iri_part, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import IMPORTED, stamped
-from confab.reasoner.names import nearest
 from confab.reasoner.symbols import Problem
-from confab.reasoner.vocabulary import CORE, LABEL, OWL, RDF, RDFS, XSD
 from confab.sim.robots.adapter import InterfaceWorld
-from confab.sim.robots.transports import TRANSPORTS, Model, RobotError, Transport
+from confab.sim.robots.transport import RobotError, Transport
+from confab.sim.robots.transports import TRANSPORTS
 
 if TYPE_CHECKING:
     from confab.known import Known
-
-MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
-"""Namespaces of a world model in the scene query of an interface: of its fields, and of the entities that their texts name."""
-
-DCTERMS = "http://purl.org/dc/terms/"
-WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
-"""The interface that reads a world file, by the file's suffix."""
 
 FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml"
 
@@ -53,14 +38,14 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     KnowledgeError
         The text isn't of that form, the scene has no such interface, a primitive has no action, or the robot can't be reached.
     """
-    name, where = _parts(on)
+    name, where = parts_of(on)
     interface = read_interface(scene.knowledge.store, scene.names.short, name)
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     if lacking := [behavior.name for behavior in lowest if behavior.name not in interface.calls]:
         raise KnowledgeError(
             f"no action of {name} carries {', '.join(lacking)} out; state e:carriesOut of one of its actions"
         )
-    world = InterfaceWorld(interface, _reached(interface, where, seed), problem)
+    world = InterfaceWorld(interface, reached(interface, where, seed), problem)
     patience = Patience()
     return world, replace(
         patience,
@@ -69,85 +54,16 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     )
 
 
-def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
-    """Write a scene of a robot's world model as Turtle, and return the number of its individuals.
-
-    Parameters
-    ----------
-    on : str
-        ``INTERFACE:ADDRESS`` of a shipped interface, or a world file, whose suffix tells the interface.
-    path : Path
-        File to write.
-    seed : int
-        Of a simulated robot.
-    title : str, optional
-
-    Raises
-    ------
-    KnowledgeError
-        No such interface, or one without scene query; the robot can't be reached; its model makes no scene.
-    """
-    from confab.scene import load
-
-    name, where = (
-        (WORLD_FILES[Path(on).suffix], on) if Path(on).suffix in WORLD_FILES and Path(on).is_file() else _parts(on)
-    )
-    known = _interfaces()
-    if name not in known:
-        raise KnowledgeError(f"no interface '{name}'{nearest(name, known)} (interfaces: {', '.join(known)})")
-    domain = load(str(known[name]))
-    interface = read_interface(domain.knowledge.store, domain.names.short, name)
-    transport = _reached(interface, where, seed)
-    try:
-        model = getattr(transport, "scene_model", transport.model)()
-    except RobotError as error:
-        raise KnowledgeError(str(error)) from error
-    text, count = scene_text(interface, model, path.stem, title or f"World of {Path(where).name or where}")
-    write_whole(path, stamped(IMPORTED, [text]))
-    return count
-
-
-def scene_text(interface: Interface, model: Model, name: str, title: str) -> tuple[str, int]:
-    """Return the scene that the scene query of an interface makes of a world model, as Turtle, and its number of individuals.
-
-    Raises
-    ------
-    KnowledgeError
-        The interface has no scene query, or the query makes nothing of the model.
-    """
-    if not interface.scene_query:
-        raise KnowledgeError(f"{interface.name} has no e:sceneQuery, so its world model makes no scene")
-    iri = f"https://example.org/{as_iri_part(name)}"
-    store = ox.Store()
-    store.extend(ox.Quad(*triple) for triple in _triples(model, iri + "#"))
-    answer = store.query((ontology.ROOT / "alignments" / interface.scene_query).read_text(encoding="utf-8"))
-    if not isinstance(answer, ox.QueryTriples):
-        raise KnowledgeError(f"{interface.scene_query} is no CONSTRUCT query")
-    found = sorted(set(answer), key=str)
-    if not found:
-        raise KnowledgeError(f"{interface.scene_query} makes nothing of the world model of {interface.name}")
-    text = _turtle(iri, ox.NamedNode(interface.iri.rpartition("#")[0]), found, title)
-    return text, len({triple.subject for triple in found})
-
-
-def _parts(on: str) -> tuple[str, str]:
+def parts_of(on: str) -> tuple[str, str]:
+    """Return interface and address of ``INTERFACE:ADDRESS``; raise `KnowledgeError` if the text isn't of that form."""
     name, colon, where = on.partition(":")
     if not colon or not name or not where:
         raise KnowledgeError(f"'{on}' names no robot; {FORM}")
     return name, where
 
 
-def _interfaces() -> Mapping[str, Path]:
-    """Return the shipped interfaces: name to file."""
-    shipped = {iri.rsplit("/", 1)[-1]: path for iri, path in ontology.shipped().items()}
-    return {
-        name: path
-        for name, path in shipped.items()
-        if path.parent.name == "robots" and " e:Interface " in path.read_text(encoding="utf-8")
-    }
-
-
-def _reached(interface: Interface, where: str, seed: int) -> Transport:
+def reached(interface: Interface, where: str, seed: int) -> Transport:
+    """Return the connection to a robot; raise `KnowledgeError` if there is none."""
     if interface.transport not in TRANSPORTS:
         known = ", ".join(TRANSPORTS)
         raise KnowledgeError(f"{interface.name} has the e:transport '{interface.transport}'; wanted one of {known}")
@@ -155,53 +71,3 @@ def _reached(interface: Interface, where: str, seed: int) -> Transport:
         return TRANSPORTS[interface.transport](where, seed)
     except RobotError as error:
         raise KnowledgeError(str(error)) from error
-
-
-# ------------------------------------------------------------------------------------------------------------- world models
-
-
-def _triples(model: Model, namespace: str) -> Iterator[ox.Triple]:
-    """Yield a world model as triples: an individual for each entity, a property for each field."""
-    nodes = {entity: ox.NamedNode(namespace + as_iri_part(entity)) for entity in model}
-    for entity, fields in model.items():
-        for name, shown in fields.items():
-            for one in shown if isinstance(shown, list | tuple) else [shown]:
-                field_ = as_iri_part(name)
-                if (literal := _literal(one)) is not None:
-                    yield ox.Triple(nodes[entity], ox.NamedNode(MODEL + field_), literal)
-                if isinstance(one, str) and one in nodes:
-                    yield ox.Triple(nodes[entity], ox.NamedNode(LINK + field_), nodes[one])
-
-
-def _literal(shown: Any) -> ox.Literal | None:
-    if isinstance(shown, bool):
-        return ox.Literal("true" if shown else "false", datatype=ox.NamedNode(XSD + "boolean"))
-    if isinstance(shown, int | float):
-        return ox.Literal(f"{shown:.6f}", datatype=ox.NamedNode(XSD + "decimal"))
-    return ox.Literal(shown) if isinstance(shown, str) else None
-
-
-def _turtle(iri: str, imported: ox.NamedNode, found: list[ox.Triple], title: str) -> str:
-    """Return a scene's triples as Turtle, with a head and labels, all individuals different."""
-    individuals = sorted({str(triple.subject.value) for triple in found if isinstance(triple.subject, ox.NamedNode)})
-    things = [one for one in individuals if "." not in one.rpartition("#")[2]]
-    head = [
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(OWL + "imports"), imported),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(DCTERMS + "title"), ox.Literal(title, language="en")),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(CORE + "symbolicOnly"), ox.Literal(True)),
-    ]
-    labels = [
-        ox.Triple(
-            ox.NamedNode(one), ox.NamedNode(LABEL), ox.Literal(one.rpartition("#")[2].replace("_", " "), language="en")
-        )
-        for one in things
-    ]
-    spoken = {"": iri + "#", "owl": OWL, "rdfs": RDFS, "xsd": XSD, "c": CORE, "dcterms": DCTERMS}
-    terms = [term.value for triple in found for term in triple if isinstance(term, ox.NamedNode)]
-    for space in sorted({term.rpartition("#")[0] + "#" for term in terms} - {*spoken.values(), RDF}):
-        spoken[space.rstrip("#").rsplit("/", 1)[-1]] = space
-    body = ox.serialize([*head, *found, *labels], format=ox.RdfFormat.TURTLE, prefixes=spoken) or b""
-    members = " ".join(f":{one.rpartition('#')[2]}" for one in things)
-    different = f"\n[ a owl:AllDifferent ; owl:distinctMembers ( {members} ) ] .\n"
-    return body.decode("utf-8") + different

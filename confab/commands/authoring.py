@@ -207,7 +207,7 @@ def import_(source: str, problem: Path | None, out: Path, level: int, time_limit
         )
     with limited(time_limit):
         if problem is None:
-            from confab.connecting import scene_of_world
+            from confab.world_import import scene_of_world
 
             count = scene_of_world(source, turtle_path(out))
             print(f"{out}: {count} individuals; plan in it with: confab plan {out} --goal FACT")

@@ -19,7 +19,7 @@ from confab.planner.plan import Step
 from confab.reasoner.amounts import written
 from confab.reasoner.embodiment.interfaces import Call, Interface, Reading
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
-from confab.sim.robots.transports import Model, RobotError, Transport
+from confab.sim.robots.transport import Model, RobotError, Transport
 
 GRACE = 5.0
 """Seconds that a robot is given to end a cancelled action."""

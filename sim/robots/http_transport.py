@@ -20,20 +20,20 @@ from urllib.error import URLError
 from urllib.parse import urlsplit
 from urllib.request import Request, urlopen
 
-from confab.sim.robots.transports import Model, RobotError
+from confab.sim.robots.transport import Model, RobotError
 
 ANSWERS_WITHIN = 5.0
 """Seconds within which a server has to answer a question about its world, or a cancellation."""
 
 ACTION_WITHIN = 3600.0
-"""Seconds after which nobody listens for the answer to an action any more; its own time limit ends it long before."""
+"""Seconds after which the connection of an action is given up; the action's own time limit ends it long before."""
 
 MOST_BYTES = 20_000_000
 """Maximum size of an answer."""
 
 
 class HttpRobot:
-    """A transport (`confab.sim.robots.transports.Transport`) to a server.
+    """A transport (`confab.sim.robots.transport.Transport`) to a server.
 
     Parameters
     ----------

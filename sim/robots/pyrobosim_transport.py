@@ -12,7 +12,7 @@ from typing import Any
 import networkx
 import numpy as np
 
-from confab.sim.robots.transports import Model, RobotError
+from confab.sim.robots.transport import Model, RobotError
 
 AS_FAST_AS_POSSIBLE = -1.0
 """Factor of pyrobosim between simulated and real time."""
@@ -25,7 +25,7 @@ USES = ("navigate", "pick", "place", "open", "close", "detect")
 
 
 class Pyrobosim:
-    """A transport (`confab.sim.robots.transports.Transport`) to a simulated world without a window.
+    """A transport (`confab.sim.robots.transport.Transport`) to a simulated world without a window.
 
     Parameters
     ----------
@@ -42,16 +42,19 @@ class Pyrobosim:
 
     def __init__(self, where: str, seed: int = 0) -> None:
         try:
-            logging.getLogger("pyrobosim").setLevel(logging.WARNING)
             from pyrobosim.core.yaml_utils import WorldYamlLoader
         except ImportError as error:
             raise RobotError(f"pyrobosim isn't installed ({error}); pip install 'confab[pyrobosim]'") from error
         random.seed(seed)
         np.random.seed(seed % 2**32)
+        before = logging.root.manager.disable
         try:
+            logging.disable(logging.INFO)  # worlds and robots log while they are made, before they can be told not to
             self.world: Any = WorldYamlLoader().from_file(Path(where))
         except Exception as error:
             raise RobotError(f"{where}: pyrobosim can't read this world ({type(error).__name__}: {error})") from error
+        finally:
+            logging.disable(before)
         self.running: Any = None
         self.searched: set[str] = set()
         self._quiet()

@@ -1,29 +1,10 @@
-"""How the actions and the world model of a robot are reached: a table of transports, and what each of them offers."""
+"""The table of transports: how the actions and the world model of a robot are reached."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeAlias
 
-Model: TypeAlias = "Mapping[str, Mapping[str, Any]]"
-"""A robot's world model: by entity, by field, a text, number, truth value, list of texts, or None."""
-
-
-class RobotError(Exception):
-    """A robot can't be reached, or answers with something that can't be understood; the message says which."""
-
-
-class Transport(Protocol):
-    """The connection to a robot. `call` and `cancel` are called from different threads, all else is not."""
-
-    def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
-        """Execute an action and return its status and a message when it has ended; raise `RobotError` if there is no answer."""
-
-    def cancel(self) -> None:
-        """End the running action, so that `call` returns; raise `RobotError` if that can't be asked for."""
-
-    def model(self) -> Model:
-        """Return the world model as it is now; raise `RobotError` if there is none."""
+from confab.sim.robots.transport import Transport
 
 
 def pyrobosim(where: str, seed: int) -> Transport:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import confab
-from confab.connecting import connected, scene_text
+from confab.connecting import connected
 from confab.execution import Execution, execute
 from confab.planner.acting.asynchronous import Synchronous
 from confab.planner.acting.symbolic_world import SymbolicWorld
@@ -25,6 +25,7 @@ from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
 from confab.sim.robots.http_transport import HttpRobot
 from confab.testing import check_world
+from confab.world_import import scene_text
 from tests.sim.robot_server import Fault, Robot, interface, served
 
 GOALS = ("ball THING_AT chest_inside", "chest OPEN false")
@@ -159,7 +160,9 @@ def test_of_many_actions_with_random_faults_none_hangs_and_none_is_believed_unse
     with acting(rover, faulty, seconds=0.2) as (world, robot):
         for number in range(120):
             behavior = draw.choice(behaviors)
-            arguments = tuple(draw.choice(sorted(rover.problem.members(p.kind)) or ["none"]) for p in behavior.parameters)
+            arguments = tuple(
+                draw.choice(sorted(rover.problem.members(p.kind)) or ["none"]) for p in behavior.parameters
+            )
             begin = time.monotonic()
             said = world.execute(Step((number,), 0, 2, behavior.name, arguments))
             assert time.monotonic() - begin < 5.0
