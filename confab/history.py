@@ -152,7 +152,7 @@ def history_html(those: Sequence[Run], title: str) -> str:
     """Return the page on which runs are shown and compared."""
     from confab.page.frozen import page_html
 
-    shown = [{"name": run.name, "when": run.when, "memory": run.memory, "page": run.page} for run in those]
+    shown = [{"name": run.name, "when": run.when, "figures": run.figures(), "page": run.page} for run in those]
     return page_html({"title": title, "runs": shown}, title)
 
 

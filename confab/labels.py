@@ -146,7 +146,7 @@ def _joined(parts: Sequence[str]) -> str:
     return " ".join(words)
 
 
-def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem) -> Labels:
+def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others: Iterable[str] = ()) -> Labels:
     """Return the labels of a problem's behaviours, situation types, classes and individuals.
 
     Parameters
@@ -155,10 +155,12 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem) -> Labe
     names : Names
         Lead to the IRIs.
     problem : Problem
+    others : iterable of str
+        Names that the problem doesn't have: of furniture, say.
     """
     domain = problem.domain
     spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
-    spoken |= problem.individuals
+    spoken |= {*problem.individuals, *others}
     behaviors = domain.behaviors.values()
     spoken |= {term for b in behaviors for effect in b.effects for term in (*effect.arguments, effect.value)}
     properties = {names.short(text(row[0])): text(row[1]) for row in knowledge.select(PROPERTIES)}

@@ -272,11 +272,10 @@ def page_data(
     again : str, optional
         The command that repeats the run; derived from the other arguments by default.
     """
-    from confab.labels import labels_of
     from confab.show import summary
 
     problem = result.problem if result is not None else scene.problem
-    labels = labels_of(scene.knowledge, scene.names, problem)
+    labels = page_labels(scene, problem)
     outcome = result.outcome if result is not None else None
     planned = execution is not None or report is not None or (outcome is not None and outcome.plan is not None)
     timeline = _timeline(problem, result, report, execution)
@@ -307,6 +306,16 @@ def page_data(
         rules = [(goals, [str(rule) for rule in its]) for goals, its in learned.told(LEARNED)]
         data["learned"] = {"text": learned.said(), "rules": rules}
     return data
+
+
+def page_labels(scene: Known, problem: Problem) -> Labels:
+    """Return the displayed names of all that a problem names, and of furniture and robots."""
+    from confab.labels import labels_of
+
+    body = embodiment_of(scene)
+    others = [] if body is None else [fixture.name for fixture in body.fixtures]
+    others += [] if body is None else [*body.places, *(robot.name for robot in body.robots)]
+    return labels_of(scene.knowledge, scene.names, problem, others)
 
 
 def timeline_data(
@@ -501,7 +510,7 @@ def _steps(timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], s
             data |= {"begin": round(bar.begin, 3), "end": round(bar.end, 3)}
             if bar.ok is not None:
                 data["ok"] = bar.ok
-        if note := notes.get(step.path, "").strip("✓ "):
+        if note := notes.get(step.path, "").strip("✓✗ "):
             data["note"] = note
         if (because := why.get(step.path)) is not None:
             data |= {"gives": list(because.gives), "needs": list(because.needs)}

@@ -9,14 +9,14 @@ from pathlib import Path
 from string import Template
 
 from confab.page.data import PageData
-from confab.page.markup import asset
+from confab.page.markup import asset, script
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
     """Return the page as HTML text: with its data in it, or, if they are None, one that asks the server it came from."""
     content = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return Template(asset("page.html")).substitute(
-        title=escape(title), style=asset("page.css"), data=content, script=asset("page.js").replace("</", "<\\/")
+        title=escape(title), style=asset("page.css"), data=content, script=script()
     )
 
 

@@ -6,8 +6,8 @@ import threading
 from functools import cached_property
 
 from confab.known import Known
-from confab.labels import Labels, labels_of
-from confab.page.data import PageData, timeline_data
+from confab.labels import Labels
+from confab.page.data import PageData, page_labels, timeline_data
 from confab.page.timeline import Bar, Period, Timeline
 from confab.planner.acting.executive import Moment
 from confab.planner.plan import Step
@@ -31,7 +31,7 @@ class Following:
     @cached_property
     def labels(self) -> Labels:
         """Displayed names of all that the problem names."""
-        return labels_of(self.scene.knowledge, self.scene.names, self.problem)
+        return page_labels(self.scene, self.problem)
 
     @property
     def begun(self) -> bool:

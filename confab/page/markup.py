@@ -55,6 +55,13 @@ def asset(name: str) -> str:
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
+@cache
+def script() -> str:
+    """Return the page's script: the parts in the folder `script`, in their order, as one module."""
+    parts = sorted((Path(__file__).parent / "script").glob("*.js"))
+    return "\n".join(part.read_text(encoding="utf-8") for part in parts)
+
+
 def styled(*pieces: object) -> str:
     """Return pieces with their style for a notebook, without external files and without effect on the rest of the page."""
     return str(tag("div", tag("style", Markup(asset("page.css"))), *pieces, class_="confab"))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from confab.known import Known
 from confab.page.data import PageData
+from confab.page.markup import asset, script
 from confab.page.sheet import Sheet, turned_from
 from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -35,8 +35,8 @@ def board(scene: Known) -> anywidget.AnyWidget:
     class Board(anywidget.AnyWidget):
         """What the page shows and what was turned or asked on it: `turned` and `asked` are written by the page."""
 
-        _esm = Path(__file__).with_name("page.js")
-        _css = Path(__file__).with_name("page.css")
+        _esm = script()
+        _css = asset("page.css")
         data: Any = traitlets.Dict().tag(sync=True)
         turned: Any = traitlets.Dict().tag(sync=True)
         asked: Any = traitlets.Dict().tag(sync=True)

@@ -1,0 +1,35 @@
+// The page: map, lanes and plan follow one clock; facts are turned and queries asked where something answers (a server or a
+// notebook's kernel). It shows one JSON object (docs/page.md), wherever that comes from; `start` and `render` below say where.
+
+const FEW = 40, MANY = 200; // rows shown at first, and by each further click
+const natural = new Intl.Collator("en", { numeric: true }).compare;
+const GROUPS = {
+  levels: "the plan by level", actors: "who does what", changes: "what changes", wanted: "wanted, and so all the time", fixed: "never changes",
+};
+const TONES = [
+  ["action", "being done"], ["planned", "still to be done"], ["failed", "failed"], ["start", "as in the beginning"],
+  ["between", "neither that nor wanted"], ["wanted", "as wanted"],
+];
+
+const create = (element, attributes, inner) => {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(...inner.flat(3).filter((one) => one !== null && one !== undefined && one !== false));
+  return element;
+};
+const made = (name, attributes = {}, ...inner) => create(document.createElement(name), attributes, inner);
+const drawn = (name, attributes = {}, ...inner) => create(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, inner);
+const clear = (element, ...inner) => element.replaceChildren(...inner.flat(3).filter(Boolean));
+const lead = (id) => id.slice(0, Math.max(0, id.lastIndexOf(".")));
+const figure = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(1)).replace(/\.0$/, "");
+
+/** Elements for some values, a few at first; a button opens more of them. */
+const folded = (values, element, few = FEW, step = MANY) => {
+  const shown = values.slice(0, few).map(element), left = values.slice(few);
+  if (!left.length) return shown;
+  const more = made("button", { type: "button", class: "more", onclick: () => more.replaceWith(...folded(left, element, step, step)) }, `${left.length} more`);
+  return [...shown, more];
+};

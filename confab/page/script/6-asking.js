@@ -1,0 +1,29 @@
+/** A query, typed or chosen, and its rows. */
+const asking = (page) => {
+  const ready = page.data.queries || [], out = made("div", { class: "answer", "aria-live": "polite" });
+  const text = made("textarea", { rows: 6, spellcheck: "false", autocapitalize: "off", "aria-label": "SPARQL query", placeholder: "SELECT ?object ?place WHERE { ?object k:location ?place }" });
+  const ask = async () => {
+    clear(out, made("p", { class: "note" }, "asking …"));
+    const begun = performance.now();
+    try {
+      const answer = await page.link.ask(text.value), seconds = ((performance.now() - begun) / 1000).toFixed(2);
+      if (answer.problem) clear(out, made("p", { class: "bad", role: "alert" }, answer.problem));
+      else if (answer.text !== undefined) clear(out, made("pre", {}, answer.text));
+      else {
+        const line = (row) => made("tr", {}, row.map((cell) => made("td", { title: cell }, page.short(cell))));
+        const lines = (rows, few) => {
+          const left = rows.slice(few), more = left.length && made("tr", {}, made("td", { colspan: answer.columns.length || 1 }, made("button", { type: "button", class: "more", onclick: () => more.replaceWith(...lines(left, MANY)) }, `${left.length} more`)));
+          return [...rows.slice(0, few).map(line), ...(more ? [more] : [])];
+        };
+        clear(out, made("p", { class: "note" }, `${answer.rows.length} row${answer.rows.length === 1 ? "" : "s"} in ${seconds} s`),
+          made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, answer.columns.map((name) => made("th", { scope: "col" }, name)))), made("tbody", {}, lines(answer.rows, MANY)))));
+      }
+    } catch (error) { clear(out, made("p", { class: "bad", role: "alert" }, `nothing answers: ${error.message}`)); }
+  };
+  text.addEventListener("keydown", (event) => { if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) { event.preventDefault(); ask(); } });
+  const choose = made("select", { "aria-label": "ready questions", onchange: () => { const one = ready[choose.value]; if (one) { text.value = one.text; ask(); } } },
+    made("option", { value: "" }, "a ready question …"), ready.map((one, number) => made("option", { value: number }, one.question)));
+  return made("section", { class: "asking" }, made("h2", {}, "Ask in SPARQL"),
+    made("p", { class: "note" }, "Asked is the scene as it is in its files, and what was observed while the robot acts; what was turned above isn't in it."),
+    made("p", { class: "tools" }, choose), text, made("p", { class: "tools" }, made("button", { type: "button", onclick: ask }, "ask"), made("small", {}, " Ctrl+Enter")), out);
+};

@@ -1,0 +1,38 @@
+/** A folder of runs: one is shown, two are compared. */
+const history = (element, data) => {
+  const chosen = new Set(data.runs.length ? [data.runs.length - 1] : []), table = made("tbody", {}), out = made("div", {});
+  const names = [...new Set(data.runs.flatMap((run) => Object.keys(run.figures)))].filter((name) => name !== "verdict");
+  const value = (run, name) => run.figures[name] || "";
+  const rows = () => clear(table, data.runs.map((run, number) => made("tr", { class: chosen.has(number) ? "chosen" : "" },
+    made("td", {}, made("label", {}, made("input", { type: "checkbox", checked: chosen.has(number), "aria-label": `show ${run.name}`, onchange: (event) => {
+      if (event.target.checked) { chosen.add(number); if (chosen.size > 2) chosen.delete([...chosen][0]); } else chosen.delete(number);
+      rows();
+      show();
+    } }), ` ${run.name}`)), made("td", {}, run.page.title), made("td", {}, run.when), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
+    names.map((name) => made("td", {}, value(run, name))))));
+  const show = () => {
+    const two = [...chosen].sort((a, b) => a - b).map((number) => data.runs[number]);
+    clear(out);
+    if (two.length === 2) {
+      const [one, other] = two, top = (run) => run.page.steps.filter((step) => !step.id.includes(".")).map((step) => step.what);
+      const gone = top(one), fresh = top(other).filter((words) => { const at = gone.indexOf(words); if (at >= 0) gone.splice(at, 1); return at < 0; });
+      const line = (name, a, b) => made("tr", { class: a === b ? "" : "differs" }, made("th", { scope: "row" }, name), made("td", {}, a), made("td", {}, b));
+      out.append(made("section", {}, made("h2", {}, `${one.name} and ${other.name} compared`), made("div", { class: "scroll" }, made("table", {},
+        made("thead", {}, made("tr", {}, ["", one.name, other.name].map((words) => made("th", { scope: "col" }, words)))),
+        made("tbody", {}, line("verdict", one.page.status, other.page.status), names.map((name) => line(name, value(one, name), value(other, name)))))),
+      made("p", { class: "changes" }, gone.map((words) => made("del", {}, words)), fresh.map((words) => made("ins", {}, words)),
+        !gone.length && !fresh.length && made("span", { class: "note" }, "the steps of the first level are the same"))));
+    }
+    const end = Math.max(...two.map((run) => run.page.end));
+    for (const run of two) {
+      const root = made("div", { class: "run" });
+      out.append(root);
+      new Page(root, two.length === 2 ? { ...run.page, title: run.name, end } : run.page, null);
+    }
+  };
+  element.classList.add("confab");
+  clear(element, made("h1", {}, data.title), made("p", { class: "note" }, "One run is shown; two are compared."), made("div", { class: "scroll" }, made("table", { class: "runs" },
+    made("thead", {}, made("tr", {}, ["run", "scene", "when", "verdict", ...names].map((words) => made("th", { scope: "col" }, words)))), table)), out);
+  rows();
+  show();
+};
