@@ -341,8 +341,16 @@ class Execution:
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
-        """Write the episode as Turtle (PROV-O), whole or not at all, and return where."""
+        """Write the episode, whole or not at all, and return where: as JSON if the name ends so, else as Turtle (PROV-O)."""
         from confab.reasoner.memory.episodes import save_episode
+
+        if Path(path).suffix == ".json":
+            import json
+
+            from confab.reasoner.files import write_whole
+
+            write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
+            return Path(path)
 
         save_episode(Path(path), self.json(), self.scene.names)
         return Path(path)

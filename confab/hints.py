@@ -32,6 +32,8 @@ SCENE = {
     "to_pddl()": "pddl as_pddl get_pddl",
     "export": "write_pddl save_pddl",
     "to_unified_planning()": "unified_planning to_up",
+    "read_episode(FILE)": "load_episode open_episode parse_episode load_execution read_execution",
+    "read_report(FILE, PLAN)": "load_report load_verdicts read_verdicts load_verification",
     "read_plan(FILE)": "load_plan open_plan parse_plan",
     "affordances": "afforded afford possible_actions applicable applicable_actions",
     "graph()": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise",

@@ -84,7 +84,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
         raise KnowledgeError(
             f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene"
         )
-    return Plan(tuple(_step(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
+    return Plan(tuple(step_from(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
 
 
 def read_certificate(path: Path) -> Certificate:
@@ -142,7 +142,14 @@ def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, 
             raise KnowledgeError(f"{where}: '{argument}' is no {parameter.kind}{nearest(argument, members)}")
 
 
-def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
+def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
+    """Return a step with all below it from JSON data, which is at a position in the tree of the plan in a file.
+
+    Raises
+    ------
+    KnowledgeError
+        The data are no step, or name what the scene doesn't have; the message says where.
+    """
     where = f"{path}: step {'.'.join(map(str, position))}"
     if not isinstance(data, dict) or not isinstance(data.get("behavior"), str):
         raise KnowledgeError(f"{where}: wanted an object with 'behavior' and 'arguments'")
@@ -170,5 +177,5 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
         arguments=arguments,
         bindings={str(k): str(v) for k, v in bound.items()},
         rank=rank if isinstance(rank, float) and isfinite(rank) else None,
-        steps=tuple(_step(step, (*position, i), path, problem) for i, step in enumerate(below)),
+        steps=tuple(step_from(step, (*position, i), path, problem) for i, step in enumerate(below)),
     )

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from confab.planner.acting.executive import Moment
-from confab.reasoner.symbols import Symbol
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -21,18 +20,14 @@ LOG = 6
 
 @dataclass(repr=False)
 class View:
-    """What is shown of the last moment, and of what happened before; `known` is what holds now, as far as that was observed."""
+    """What is shown of the last moment, and of what happened before."""
 
     moment: Moment | None = None
     log: list[str] = field(default_factory=list)
-    known: dict[Symbol, str] = field(default_factory=dict)
 
     def take(self, moment: Moment) -> None:
         """Take note of a moment."""
         self.moment = moment
-        if moment.what == "end":
-            self.known |= {fact.symbol: fact.value for fact in moment.expected}
-            self.known |= {s.symbol: s.observed for s in moment.surprises if s.observed is not None}
         if moment.what == "intervention":
             self.log.append(f"✋ {moment.text}")
         elif moment.what == "discovery":

@@ -86,8 +86,12 @@ class Report:
             "status": "verified" if self.verified else "failed",
             "success": {"verified": self.good, "of": len(self.rollouts), "interval": interval, "poured": self.poured},
             "trusted": dict(self.trusted),
-            "rollouts": [rollout.as_json() for rollout in self.rollouts],
+            "rollouts": [{**rollout.as_json(), "seen": self._seen(rollout)} for rollout in self.rollouts],
         }
+
+    def _seen(self, rollout: Rollout) -> list[str]:
+        """Return what was seen in the end of the symbols that have a goal."""
+        return [str(Fact(symbol, rollout.state[symbol])) for symbol in sorted(self.goal) if symbol in rollout.state]
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return the verdict on each step, by the step's path, in the first rollout that isn't good, else in the first."""

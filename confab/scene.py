@@ -172,6 +172,30 @@ class Scene(Known):
         """
         return plan_of(path, self.problem)
 
+    def read_episode(self, path: str | Path) -> Execution:
+        """Return the execution in a JSON file that `Execution.save` or ``confab execute --json`` wrote.
+
+        Raises
+        ------
+        KnowledgeError
+            As `confab.saved.read_episode`.
+        """
+        from confab.saved import read_episode
+
+        return read_episode(self, Path(path))
+
+    def read_report(self, verdicts: str | Path, plan: AnyPlan) -> Report:
+        """Return the verification of a plan in a JSON file that ``confab verify --json`` or ``confab run`` wrote.
+
+        Raises
+        ------
+        KnowledgeError
+            As `confab.saved.read_report`.
+        """
+        from confab.saved import read_report
+
+        return read_report(self, Path(verdicts), plan_of(plan, self.problem))
+
     def to_pddl(self, level: int | None = None) -> tuple[str, str]:
         """Return one level, the lowest if none is given, as the texts of a PDDL domain and problem; `export` writes them.
 

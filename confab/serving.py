@@ -158,8 +158,11 @@ class Service:
         from confab.reasoner.reading.observed import assert_observed
 
         self.following.take(moment)
-        if self.following.known:
-            assert_observed(self.scene.knowledge, self.following.known, self.scene.names)
+        names, known = self.scene.names, self.following.known
+        strange = {one for symbol in known for one in symbol.arguments if one not in names}  # objects that were added
+        if known:
+            those = {s: v for s, v in known.items() if v not in strange and not strange.intersection(s.arguments)}
+            assert_observed(self.scene.knowledge, those, names)
             self.change += 1
 
     def close(self) -> None:

@@ -152,6 +152,8 @@ def _json(text: bytes) -> Kind | None:
             return Kind(PLAN)
         case {"status": _, "success": _, "rollouts": list()}:
             return Kind(VERDICTS)
+        case {"scene": _, "status": _, "events": list(), "course": list()}:
+            return Kind(EPISODE)
         case {"run": _, "when": _, "how": _, "page": _}:
             return Kind(RUN)
         case {"head": {"vars": list(names)}, "results": _}:

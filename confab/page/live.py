@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import cached_property
 
 from confab.known import Known
@@ -11,7 +12,7 @@ from confab.page.data import PageData, page_labels, timeline_data
 from confab.page.timeline import Bar, Period, Timeline
 from confab.planner.acting.executive import Moment
 from confab.planner.plan import Step
-from confab.reasoner.symbols import Symbol
+from confab.reasoner.symbols import Problem, Symbol
 
 
 class Following:
@@ -25,6 +26,7 @@ class Following:
         self._bars: list[Bar] = []
         self._marks: list[tuple[float, str]] = []
         self._moment: Moment | None = None
+        self._wanted = self.problem
         self._begun: tuple[Step, float] | None = None
         self._lock = threading.Lock()
 
@@ -42,6 +44,8 @@ class Following:
         """Take note of a moment."""
         with self._lock:
             self._moment, self.version = moment, self.version + 1
+            if moment.belief is not None:
+                self._believe(moment.belief, moment.seconds)
             if moment.what == "begin" and moment.step is not None:
                 self._begun = moment.step, moment.seconds
             elif moment.what == "end" and moment.step is not None:
@@ -50,16 +54,16 @@ class Following:
                 note = "; ".join(f"{s.symbol}: expected {s.expected}, seen {s.observed}" for s in moment.surprises)
                 self._bars.append(Bar(step, begin, moment.seconds, done, note))
                 self._begun = None
-                seen = {fact.symbol: fact.value for fact in moment.expected} if done else {}
-                seen |= {s.symbol: s.observed for s in moment.surprises if s.observed is not None}
-                for symbol, value in seen.items():
-                    self.known[symbol] = value
-                    periods = self._periods.setdefault(symbol, [])
-                    if not periods or periods[-1][1] != value:
-                        periods.append((moment.seconds, value))
             elif moment.what in ("intervention", "discovery", "repair", "replan"):
                 text = moment.text if moment.what in ("intervention", "discovery") else f"{moment.what}: {moment.text}"
                 self._marks.append((moment.seconds, text))
+
+    def _believe(self, belief: Problem, now: float) -> None:
+        """Note which symbols have another value than before, and what is wanted."""
+        for symbol, value in belief.initial.items():
+            if self.known.get(symbol) != value:
+                self._periods.setdefault(symbol, []).append((now, value))
+        self.known, self._wanted = dict(belief.initial), belief
 
     def data(self) -> PageData:
         """Return what the page shows now."""
@@ -67,7 +71,7 @@ class Following:
             moment, now = self._moment, self._moment.seconds if self._moment is not None else 0.0
             bars, marks = list(self._bars), tuple(self._marks)
             seen = {symbol: list(periods) for symbol, periods in self._periods.items()}
-            begun, version = self._begun, self.version
+            begun, version, wanted = self._begun, self.version, self._wanted
         assert moment is not None
         begun_path = None if begun is None else begun[0].path
         left = [s for s in moment.plan.primitives if s.path not in moment.done]
@@ -87,7 +91,8 @@ class Following:
         }
         final = {symbol: periods[-1][1] for symbol, periods in seen.items()}
         unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
-        timeline = Timeline(self.problem, moment.plan, tuple(bars), phases, at, unit, final, marks)
+        lived = replace(self.problem, goal=wanted.goal, classes=wanted.classes)
+        timeline = Timeline(lived, moment.plan, tuple(bars), phases, at, unit, final, marks)
         notes = {begun[0].path: "◀ being done"} if begun is not None else {}
         data = timeline_data(self.scene, timeline, self.labels, notes, reasons=False)
         done = sum(step.path in moment.done for step in moment.plan.primitives)

@@ -62,7 +62,10 @@ class Patience:
 
 @dataclass(frozen=True)
 class Moment:
-    """What a spectator is told: something happened, and this is how things stand; `seconds` is the time on the world's clock."""
+    """What a spectator is told: something happened, and this is how things stand.
+
+    `seconds` is the time on the world's clock, `belief` the task as it is believed to be, with the situation in its initial state.
+    """
 
     what: str  # plan, begin, end, intervention, discovery, repair, replan, over
     plan: Plan
@@ -72,6 +75,7 @@ class Moment:
     surprises: tuple[Surprise, ...] = ()
     text: str = ""
     seconds: float = 0.0
+    belief: Problem | None = None
 
 
 def act(
@@ -226,7 +230,9 @@ class _Run:
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
-        self.tell(Moment(what, whole, frozenset(done), step, tuple(expected), surprises, text, clock))
+        self.tell(
+            Moment(what, whole, frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
+        )
 
     # --------------------------------------------------------------------------------------------------- acting
 

@@ -124,7 +124,7 @@ def test_the_map_has_furniture_connections_or_order(pages: dict[str, PageData], 
     assert "lines are what connects them" in house["note"]
     assert ("hall", "kitchen") in [tuple(way) for way in house["ways"]]
     assert "map" not in pages["towers-small"]
-    assert pages["plan"]["map"]["areas"][0]["label"] == "table"
+    assert pages["plan"]["map"]["areas"][0]["label"] == "table top"
     (cup,) = (thing for thing in pages["plan"]["map"]["things"] if thing["id"] == "cup1")
     assert [place for _, place, _, _ in cup["at"]] == ["location2", "", "location7"]
     made = confab.generate("served", tmp_path / "served.ttl", objects=6)

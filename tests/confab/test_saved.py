@@ -1,0 +1,69 @@
+"""What was saved is read again: an episode and verdicts come back as they were, and what is none is refused in a sentence."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.sim.verdict import Verdict
+from confab.sim.verify import Rollout, StepReport
+
+PEOPLE = (
+    "after=28 cup2 LOCATION location8",
+    "after=28 add Cup cup9 LOCATION location2 BEVERAGE no_beverage",
+    "after=99 cup1 LOCATION location6",
+)
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+def test_an_episode_comes_back_as_it_was_saved(scene: confab.Scene, tmp_path: Path) -> None:
+    done = scene.execute(interventions=PEOPLE)
+    again = scene.read_episode(done.save(tmp_path / "episode.json"))
+    assert again.json() == done.json()
+    assert (again.summary(), again.reached) == (done.summary(), True)
+    assert again.episode.observed == done.episode.observed
+    assert again.report(tmp_path / "page.html").is_file()
+    assert scene.execute(interventions=PEOPLE).save(tmp_path / "episode.json").is_file()  # its kind is known
+
+
+def test_verdicts_come_back_as_they_were_saved(scene: confab.Scene, tmp_path: Path) -> None:
+    plan = scene.plan()
+    steps = [StepReport(step, Verdict(True, measured={"lag": 0.5}), 1.0) for step in plan.plan.primitives]
+    lost = Verdict(False, "slip or drop", ("cup2",), {"lag": 0.0863}, "it was lost")
+    seen = {symbol: "location8" for symbol in scene.problem.goal if symbol.situation == "LOCATION"}
+    rollouts = (
+        Rollout(3, False, (*steps[:2], StepReport(plan.plan.primitives[2], lost, 0.5)), (0.9,), 1.0, 2.5),
+        Rollout(4, True, tuple(steps), (), 1.0, 2.5, seen),
+    )
+    report = confab.Report(plan.plan, scene.problem.goal, rollouts, None, {"HAND_TILT": 2}, scene)
+    file = tmp_path / "verify.json"
+    file.write_text(json.dumps(report.json()))
+    again = scene.read_report(file, plan)
+    assert again.json() == report.json()
+    assert (again.summary(), again.good, again.verified) == (report.summary(), 0, False)
+    with pytest.raises(confab.KnowledgeError, match="give the plan that was verified"):
+        scene.read_report(file, scene.plan("cup1 LOCATION location6"))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", "3", '{"scene": 1}', '{"rollouts": [3]}', '{"rollouts": [], "trusted": {}}']
+)
+def test_what_is_neither_is_refused_in_a_sentence(scene: confab.Scene, text: str, tmp_path: Path) -> None:
+    file = tmp_path / "wrong.json"
+    file.write_text(text)
+    for read in (lambda: scene.read_episode(file), lambda: scene.read_report(file, scene.plan())):
+        with pytest.raises(confab.KnowledgeError, match=r"wrong\.json: "):
+            read()
+
+
+def test_an_episode_of_another_scene_or_in_turtle_is_refused(scene: confab.Scene, tmp_path: Path) -> None:
+    done = confab.load("towers-small").execute()
+    with pytest.raises(confab.KnowledgeError, match="load that scene"):
+        scene.read_episode(done.save(tmp_path / "towers.json"))
+    with pytest.raises(confab.KnowledgeError, match="with_episodes"):
+        scene.read_episode(done.save(tmp_path / "towers.ttl"))
