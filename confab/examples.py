@@ -78,7 +78,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab convert mine.ttl --behaviors sparql",
         "confab convert mine.ttl --behaviors individuals -o mine.ttl",
     ),
-    "export": ("confab export towers-small -o towers",),
+    "export": (
+        "confab export towers-small -o towers",
+        "confab export beverage-serving --trajectory -o serving.yaml",
+    ),
 }
 
 

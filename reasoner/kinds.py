@@ -25,6 +25,7 @@ MAKER = "Made by Confab"
 REPORT, PICTURE, FILM = "a report", "a picture", "a film"
 PLAN, VERDICTS, ROWS, TRIPLES = "a plan", "verdicts", "rows of a query", "triples of a query"
 MEMORY, EPISODE, OBSERVED, REACH = "a memory", "an episode", "observed facts", "facts of what hands reach"
+TRAJECTORIES = "trajectories"
 GENERATED, IMPORTED, CONVERTED, CONSTRUCTED = (
     "a generated scene",
     "an imported scene",
@@ -156,6 +157,8 @@ def _json(text: bytes) -> Kind | None:
             return Kind(EPISODE)
         case {"run": _, "when": _, "how": _, "page": _}:
             return Kind(RUN)
+        case {"scene": _, "rate": _, "primitives": list()}:
+            return Kind(TRAJECTORIES)
         case {"head": {"vars": list(names)}, "results": _}:
             return Kind(ROWS, columns=tuple(map(str, names)))
         case bool() | [] | {"head": _, "boolean": _}:

@@ -16,11 +16,14 @@ import pybullet
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.symbolic_world import met, shared_kinds
 from confab.reasoner.embodiment.values import PerceiverUse, Place
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.sim.attempt import CLOSE
 from confab.sim.bodies import outer_radius
+from confab.sim.engine import NEAR_PLACE
 from confab.sim.perception import tilt_of
 from confab.sim.reach import reach
 from confab.sim.urdf import Array
+from confab.sim.whereabouts import LEVEL
 from confab.sim.world import World
 
 REST = 0.05
@@ -60,7 +63,7 @@ class Lookout:
         for symbol in list(self.world.symbols):
             use = self.world.embodiment.perceivers[symbol.situation]
             if use.perceiver == "perceive_place" and self._astray(symbol, use):
-                self._add_spot(symbol.arguments[0])
+                self._add_spot(symbol)
         return len(self.news) > before
 
     def why_unplaced(self, name: str) -> str:
@@ -101,6 +104,9 @@ class Lookout:
         wide = f"{width * 100:.0f} cm wide; hands open to {widest * 100:.0f} cm"
         text = f"{name}, of which no fact speaks, is {width * 100:.0f} cm wide"
         found = Discovery(name, tuple(sorted(kinds)), fixed=wide if width >= widest else "", text=text)
+        for place in (place for place in world.embodiment.places if self._is_at(name, place)):
+            symbols = (Symbol(s.name, (name,)) for s in wheres if uses[s.name].perceiver == "perceive_place")
+            found = replace(found, blocked=self._covered(name, place), by=Fact(next(symbols), place))
         self.problem = met(problem, found)
         classes = self.problem.classes
         world.symbols = [
@@ -130,9 +136,28 @@ class Lookout:
         gaps = [base - world.place(place) for place in world.embodiment.places]
         return not any(abs(gap[2]) < height and np.hypot(*gap[:2]) < near for gap in gaps)
 
-    def _add_spot(self, name: str) -> None:
-        """Discover the spot at which an object stands."""
+    def _is_at(self, name: str, place: str) -> bool:
+        """Return whether a thing stands at a place."""
+        gap = self.world.sense(name)[1] - self.world.place(place)
+        return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
+
+    def _covered(self, name: str, own: str) -> tuple[str, ...]:
+        """Return the places but `own` at which no object of the scene has room beside a thing, as motions are planned."""
         world = self.world
+        base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
+        least = (
+            min(outer_radius(thing.shape) for other, thing in world.bodies.items() if other != name)
+            if len(world.bodies) > 1
+            else 0.0
+        )
+        near = {place: base - world.place(place) for place in world.embodiment.places if place != own}
+        return tuple(
+            place for place, gap in near.items() if abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < radius + least + CLOSE
+        )
+
+    def _add_spot(self, symbol: Symbol) -> None:
+        """Discover the spot at which an object stands."""
+        world, name = self.world, symbol.arguments[0]
         base = world.sense(name)[1]
         carrier, away = self._support(name), world.nearest_place(base)
         spot = self._spot(base, carrier, world.bodies[name].shape.grasp_height)
@@ -140,8 +165,11 @@ class Lookout:
         text = f"{name} stands {away[1] * 100:.0f} cm from {away[0]}: {spot.individual}"
         if self.reaching:
             text += f", reached by {' and '.join(hands) or 'no hand'}"
-        self._adopted(replace(spot, text=text))
-        self.news.append(replace(spot, text=text))
+        blocked = self._covered(name, spot.individual)
+        if blocked:
+            text += f"; there is no room at {' and '.join(blocked)}"
+        by = Fact(symbol, spot.individual)
+        self.news.append(self._adopted(replace(spot, text=text, blocked=blocked, by=by)))
 
     def _adopted(self, spot: Discovery) -> Discovery:
         self.problem = met(self.problem, spot)
@@ -165,8 +193,9 @@ class Lookout:
         beside = self._beside(point, carrier, fixed)
         turned, origin = world.carrier(carrier)
         x, y, z = turned.T @ (point - origin)
-        stand = embodiment.places[beside].stand if beside else ""
-        place = Place(name, (float(x), float(y), float(z)), carrier, stand)
+        neighbour = embodiment.places[beside] if beside else Place("", (0.0, 0.0, 0.0))
+        stand, height = neighbour.stand, neighbour.height or height
+        place = Place(name, (float(x), float(y), float(z)), carrier, stand, neighbour.height)
         world.embodiment = replace(embodiment, places={**embodiment.places, name: place})
         shared = [
             (relation, tuple(name if one == beside else one for one in row))

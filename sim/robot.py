@@ -47,7 +47,8 @@ class Manipulator:
 
     `posture` is the arm's last command. `grasp` is the rotation and position of the held object in the hand at the grasp, the
     reference for slip. `limit` is the time limit in seconds of the running skill, `deadline` the simulation step at which it
-    expires. `pace` is the share of its speeds that the arm uses. `at` is where its motions have brought the hand.
+    expires. `pace` is the share of its speeds that the arm uses. `at` is where its motions have brought the hand. `opened_to` is
+    the last command of the fingers in metres.
     """
 
     client: int
@@ -68,6 +69,7 @@ class Manipulator:
     limit: float = math.inf
     deadline: float = math.inf
     at: Whereabouts = Whereabouts()
+    opened_to: float = 0.0
 
     @property
     def limits(self) -> MotionLimits:
@@ -141,6 +143,7 @@ class Manipulator:
         )
 
     def _fingers_to(self, opening: float) -> None:
+        self.opened_to = opening
         for joint in self.fingers:
             pybullet.setJointMotorControl2(
                 self.body,

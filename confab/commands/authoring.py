@@ -21,7 +21,7 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE
+from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, TRAJECTORIES
 from confab.terminal import NO, YES, limited, remark, show_result, told
 
 
@@ -221,13 +221,50 @@ def import_(source: str, problem: Path | None, out: Path, level: int, time_limit
 
 @command(epilog=examples("export"))
 @SCENE
-@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="OUT", help="Folder, or file, to write.")
 @click.option("--level", type=int, help="Level to export; the lowest if not given.")
+@click.option(
+    "--trajectory",
+    is_flag=True,
+    help="Instead the joint paths of a plan, verified in physics, into a .json or .yaml file.",
+)
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="The plan whose trajectories are written.")
+@click.option("--both-hands", is_flag=True, help="Trajectories with all hands at once.")
+@SEED
 @TIME_LIMIT
-def export(scene: str, out: Path, level: int | None, time_limit: float | None) -> None:
-    """Write one level of a scene as PDDL, for other planners."""
-    from confab.pddl_commands import export_pddl
+def export(
+    scene: str,
+    out: Path,
+    level: int | None,
+    trajectory: bool,
+    plan: Path | None,
+    both_hands: bool,
+    seed: int,
+    time_limit: float | None,
+) -> None:
+    """Write one level of a scene as PDDL, or the trajectories of a plan."""
+    from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load
+
+    if trajectory:
+        from confab.commands.given import load_scene, plan_in
+        from confab.reasoner.files import check_replaceable
+        from confab.trajectories import FORMATS, trajectories, write_trajectories
+
+        if out.suffix not in FORMATS:
+            raise KnowledgeError(f"{out}: wanted a name that ends in {', '.join(FORMATS)}")
+        if level is not None:
+            raise KnowledgeError("--level is of PDDL; trajectories are those of primitives")
+        check_replaceable(out, TRAJECTORIES)
+        with limited(time_limit):
+            loaded = load_scene(scene)
+            data = trajectories(loaded, None if plan is None else plan_in(plan, loaded), seed, both_hands)
+        write_trajectories(out, data)
+        print(f"{out}: trajectories of {len(data['primitives'])} primitives, verified with seed {seed}")
+        return
+    if plan is not None or both_hands:
+        raise KnowledgeError("--plan and --both-hands are of trajectories; add --trajectory")
+    from confab.pddl_commands import export_pddl
 
     with limited(time_limit):
         paths = export_pddl(load(scene).problem, level, out)

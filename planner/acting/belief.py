@@ -12,7 +12,20 @@ from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.validation import successor
 from confab.reasoner.refutations import Refutation, with_refuted
-from confab.reasoner.symbols import FALSE, Problem, State, Symbol, ValueEffect
+from confab.reasoner.symbols import (
+    FALSE,
+    AnyOf,
+    Behavior,
+    Condition,
+    EqualityCondition,
+    Fact,
+    Parameter,
+    Problem,
+    State,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+)
 
 
 @dataclass
@@ -91,7 +104,9 @@ class Belief:
         self.problem, self.certain = met(self.problem, found), met(self.certain, found)
         if found.fixed:
             self.obstacles[found.individual] = found
-            self.certain = with_refuted(self.certain, _moving(self.certain, found))
+            self.certain = _with_obstacle(self.certain, found.individual)
+        if found.by is not None:
+            self.certain = _without_room(self.certain, found.blocked, found.by)
         self._apply_doubts()
 
     def without_obstacles(self, goal: Mapping[Symbol, str]) -> Problem:
@@ -118,12 +133,45 @@ class Belief:
         self.using = compiled(self.problem)
 
 
-def _moving(problem: Problem, found: Discovery) -> Iterable[Refutation]:
-    """Yield the refutations of all behaviours that would move or take a fixed thing."""
+def _with_obstacle(problem: Problem, individual: str) -> Problem:
+    """Return the problem in which no behaviour takes hold of an individual, or changes where it is."""
+    behaviors = {}
     for behavior in problem.domain.behaviors.values():
-        values = (effect for effect in behavior.effects if isinstance(effect, ValueEffect))
+        values = [effect for effect in behavior.effects if isinstance(effect, ValueEffect)]
         changed = {term for effect in values for term in (*effect.arguments, effect.value)}
-        for parameter in behavior.parameters:
-            if parameter.name in changed and found.individual in problem.classes.get(parameter.kind, ()):
-                arguments = tuple(found.individual if p is parameter else "" for p in behavior.parameters)
-                yield Refutation(behavior.name, arguments, (), found.fixed)
+        never: list[tuple[Condition, ...]] = [
+            (EqualityCondition(one.name, individual),)
+            for one in _terms(behavior)
+            if one.name in changed and individual in problem.classes.get(one.kind, ())
+        ]
+        behaviors[behavior.name] = _excluding(behavior, never)
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
+
+
+def _without_room(problem: Problem, places: Iterable[str], by: Fact) -> Problem:
+    """Return the problem in which no behaviour brings another object to some places while a fact holds."""
+    occupant, behaviors = by.symbol.arguments[0], {}
+    holds = ValueCondition(by.symbol.situation, by.symbol.arguments, by.value)
+    for behavior in problem.domain.behaviors.values():
+        kinds = {one.name: one.kind for one in _terms(behavior)}
+        never: list[tuple[Condition, ...]] = [
+            (EqualityCondition(effect.value, place), EqualityCondition(effect.arguments[0], occupant, True), holds)
+            for effect in behavior.effects
+            for place in places
+            if isinstance(effect, ValueEffect) and effect.situation == by.symbol.situation
+            if effect.arguments[0] in kinds and place in problem.classes.get(kinds.get(effect.value, ""), ())
+        ]
+        behaviors[behavior.name] = _excluding(behavior, never)
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
+
+
+def _terms(behavior: Behavior) -> Iterable[Parameter]:
+    """Return the parameters of a behaviour, and the variables that its preconditions determine."""
+    determined = {c.value for c in behavior.preconditions if isinstance(c, ValueCondition) and not c.negated}
+    return (*behavior.parameters, *(one for one in behavior.variables if one.name in determined))
+
+
+def _excluding(behavior: Behavior, never: Iterable[tuple[Condition, ...]]) -> Behavior:
+    """Return a behaviour with the additional preconditions that none of some conjunctions holds."""
+    new = [AnyOf((together,), negated=True) for together in never]
+    return replace(behavior, preconditions=(*behavior.preconditions, *new)) if new else behavior

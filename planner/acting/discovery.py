@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from confab.reasoner.symbols import Fact
+
 
 @dataclass(frozen=True)
 class Discovery:
@@ -18,6 +20,9 @@ class Discovery:
         Static facts about it.
     fixed : str
         Why nothing can move it, if that is so.
+    blocked : tuple of str
+        Places at which nothing else has room as long as the fact `by` holds.
+    by : Fact, optional
     text : str
         What it is, and where, in words.
     """
@@ -26,4 +31,6 @@ class Discovery:
     kinds: tuple[str, ...]
     relations: tuple[tuple[str, tuple[str, ...]], ...] = ()
     fixed: str = ""
+    blocked: tuple[str, ...] = ()
+    by: Fact | None = None
     text: str = ""

@@ -3,6 +3,7 @@
 belief    the situation as last seen, the goal as it is now, and what failures have taught about what is possible
 agenda    the steps that are still to be done; the first may be partly done
 expected  what the next observation should show
+aside     goals that are impossible as things stand; wanted again when something unexpected is seen
 put off   goals that can't be reached as long as doubts hold; tried again when everything else is done
 
 Rule 1: no primitive is begun whose precondition doesn't hold in the last observation.
@@ -159,6 +160,7 @@ class _Run:
     puzzled: str = ""
     begun: dict[tuple[int, ...], State] = field(default_factory=dict)
     attempts: Counter[tuple[str, tuple[str, ...]]] = field(default_factory=Counter)
+    aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
     put_off: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
     rounds: int = 1
     room_wanted: bool = False
@@ -189,7 +191,7 @@ class _Run:
         self.most = self.patience.primitives * max(len(begun.primitives), 20)
         if outcome is not None and outcome.plan is None:
             self.despair(outcome, limits)
-        self.say("plan", text=record.reasons[-1].text if record.reasons else "")
+        self.say("plan", text="; ".join(reason.text for _, reason in self.aside.values()))
 
     def finish(self) -> None:
         """Nothing is left to be done: what is wanted is there, or the agenda must be looked at again, or a goal was put off."""
@@ -199,8 +201,9 @@ class _Run:
             return
         if self.put_off and self.try_anew("the rest is done"):
             return
-        for _, reason in self.put_off.values():
+        if self.put_off:
             record.status = End.GAVE_UP
+        for _, reason in (*self.aside.values(), *self.put_off.values()):
             record.reason(reason)
         self.going = False
         if record.reasons and record.status is End.REACHED:
@@ -335,17 +338,22 @@ class _Run:
         goal = self.belief.goal
         if intervention.change is Change.GOAL:
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
-            for fact in intervention.facts:
-                self.put_off.pop(fact.symbol, None)
+            self.forget(fact.symbol for fact in intervention.facts)
         elif intervention.change is Change.DROP_GOAL and intervention.symbol is not None:
             goal.pop(intervention.symbol, None)
-            self.put_off.pop(intervention.symbol, None)
+            self.forget([intervention.symbol])
         elif intervention.change is Change.ADD:
             self.belief.add(intervention.individual, (intervention.kind,))
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
             self.doubt("something else is wanted")
         self.say("intervention", text=intervention.text)
+
+    def forget(self, symbols: Iterable[Symbol]) -> None:
+        """Want nothing any more of symbols whose goals were set aside or put off."""
+        for symbol in symbols:
+            self.aside.pop(symbol, None)
+            self.put_off.pop(symbol, None)
 
     def doubt(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
         """Want the agenda looked at again. What is in progress is sound if it could have begun with the surprises known."""
@@ -364,6 +372,8 @@ class _Run:
     def reconsider(self) -> None:
         """Repair the agenda, or replan; set aside what can't be reached any more."""
         why, self.puzzled, belief, record = self.puzzled, "", self.belief, self.record
+        if self.missed:
+            self.want_again(self.aside)
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
         doubts = len(belief.withdrawn), len(belief.refuted), self.rounds
@@ -410,9 +420,15 @@ class _Run:
     def set_aside(self, impossible: Mapping[Symbol, Reason]) -> None:
         """Want no more what can't be, and remember why."""
         if impossible:
-            for reason in impossible.values():
-                self.record.reason(reason)
-            self.belief.want({s: v for s, v in self.belief.goal.items() if s not in impossible})
+            goal = self.belief.goal
+            self.aside |= {symbol: (goal[symbol], reason) for symbol, reason in impossible.items()}
+            self.belief.want({s: v for s, v in goal.items() if s not in impossible})
+
+    def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
+        """Want goals again that were set aside or put off."""
+        if goals:
+            self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in goals.items()}})
+            goals.clear()
 
     def set_aside_the_vanished(self) -> None:
         """Want nothing of an object that is gone, or that is at no place that a fact could name."""
@@ -433,7 +449,7 @@ class _Run:
             alone = replace(belief.problem, goal={fact.symbol: fact.value})
             steps, single = replan(alone, None, belief.using, limits.until(end))
             if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
-                hopeless[fact.symbol] = self.blocked(fact, limits.until(end)) or single.reason
+                hopeless[fact.symbol] = self.blocked(fact, limits.until(end)) or self.told(fact, single.reason)
         if hopeless and belief.doubted:
             goal = belief.goal
             self.put_off |= {symbol: (goal[symbol], self.blamed(symbol, goal[symbol])) for symbol in hopeless}
@@ -471,6 +487,12 @@ class _Run:
         told = "; ".join(f"{name} at {', '.join(where[name])} ({found.fixed})" for name, found in things.items())
         return Reason(f"{fact} is blocked by {told}", (*fact.symbol.arguments, fact.value, *things))
 
+    def told(self, fact: Fact, reason: Reason) -> Reason:
+        """Return the reason why a goal can't be reached, with what was discovered of its objects."""
+        there = {v for s, v in self.belief.state.items() if s.arguments[0] in fact.symbol.arguments}
+        found = [one.text for one, _ in self.record.discovered if one.individual in there and one.text]
+        return replace(reason, text="; ".join((*found, reason.text))) if found else reason
+
     def blamed(self, symbol: Symbol, value: str) -> Reason:
         """Return the reason for giving a goal up: the last failure that concerns it, else the last one."""
         concerned = {*symbol.arguments, value}
@@ -487,8 +509,11 @@ class _Run:
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
+        for _, earlier in (*self.aside.values(), *self.put_off.values()):
+            self.record.reason(earlier)
         self.record.reason(reason)
         self.belief.want({})
+        self.aside.clear()
         self.put_off.clear()
         self.most = len(self.record.events) + self.patience.primitives
         self.puzzled = reason.text
@@ -537,8 +562,7 @@ class _Run:
         self.rounds += 1
         self.attempts.clear()
         self.belief.trust_again()
-        self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in self.put_off.items()}})
-        self.put_off.clear()
+        self.want_again(self.put_off)
         self.sound = False
         self.doubt(f"tried anew: {why}")
         return True

@@ -1,0 +1,79 @@
+"""Twenty interventions in PyBullet's world: objects pushed and knocked over, boxes put in the way, things taken, links shut.
+
+``python -m benchmarks.disturbed FROM TO [NUMBER …]`` runs all interventions, or those of some numbers, with seeds FROM to TO - 1,
+bodies perturbed. An episode *recovers* if it reaches its goals; it *gives up rightly* if each goal that is left is one that the
+intervention made impossible, and a reason names the cause. Anything else is wrong.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from time import process_time
+
+import confab
+from confab.planner.acting.episode import End, Episode
+
+CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("beverage-serving", ("at=6 push cup2 -3 9",), ""),
+    ("beverage-serving", ("after=22 push cup1 2 8",), ""),
+    ("beverage-serving", ("at=16 push bottle2 -4 6",), ""),
+    ("beverage-serving", ("after=28 push cup2 5 5",), ""),
+    ("beverage-serving", ("at=0.5 push cup1 -3 -8",), ""),
+    ("beverage-serving", ("after=22 box location5",), ""),
+    ("beverage-serving", ("at=3 box location7",), ""),
+    ("beverage-serving", ("after=22 box location5", "after=22 push cup2 -2 9"), ""),
+    ("beverage-serving", ("after=22 box location5 12x12x20",), "blocked by box1"),
+    ("beverage-serving", ("at=3 box location7 14x10x15",), "blocked by box1"),
+    ("beverage-serving", ("after=22 knock cup2",), "cup2 lies"),
+    ("beverage-serving", ("at=7 knock bottle2",), "bottle2 lies"),
+    ("beverage-serving", ("after=22 remove cup2",), "cup2 isn't to be seen"),
+    ("one-arm-serving", ("at=4 push cup1 6 -6",), ""),
+    ("one-arm-serving", ("at=8 box place5",), ""),
+    ("one-arm-serving", ("at=8 knock bottle1",), "bottle1 lies"),
+    ("one-arm-serving", ("at=8 box place5 12x12x12",), "blocked by box1"),
+    ("spice-drawer", ("at=3 push lid -2 7",), ""),
+    ("spice-drawer", ("at=4 door OPENED false",), ""),
+    ("centrifuge", ("at=8 push tube2 2 6",), ""),
+)
+"""Scene, interventions, and words of the reason that is right; none where the goals can be reached."""
+
+
+def outcome(episode: Episode, words: str) -> str:
+    """Return how an episode ended: recovered, gave up rightly, or what is wrong with it."""
+    open_ = [str(symbol) for symbol, value in episode.goal.items() if episode.observed.get(symbol) != value]
+    reasons = "; ".join(reason.text for reason in episode.reasons)
+    if episode.missed:
+        return f"wrong: {', '.join(one.text for one in episode.missed)} never came"
+    if open_:
+        return f"wrong: {', '.join(open_)} is claimed"
+    if episode.status is End.REACHED:
+        return "recovered"
+    if words and words in reasons:
+        return "gave up rightly"
+    return f"wrong: {episode.status.value}: {reasons}"
+
+
+def main() -> None:
+    """Print a line per episode, and how they ended."""
+    begin, end, *numbers = (int(word) for word in sys.argv[1:] or ("0", "1"))
+    ends = Counter[str]()
+    for number in numbers or range(1, len(CASES) + 1):
+        name, interventions, words = CASES[number - 1]
+        scene = confab.load(name)
+        for seed in range(begin, end):
+            cpu = process_time()
+            run = scene.execute(interventions=interventions, world="pybullet", seed=seed, perturb=True)
+            episode, ended = run.episode, outcome(run.episode, words)
+            ends[ended.partition(":")[0]] += 1
+            failures = ", ".join(failure.code for failure in episode.failures) or "no failures"
+            seconds = f"{episode.seconds['simulated']:.0f} s simulated, {process_time() - cpu:.0f} CPU s"
+            print(
+                f"{number:2} {name}, {' & '.join(interventions)}, seed {seed}: {ended}; {failures}; {seconds}",
+                flush=True,
+            )
+    print(", ".join(f"{count} {ended}" for ended, count in ends.most_common()))
+
+
+if __name__ == "__main__":
+    main()
