@@ -1,55 +1,86 @@
 """The relaxed-plan heuristic h_FF, which also tells what is applicable and what is preferred.
 
-Bits are reached in layers, a relaxed operator when the last bit it needs is. A bit's cost is that of its cheapest
-operator so far (one, plus the costs of what the operator needs); the operators behind the goal make the relaxed plan.
-Operators that are reached with the first layer are the applicable ones: no successor generator is needed.
+layer      bits that are reached together; a relaxed operator is reached with the last bit that it needs
+cost       of a bit: of the cheapest operator that sets it, its own number of repetitions plus the costs of what it needs
+repeated   an operator that moves an amount towards a comparison counts as often as that takes: so many times as the amount is
+           away, divided by how far the operator moves it; once where that depends on the state
+plan       the operators behind the goal; those of the first layer are the applicable ones
 
-Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001); additive costs choose the supporters, as in Keyder and
-Geffner, "Heuristics for planning with action costs revisited", ECAI 2008.
+A goal that isn't reached even so can't be reached at all.
+
+Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001); additive costs choose the supporters, as in Keyder and Geffner,
+"Heuristics for planning with action costs revisited", ECAI 2008; repetitions: Scala, Haslum, Thiébaux and Ramirez, "Subgoaling
+techniques for satisficing and optimal numeric planning", JAIR 68 (2020).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Protocol, TypeAlias
+from collections import defaultdict
+from collections.abc import Callable
+from fractions import Fraction
+from math import ceil
+from typing import NamedTuple, TypeAlias
 
-from confab.planner.grounded.task import Task
+from confab.planner.grounded.amounts import Exact, Linear, pushes
+from confab.planner.grounded.task import Task, bits_of
 
-Evaluation: TypeAlias = "tuple[int, list[int], list[int]] | None"
-"""h, the relaxed plan in the order of its layers, the applicable operators; None if the goal isn't reachable even so."""
-
-Evaluate: TypeAlias = Callable[[int], Evaluation]
-
-
-class EvaluateFor(Protocol):
-    """Evaluates a state, for the goal of the task or for other bits."""
-
-    def __call__(self, state: int, goal: Sequence[int] = ...) -> Evaluation:
-        """Return h of a state."""
+MOST_TIMES = 1000
+"""Maximum number of repetitions that count: a distance has to be told from a longer one, and no more."""
+Push: TypeAlias = "tuple[Linear, str, Exact | None]"
+"""A difference, the sign that it has to have, and how far an operator moves it; None if that depends on the state."""
 
 
-def heuristic(task: Task) -> EvaluateFor:
+class Evaluation(NamedTuple):
+    """h of a state, its relaxed plan in the order of layers, the applicable operators, and the work of finding these, in bits."""
+
+    h: int
+    plan: list[int]
+    applicable: list[int]
+    work: int
+
+
+Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
+"""To the evaluation of a state; None if the goal isn't reachable from it."""
+
+
+def heuristic(task: Task) -> Evaluate:
     """Return h_FF of a task, as a function of a state."""
-    operators, owners = len(task), task.owners
-    needs, adds = task.needs.lists(), task.adds.lists()
-    step = [0 if owner < 0 else 1 for owner in owners]
+    needs, adds, owners, repeated = _relaxed(task)
+    operators, amounts, low = len(task), task.amounts, (1 << task.size) - 1
+    once = [0 if owner < 0 else 1 for owner in owners]
     missing = [len(bits) for bits in needs]
     always = [o for o, number in enumerate(missing) if not number]
     needed_by: list[list[int]] = [[] for _ in range(task.size)]
     for o, bits in enumerate(needs):
         for bit in bits:
             needed_by[bit].append(o)
-    whole = _bits(task.goal, task.size)
+    each = (sum(map(len, needs)) + sum(map(len, adds))) / max(len(needs), 1)
+    goal = bits_of(task.goal)
     unreached = [-1] * task.size
     size = (task.size + 7) // 8
     of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
-    def evaluate(state: int, goal: Sequence[int] = whole) -> Evaluation:
+    def counted(state: int) -> tuple[list[int], set[int]]:
+        """Return how often each relaxed operator has to be repeated, and those that don't help however often they are."""
+        times, useless = once[:], set[int]()
+        if amounts is not None:
+            vector = amounts.vector(state)
+            for (difference, sign, push), found in repeated.items():
+                number = _times(difference.of(vector), sign, push)
+                for o in found:
+                    times[o] = number
+                if not number:
+                    useless.update(found)
+        return times, useless
+
+    def evaluate(state: int) -> Evaluation | None:
+        times, useless = counted(state) if repeated else (once, None)
         left, cost, layer_of, supporter = missing[:], unreached[:], unreached[:], unreached[:]
-        layer = [8 * i + b for i, byte in enumerate(state.to_bytes(size, "little")) if byte for b in of_byte[byte]]
+        bytes_ = (state & low).to_bytes(size, "little")
+        layer = [8 * i + b for i, byte in enumerate(bytes_) if byte for b in of_byte[byte]]
         for bit in layer:
             cost[bit] = layer_of[bit] = 0
-        reached, applicable, depth = always[:], None, 0
+        reached, applicable, depth, number = always[:], None, 0, 0
         while True:
             for bit in layer:
                 for o in needed_by[bit]:
@@ -58,10 +89,13 @@ def heuristic(task: Task) -> EvaluateFor:
                         reached.append(o)
             if applicable is None:
                 applicable = [o for o in reached if o < operators]
+            if useless:
+                reached = [o for o in reached if o not in useless]
             depth += 1
+            number += len(reached)
             layer = []
             for o in reached:
-                total = step[o]
+                total = times[o]
                 for bit in needs[o]:
                     total += cost[bit]
                 for bit in adds[o]:
@@ -71,29 +105,75 @@ def heuristic(task: Task) -> EvaluateFor:
                         layer.append(bit)
                     elif total < known:
                         cost[bit], supporter[bit] = total, o
-            if not layer or all(cost[bit] >= 0 for bit in goal):
+            # An operator that comes later may need fewer repetitions.
+            if not layer or (not repeated and all(cost[bit] >= 0 for bit in goal)):
                 break
             reached = []
         if any(cost[bit] < 0 for bit in goal):
             return None
-        chosen: dict[int, int] = {}  # operator: layer in which its effect is wanted first
-        waiting, seen = list(goal), set(goal)
+        chosen: dict[int, tuple[int, int]] = {}  # operator: layer in which its effect is wanted first, repetitions
+        waiting, seen = goal[:], set(goal)
         while waiting:
             bit = waiting.pop()
             o = supporter[bit]
             if o >= 0:
                 owner = owners[o]
                 if owner >= 0:
-                    chosen[owner] = min(layer_of[bit], chosen.get(owner, depth))
+                    first, often = chosen.get(owner, (depth, 0))
+                    chosen[owner] = min(first, layer_of[bit]), max(often, times[o])
                 for need in needs[o]:
                     if need not in seen:
                         seen.add(need)
                         waiting.append(need)
         applicable.sort()
-        return len(chosen), sorted(chosen, key=lambda o: (chosen[o], o)), applicable
+        plan = sorted(chosen, key=lambda o: (chosen[o][0], o))
+        if repeated:
+            plan = [o for o in plan for _ in range(chosen[o][1])]
+        return Evaluation(len(plan), plan, applicable, 1 + round(number * each))
 
     return evaluate
 
 
-def _bits(state: int, size: int) -> list[int]:
-    return [bit for bit in range(size) if state >> bit & 1]
+def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[Push, list[int]]]:
+    """Return what the relaxed operators need and add, their owners, and those that move an amount, by how far.
+
+    One that moves amounts towards a comparison is a relaxed operator of its own.
+    """
+    needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
+    repeated = defaultdict[Push, list[int]](list)
+    if task.amounts is not None:
+        compared = {bit: key for key, bit in task.amounts.bits.items()}
+        for o, bits in enumerate(adds[:]):
+            for bit in bits if not compared.keys().isdisjoint(bits) else ():
+                if bit in compared:
+                    difference, sign = compared[bit]
+                    repeated[difference, sign, _push(task, o, difference)].append(len(owners))
+                    needs.append(needs[o])
+                    adds.append([bit])
+                    owners.append(owners[o])
+            adds[o] = [bit for bit in bits if bit not in compared]
+    return needs, adds, owners, repeated
+
+
+def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
+    """Return how far a relaxed operator moves a difference; None if that depends on the state."""
+    amounts, owner = task.amounts, task.owners[relaxed]
+    assert amounts is not None
+    own = sum(1 << bit for bit in task.needs[relaxed])
+    moves = [move for move in amounts.made(owner) if move.when & own == move.when] if owner >= 0 else []
+    found = pushes(moves, difference)
+    return None if isinstance(found, bool) else found
+
+
+def _times(amount: Exact, sign: str, push: Exact | None) -> int:
+    """Return how often an operator has to be done until a difference is what its sign says; 0 if never."""
+    if push is None:
+        return 1
+    if sign == "=":
+        amount, push = (amount, push) if amount < 0 else (-amount, -push)
+    if push <= 0:
+        return 0
+    times = max(ceil(Fraction(-amount) / Fraction(push)), 1)
+    if sign == ">" and amount + times * push == 0:
+        times += 1
+    return min(times, MOST_TIMES)

@@ -3,20 +3,19 @@
 window      consecutive steps, from the state before them to the bits that the steps behind it (and the goal) need; amounts are
             as these want them if the steps behind still lead to the goal
 operators   those nearest to the window: reachable early from its start and wanted early by its end
-search      A* with h_FF on these operators alone; what can't become shorter by h is cut off
-restarts    the whole plan is searched anew with all operators, h counting for less each time, for the work that is left
+search      A* with h_FF on these operators alone (`confab.planner.grounded.shortest`); what can't become shorter by h is cut off
+whole       in the end the whole plan is such a window, with all operators, h counting for more, for the work that is left
 order       windows are tried on the plan as it is and regrouped, so that a step stands behind one that it depends on
 
 Work is counted in operators looked at and never in seconds, so the same plan is improved alike on any machine.
 
 Action elimination (`shortened`): Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
-2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015). Restarts: Richter,
-Thayer and Ruml, "The joy of forgetting: faster anytime search via restarting", ICAPS 2010.
+2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
 """
 
 from __future__ import annotations
 
-import heapq
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -34,23 +33,21 @@ from confab.planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
 """States looked at for a cheapest plan, where the plan has no more steps."""
-WEIGHTS = (5, 3, 2)
-"""Of h, in searches of the whole plan anew."""
 WAYS = 20
 """Alternatives of what follows from others, gone through in the time in which an operator is looked at."""
 SIZES = (8, 16, 32, 64)
 """Steps of a window; the long ones are for round trips that one step saves."""
 OPERATORS, EVALUATIONS = 150, 100
 """Of a window's search, at most."""
+WEIGHT = 3
+"""Of h_FF, where the whole plan is searched anew with all operators."""
 TRIALS = 2_000_000
 """Operators done again, in all, to see which step might be left out."""
 LOOK = 50
 """Operators ranked in the time in which one is evaluated."""
 
 
-def shorter(
-    task: Task, plan: Sequence[int], work: int, deadline: float | None = None, restarts: bool = True
-) -> list[int]:
+def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
     """Return a plan that costs no more than a given one: a cheapest one where few states tell, else by replacing windows of it.
 
     Parameters
@@ -62,8 +59,6 @@ def shorter(
         Operators that may be looked at, half a million to a million per second.
     deadline : float, optional
         On the clock of `time.perf_counter`.
-    restarts : bool
-        Whether the whole is searched anew for what work windows leave.
     """
     best = shortened(task, plan, deadline)
     if task.prices and task.cost_of(best) > task.cost_of(plan):
@@ -82,7 +77,7 @@ def shorter(
             best = windows.pass_over(regrouped(task, best), size)
         best = shortened(task, best, deadline)
         if len(best) == before or windows.over:
-            best = windows.restarted(best) if restarts else best
+            best = windows.restarted(best)
             return best if task.cost_of(best) <= task.cost_of(plan) else list(plan)  # fewer steps may cost more
 
 
@@ -91,7 +86,8 @@ def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> 
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
-    return plan if found.plan is None else list(found.plan), found.plan is not None or found.bound >= cost
+    best = plan if found.plan is None else list(found.plan)
+    return best, found.bound >= task.cost_of(best)
 
 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
@@ -246,58 +242,29 @@ class _Windows:
             return None
         operators = self.near(steps, state, wanted)
         task, operators = self.part(operators, state, wanted)
-        found = self.search(task, len(steps), EVALUATIONS)
+        found = self.search(task, sum(self.task.costs[step] for step in steps))
         if found is None:
             self.failed.add((state, wanted, len(steps)))
             return None
         return [operators[operator] for operator in found]
 
     def restarted(self, plan: list[int]) -> list[int]:
-        """Return a plan with fewer steps that cost no more, searched as a whole with ever less greed for what work is left."""
-        task = self.task
-        for weight in WEIGHTS:
-            found = self.search(task, len(plan), self.work // max(len(task.owners), 1), weight)
-            if found is not None and task.cost_of(found) <= task.cost_of(plan):
-                plan = found
-        return shortened(task, plan, self.deadline)
+        """Return a cheaper plan that is searched as a whole, with all operators, for what work is left; or the same."""
+        most = self.work // max(len(self.task.owners), 1)
+        found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
+        return plan if found is None else shortened(self.task, found, self.deadline)
 
-    def search(self, task: Task, limit: int, evaluations: int, weight: int = 1) -> list[int] | None:
-        """Search a plan with fewer steps than a limit: A* by g + weight h, cut off where g + h reaches the limit."""
-        low, wanted = (1 << task.size) - 1, task.goal
-        plain = task if task.amounts is None else replace(task, amounts=None, initial=task.initial & low)
-        evaluate = heuristic(plain)
-        entries: list[tuple[int, int, int, int, list[int]]] = []
-        came_from: dict[int, tuple[int, int]] = {}
-        g_of = {task.initial: 0}
-        waiting = [task.initial]
-        number = 0
-        while number < evaluations and not self.late:
-            for state in waiting:
-                number += 1
-                evaluation = evaluate(state & low)
-                if evaluation is not None and g_of[state] + evaluation[0] < limit:
-                    rank = g_of[state] + weight * evaluation[0]
-                    heapq.heappush(entries, (rank, evaluation[0], number, state, evaluation[2]))
-            if not entries:
-                break
-            _, _, _, before, applicable = heapq.heappop(entries)
-            g = g_of[before] + 1
-            waiting = []
-            for operator in applicable:
-                after = task.applied(before, operator)
-                if after is None or g_of.get(after, limit) <= g:
-                    continue
-                came_from[after], g_of[after] = (before, operator), g
-                if after & wanted == wanted:
-                    found = []
-                    while after != task.initial:
-                        after, step = came_from[after]
-                        found.append(step)
-                    self.work -= number * len(task.owners)
-                    return found[::-1]
-                waiting.append(after)
-        self.work -= number * len(task.owners)
-        return None
+    def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
+        """Search a plan that is cheaper than `upper`: A*, cut off where what was spent and h_FF reach that."""
+        evaluate, costs = heuristic(task), task.costs
+
+        def left(state: int) -> float:
+            evaluation = evaluate(state)
+            return math.inf if evaluation is None else sum(costs[operator] for operator in evaluation.plan)
+
+        found = shortest(task, left, upper, deadline=self.deadline, known=most, weight=weight)
+        self.work -= len(found.states) * len(task.owners)
+        return None if found.plan is None else list(found.plan)
 
     @cached_property
     def arrays(self) -> tuple[Ints, Ints, Ints]:
@@ -400,6 +367,8 @@ class _Windows:
         ways = derived.ways
         part = replace(
             task,
+            facts=(),
+            complements={},
             size=len(new),
             initial=small(state),
             goal=small(wanted),

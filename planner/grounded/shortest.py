@@ -1,17 +1,17 @@
-"""Shortest plans of a grounded task: A* over the bits of its states, with whatever lower bound it is given.
+"""Shortest plans of a grounded task: the order of A*, with whatever estimate of what is left it is given.
 
 g        cost of the operators from the start to a state
-h        a lower bound on the cost from a state to the goal, infinite where there is no way: `nothing`, which makes this a
-         breadth-first search, `ways` of the single goals, or LM-cut (`confab.planner.hierarchical.bounds`)
-f        g + h, the least of which is expanded next; no plan is cheaper than the least f that is open
-upper    what a plan has to be cheaper than; what can't be is dropped
+h        what it costs from a state to the goal, infinite where there is no way. With a lower bound what is found is a cheapest
+         plan: `nothing`, which makes this a breadth-first search, `ways` of the single goals, or LM-cut
+         (`confab.planner.hierarchical.bounds`)
+f        g + weight h, the least of which is expanded next; with weight 1 no plan is cheaper than the least f that is open
+upper    what a plan has to be cheaper than: a state of which g + h is no less is dropped
 """
 
 from __future__ import annotations
 
-import heapq
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TypeAlias
@@ -19,6 +19,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from confab.planner.grounded.exploring import Candidate, OpenList, explore, path_to
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.plan import Counts
 
@@ -29,17 +30,57 @@ Bound: TypeAlias = "Callable[[int], float]"
 class Shortest:
     """What was found: no plan is cheaper than `bound` or, if that is infinite, there is none cheaper than `upper`.
 
-    `plan` are the operators of a cheapest plan; `states` were reached, each at a cost.
+    `plan` are the operators of the cheapest plan found; `states` were reached.
     """
 
     bound: float
     plan: tuple[int, ...] | None
-    states: Mapping[int, float]
+    states: Mapping[int, object]
 
 
 def nothing(state: int) -> float:
     """Return the bound that knows nothing."""
     return 0.0
+
+
+class Cheapest:
+    """The order of A* by a bound on what is left; `lower` is the least f that is open, `counts` grows."""
+
+    def __init__(self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1) -> None:
+        self.task, self.bound, self.upper, self.weight, self.counts = task, bound, upper, weight, counts
+        self.reached: dict[int, Candidate] = {}
+        self.work, self.turn, self.bytes, self.lower = 0, 1, 0, 0.0
+        self.open = OpenList[tuple[float, Candidate]]()
+        self.best: int | None = None
+
+    def candidates(self) -> Iterator[Candidate]:
+        """Yield what operators lead to from the states with the least f, until no cheaper plan can come."""
+        task, costs, priced = self.task, self.task.costs, bool(self.task.prices)
+        while (drawn := self.open.first()) is not None:
+            self.open.drop(0)
+            h, (_, _, state, cost) = drawn[1]
+            if cost > self.reached[state].cost or cost + h >= self.upper:
+                continue  # it was reached by a cheaper way since, or a plan was found that is no dearer
+            self.lower = max(self.lower, cost + self.weight * h)
+            self.work += 1
+            self.counts.expanded += 1
+            for operator in task.applicable(state)[0]:
+                after = task.applied(state, operator)
+                if after is not None:
+                    self.counts.generated += 1
+                    spent = task.spent(state, operator) if priced else costs[operator]
+                    yield Candidate(state, (operator,), after, cost + spent)
+
+    def put(self, candidate: Candidate) -> None:
+        """Rank a state by f, unless no cheaper plan leads through it; one where the goal holds is what has to be beaten."""
+        cost = candidate.cost
+        h = self.bound(candidate.state)
+        if cost + h >= self.upper:
+            return
+        if candidate.state & self.task.goal == self.task.goal:
+            self.upper, self.best = cost, candidate.state
+        else:
+            self.open.push((cost + self.weight * h, h), (h, candidate))
 
 
 def shortest(
@@ -50,8 +91,9 @@ def shortest(
     deadline: float | None = None,
     counts: Counts | None = None,
     known: float = math.inf,
+    weight: int = 1,
 ) -> Shortest:
-    """Return a cheapest plan cheaper than `upper`, or why none is returned.
+    """Return a cheapest plan of those cheaper than `upper`, as far as the limits allow.
 
     Parameters
     ----------
@@ -59,52 +101,25 @@ def shortest(
     bound : function of a state
     upper : float
     most : int
-        Expansions after which only a bound is returned, as when the deadline (of `time.perf_counter`) has passed.
+        Expansions after which only a bound, and the cheapest plan so far, are returned, as when the deadline (of
+        `time.perf_counter`) has passed.
     deadline : float, optional
     counts : Counts, optional
         Grows by what is generated and expanded.
     known : float
         States reached after which only a bound is returned: all of them will have to be expanded, if there is no plan.
+    weight : int
+        Of the bound in f; with more than 1 what is found first is dearer and comes sooner, and `bound` says nothing.
     """
-    counts = counts or Counts()
-    goal, costs, priced = task.goal, task.costs, bool(task.prices)
-    g = {task.initial: 0.0}
-    came_from: dict[int, tuple[int, int]] = {}
-    estimate = bound(task.initial)
-    queue = [(estimate, estimate, 0, task.initial)]  # f, h, order of generation, state
-    lower, number, expanded = estimate, 0, 0
-    while queue:
-        f, h, _, state = heapq.heappop(queue)
-        if f > g[state] + h:
-            continue  # reached by a cheaper way since
-        if f >= upper:
+    order = Cheapest(task, bound, upper, counts or Counts(), weight)
+    expanded, lower = 0, None
+    for work in explore(task, order):
+        expanded += work
+        if expanded > most or len(order.reached) > known or (deadline is not None and perf_counter() > deadline):
+            lower = order.lower
             break
-        lower = max(lower, f)
-        if state & goal == goal:
-            steps = []
-            while state in came_from:
-                state, operator = came_from[state]
-                steps.append(operator)
-            return Shortest(f, tuple(steps[::-1]), g)
-        if expanded >= most or len(g) > known or (deadline is not None and perf_counter() > deadline):
-            return Shortest(lower, None, g)
-        expanded += 1
-        counts.expanded += 1
-        so_far = g[state]
-        for operator in task.applicable(state)[0]:
-            after = task.applied(state, operator)
-            if after is None:
-                continue
-            counts.generated += 1
-            new = so_far + (task.spent(state, operator) if priced else costs[operator])
-            if new < g.get(after, math.inf):
-                g[after] = new
-                came_from[after] = state, operator
-                estimate = bound(after)
-                if new + estimate < upper:
-                    number += 1
-                    heapq.heappush(queue, (new + estimate, estimate, number, after))
-    return Shortest(upper, None, g)
+    plan = None if order.best is None else tuple(path_to(order.reached, order.best))
+    return Shortest(order.upper if lower is None else lower, plan, order.reached)
 
 
 def ways(task: Task) -> Bound:

@@ -96,14 +96,14 @@ class Subproblem:
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
-        from confab.planner.grounded.best_first import WORLD, search
+        from confab.planner.grounded.best_first import search
 
         if self.task is None:
             self.segments.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
         limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
-        found = search(self.task, limits, self.segments.deadline, most_work=most, portfolio=WORLD)
+        found = search(self.task, limits, self.segments.deadline, most_work=most)
         work = max(LEAST * found.counts.expanded, found.work // BITS)
         self.segments.spend(self.level, found.counts, MAKING * size + work)
         self.plan = found.plan

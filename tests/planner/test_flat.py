@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Generator
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 from confab.planner.grounded import reachability
-from confab.planner.grounded.best_first import ahead, plan_level, search
+from confab.planner.grounded.best_first import plan_level, search
+from confab.planner.grounded.exploring import Order, explore, path_to
+from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import Evaluate, Evaluation, heuristic
-from confab.planner.grounded.hff_dense import Effort
-from confab.planner.grounded.hff_dense import heuristic as by_arrays
-from confab.planner.grounded.landmarks import behind, in_series, landmarks
-from confab.planner.grounded.novelty import Seen, by_novelty
+from confab.planner.grounded.landmarks import landmarks
+from confab.planner.grounded.lookahead import ahead
+from confab.planner.grounded.novelty import Novelty
 from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
+from confab.planner.grounded.shortest import Cheapest, nothing
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.agenda import Agenda
@@ -31,7 +33,6 @@ from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
-from tests.planner.test_wants import museum
 
 
 @pytest.fixture(scope="module", name="tabletop")
@@ -105,20 +106,25 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
     def slow(task: Task) -> Evaluate:
         fast = heuristic(task)
 
-        def evaluate(state: int) -> Evaluation:
+        def evaluate(state: int) -> Evaluation | None:
             nonlocal evaluated
             evaluated += 1
             return fast(state)
 
         return evaluate
 
-    monkeypatch.setattr("confab.planner.grounded.best_first.relaxed", slow)
-    monkeypatch.setattr("confab.planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
-    monkeypatch.setattr("confab.planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
-    for module in ("plan", "grounded.best_first", "grounded.plan_windows", "grounded.reachability"):
+    monkeypatch.setattr("confab.planner.grounded.best_first.heuristic", slow)
+    monkeypatch.setattr("confab.planner.grounded.lookahead.ENABLING", 0)  # else a few evaluations do
+    for module in (
+        "plan",
+        "grounded.best_first",
+        "grounded.lookahead",
+        "grounded.plan_windows",
+        "grounded.reachability",
+    ):
         monkeypatch.setattr(f"confab.planner.{module}.perf_counter", lambda: float(evaluated))
     problem = carrier(16)
-    assert plan_level(problem).status is Status.SOLVED and evaluated > 50
+    assert plan_level(problem).status is Status.SOLVED and evaluated > 25
     evaluated = 0
     late = plan_level(problem, limits=Limits(seconds=seconds))
     assert late.status is Status.GAVE_UP and late.reason == Reason("the time limit came first")
@@ -135,30 +141,31 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
     assert len(shortened(task, doubled)) <= len(plan)
 
 
-@pytest.mark.parametrize("deep", [False, True])
-def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
+ORDERS: dict[str, Callable[[Task], Order]] = {
+    "novelty": lambda task: Novelty(task, heuristic(task), 1, landmarks(task), Counts()),
+    "h_FF": lambda task: Greedy(task, heuristic(task), ahead(task), Counts()),
+    "cost": lambda task: Cheapest(task, nothing, math.inf, Counts()),
+}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_one_loop_finds_plans_and_exhausts_all_states_in_any_order(order: str) -> None:
     task = ground(carrier(3))
     assert isinstance(task, Task)
-    marks = partial(landmarks, task) if deep else None
-    seen, state = finished(by_novelty(task, heuristic(task), 1, Counts(), marks)) or ({}, 0)
-    assert state & task.goal == task.goal
-    while state != task.initial:
-        before, operators = seen[state]
-        for operator in operators:
-            assert task.applied(before, operator) == state
-        state = before
+    found = ORDERS[order](task)
+    list(explore(task, found))
+    assert found.best is not None and found.best & task.goal == task.goal
+    state, plan = task.initial, path_to(found.reached, found.best)
+    for operator in plan:
+        state = task.applied(state, operator) or 0
+    assert state == found.best
+    assert order != "cost" or len(plan) == 9  # twice there and once back, for three parcels
     me = sum(1 << bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == "ME")
     nowhere = replace(task, goal=task.goal | me)  # here and there at once: relaxed, that can be
-    assert finished(by_novelty(nowhere, heuristic(nowhere), 1, Counts(), marks)) is None
-
-
-def finished(search: Generator[int, None, tuple[Seen, int] | None]) -> tuple[Seen, int] | None:
-    while True:
-        try:
-            next(search)
-        except StopIteration as done:
-            found: tuple[Seen, int] | None = done.value
-            return found
+    none = ORDERS[order](nowhere)
+    list(explore(nowhere, none))
+    assert none.best is None
+    assert len(none.reached) == 2 * (2**3 + 3 * 2 * 2**2 + 3 * 2 * 2)  # rooms times: no parcel in an arm, one, two
 
 
 def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> None:
@@ -181,29 +188,6 @@ def test_what_every_plan_passes_is_a_landmark() -> None:
     assert isinstance(task, Task)
     names = {str(fact) for bit, fact in enumerate(task.facts) if landmarks(task) >> bit & 1}
     assert names == {"x0 AT here", "x0 AT there", "here ME true", "there ME true"}  # either arm will do
-
-
-def test_what_lies_behind_a_landmark_on_every_way_to_it_is_known() -> None:
-    task = ground(carrier(1))
-    assert isinstance(task, Task)
-    number = {str(fact): bit for bit, fact in enumerate(task.facts)}
-    before = behind(task)[number["x0 AT there"]]
-    assert {name for name, bit in number.items() if before >> bit & 1} == {
-        "x0 AT here",
-        "here ME true",
-        "there ME true",
-    }
-
-
-def test_a_search_from_landmark_to_landmark_leads_to_the_goal() -> None:
-    task = ground(museum(9), 2)
-    assert isinstance(task, Task)
-    walk = in_series(task, heuristic(task), 1, lambda part, evaluate: by_novelty(part, evaluate, 1, Counts()))
-    seen, state = finished(walk) or ({}, 0)
-    now = task.initial
-    for operator in seen[state][1]:
-        now = task.applied(now, operator) or 0
-    assert now == state and state & task.goal == task.goal
 
 
 def carrier(parcels: int) -> Problem:
@@ -267,7 +251,7 @@ def test_a_long_way_to_what_one_step_does_is_saved() -> None:
     plan = task.operators_of(steps)
     assert plan is not None
     assert len(plan) == 32 * len(doors)
-    assert len(shorter(task, plan, 200_000, restarts=False)) == len(doors)
+    assert len(shorter(task, plan, 200_000)) == len(doors)
 
 
 def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> None:
@@ -285,31 +269,6 @@ def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> N
     )  # two at a time; picking another parcel meanwhile is no use
 
 
-LIFT = """(define (domain lift) (:requirements :typing) (:types floor person count)
- (:predicates (lift ?f - floor) (at ?x - person ?f - floor) (in ?x - person) (next ?n ?m - count) (inside ?n - count))
- (:action move :parameters (?f ?g - floor) :precondition (lift ?f) :effect (and (lift ?g) (not (lift ?f))))
- (:action board :parameters (?x - person ?f - floor ?n ?m - count)
-  :precondition (and (lift ?f) (at ?x ?f) (inside ?n) (next ?n ?m))
-  :effect (and (in ?x) (inside ?m) (not (at ?x ?f)) (not (inside ?n))))
- (:action leave :parameters (?x - person ?f - floor ?n ?m - count)
-  :precondition (and (lift ?f) (in ?x) (inside ?m) (next ?n ?m))
-  :effect (and (at ?x ?f) (inside ?n) (not (in ?x)) (not (inside ?m)))))"""
-
-
-def test_a_wasteful_plan_is_searched_again_without_lookahead(monkeypatch: pytest.MonkeyPatch) -> None:
-    people = range(16)
-    text = f"""(define (problem p) (:domain lift) (:objects {" ".join(f"f{i}" for i in range(8))} - floor
-      {" ".join(f"x{i}" for i in people)} - person n0 n1 n2 n3 - count)
-     (:init (lift f0) (inside n0) (next n0 n1) (next n1 n2) (next n2 n3) {" ".join(f"(at x{i} f{i % 8})" for i in people)})
-     (:goal (and {" ".join(f"(at x{i} f{(3 * i + 1) % 8})" for i in people)})))"""
-    task = ground(imported(parse(LIFT, text)).problem)
-    assert isinstance(task, Task)
-    again = search(task)
-    assert task.carried_out(task.initial, again.plan)[0] & task.goal == task.goal
-    monkeypatch.setattr("confab.planner.grounded.best_first.AGAIN", 0)
-    assert len(again.plan) < len(search(task).plan)
-
-
 def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
     task = ground(tabletop, goal=tabletop.goal_on(3))
     assert isinstance(task, Task)
@@ -322,8 +281,9 @@ def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> 
 def test_a_lookahead_drives_back_for_what_is_left() -> None:
     task = ground(carrier(12))
     assert isinstance(task, Task)
-    relaxed = (heuristic(task)(task.initial) or (0, [], []))[1]
-    state, path = ahead(task)(task.initial, relaxed)
+    evaluation = heuristic(task)(task.initial)
+    assert evaluation is not None
+    state, path = ahead(task)(task.initial, evaluation.plan)
     assert state & task.goal == task.goal
     assert task.carried_out(task.initial, path) == (state, path)
     assert len(path) <= 4 * 12 + 1  # one at a time, there and back
@@ -352,51 +312,15 @@ def test_a_lookahead_replaces_what_is_stuck() -> None:
     assert reached == state
 
 
-def test_relaxing_by_arrays_finds_what_relaxing_bit_by_bit_finds(tabletop: Problem) -> None:
-    for problem in (tabletop, corridor(12), carrier(4)):
-        task = ground(problem)
-        assert isinstance(task, Task)
-        plain, arrays, choice, state = heuristic(task), by_arrays(task), random.Random(1), task.initial
-        states = []
-        for _ in range(60):
-            states.append(state)
-            one, other = plain(state), arrays([state])[0]
-            assert (one is None) == (other is None)
-            if one is None or other is None or not one[2]:
-                break
-            assert one[2] == other[2] and 0 < len(other[1]) == other[0] <= 2 * one[0]
-            state = task.applied(state, choice.choice(one[2])) or 0
-            if state & task.goal == task.goal:
-                break
-        assert arrays(states) == [arrays([state])[0] for state in states]
-
-
-@pytest.mark.parametrize(("parts", "layers"), [(300, 1), (2, 40)])
-def test_arrays_reach_what_costs_more_than_a_number_holds(parts: int, layers: int) -> None:
-    facts = [(layer, part) for layer in range(layers) for part in range(parts)] + [(layers, 0)]
-    actions = "".join(
-        f"(:action make{layer}-{part} :parameters () "
-        f":precondition (and {' '.join(f'(p{layer - 1}-{i})' for i in range(parts)) if layer else ''}) "
-        f":effect (p{layer}-{part}))"
-        for layer, part in facts
-    )
-    domain = f"(define (domain d) (:predicates {' '.join(f'(p{a}-{b})' for a, b in facts)}) {actions})"
-    task = ground(imported(parse(domain, f"(define (problem p) (:domain d) (:init) (:goal (p{layers}-0)))")).problem)
-    assert isinstance(task, Task)
-    found = by_arrays(task)([task.initial])[0]
-    assert found is not None and found[0] == layers * parts + 1
-
-
 def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("confab.planner.grounded.novelty.MOST_BYTES", 0)
-    monkeypatch.setattr("confab.planner.grounded.best_first.MOST_BYTES", 0)
+    monkeypatch.setattr("confab.planner.grounded.exploring.MOST_BYTES", 0)
     outcome = plan_level(carrier(40))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
     assert outcome.reason.text == "there isn't enough memory to go on"
 
 
 def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("confab.planner.grounded.best_first.landmarks", lambda *_: np.empty(1 << 55))
+    monkeypatch.setattr(Novelty, "candidates", lambda _: iter(np.empty(1 << 55)))
     outcome = plan_level(carrier(8))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert not validate(carrier(8), outcome.plan)

@@ -1,0 +1,86 @@
+"""The order by h_FF: what comes from a state with the least h first, with preferred operators and lookahead.
+
+open list   states with the operators that are still to be tried in them, by h: in one queue all that are applicable, in another
+            those of the relaxed plan
+least       a new least h gives the preferred operators turns in advance, and is followed by a lookahead
+
+A state is evaluated when it is reached and its operators are applied one by one: Richter and Helmert, "Preferred operators and
+deferred evaluation in satisficing planning", ICAPS 2009.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+
+from confab.planner.grounded.exploring import Candidate, OpenList
+from confab.planner.grounded.hff import Evaluate
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Counts
+
+BOOST = 1000
+"""Turns that the preferred operators get on a new least h."""
+ALL, PREFERRED = 0, 1
+
+Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
+"""From a state and its relaxed plan to a state that lies ahead, and the operators that lead there."""
+
+
+class Greedy:
+    """The order by h of a task; `counts` grows."""
+
+    def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
+        self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts
+        self.reached: dict[int, Candidate] = {}
+        self.work, self.turn, self.bytes = 0, 1, 0
+        self.open = OpenList[tuple[int, Iterator[int]]](2)
+        self.least: int | None = None
+        self.ahead: Candidate | None = None
+        self.best: int | None = None
+
+    def candidates(self) -> Iterator[Candidate]:
+        """Yield what lookaheads lead to, and what operators lead to from the states with the least h."""
+        while self.best is None:
+            if self.ahead is not None:
+                candidate, self.ahead = self.ahead, None
+                yield candidate
+                continue
+            drawn = self.open.first()
+            if drawn is None:
+                return
+            queue, (state, operators) = drawn
+            operator = next(operators, None)
+            if operator is None:
+                self.open.drop(queue)
+                continue
+            self.counts.generated += 1
+            after = self.task.applied(state, operator)
+            if after is not None:
+                yield Candidate(state, (operator,), after, 0.0)
+
+    def put(self, candidate: Candidate) -> None:
+        """Evaluate a state; where the goal is within reach, its operators are to be tried."""
+        state = candidate.state
+        if state & self.task.goal == self.task.goal:
+            self.best = state
+            return
+        self.counts.evaluated += 1
+        evaluation = self.evaluate(state)
+        if evaluation is None:
+            self.work += self.turn
+            return
+        self.counts.expanded += 1
+        self.work += evaluation.work
+        possible = set(evaluation.applicable)
+        preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
+        operators = array("q", (*preferred, *sorted(possible.difference(preferred))))
+        self.bytes += operators.itemsize * len(operators)
+        self.open.push(evaluation.h, (state, iter(operators)), ALL)
+        if preferred:
+            self.open.push(evaluation.h, (state, iter(operators[: len(preferred)])), PREFERRED)
+        if self.least is None or evaluation.h < self.least:
+            self.least = evaluation.h
+            self.open.turns[PREFERRED] -= BOOST
+            after, path = self.lookahead(state, evaluation.plan)
+            if len(path) > 1:
+                self.ahead = Candidate(state, tuple(path), after, 0.0)
