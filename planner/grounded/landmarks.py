@@ -1,7 +1,8 @@
 """Landmarks: facts that every plan makes true at some time.
 
-Those of an operator are what all its needs have behind them, those of a fact what all ways to it have in common: Keyder, Richter and
-Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
+The landmarks of an operator are all facts behind its needs, and those of a fact are what all operators that set it have in common.
+
+Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ distance    what is open, and of the facts of a relaxed plan, made where the las
 novel       some fact is new among the states of the same distance: one "and" of two integers
 open list   states by novelty, then by what is open; of equal ones the last comes first
 
-A relaxed plan is made only for states that meet what was open and are expanded, so that hundreds of thousands of states a second are
-looked at. No state is dropped: where the open list runs empty, there is no plan.
+A relaxed plan is made only for states that meet what was open and are expanded, so that the order ranks a hundred thousand states a
+second. No state is dropped: where the open list runs empty, there is no plan.
 
 Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
 cut off at one.
