@@ -18,8 +18,9 @@ from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
 GROUPS = {  # as the help lists them, the main ones first
-    "Plan and act": ("plan", "run", "runs", "verify", "execute", "explain"),
+    "Plan and act": ("plan", "run", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
+    "Look": ("report", "runs"),
     "Ask": ("query", "serve", "mcp", "picture"),
     "Author": ("validate", "new", "generate", "convert", "fetch"),
     "Exchange": ("import", "export"),
@@ -27,7 +28,8 @@ GROUPS = {  # as the help lists them, the main ones first
 COMMANDS = {
     "plan": ("planning", "plan"),
     "run": ("planning", "run"),
-    "runs": ("planning", "runs"),
+    "report": ("reporting", "report"),
+    "runs": ("reporting", "runs"),
     "verify": ("planning", "verify"),
     "execute": ("planning", "execute"),
     "serve": ("asking", "serve"),

@@ -13,6 +13,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab run towers-small",
         "confab run beverage-serving --memory memory.ttl -o out --no-video",
     ),
+    "report": (
+        "confab report beverage-serving -o plan.html",
+        "confab execute beverage-serving -o visit.json",
+        "confab report beverage-serving --episode visit.json -o visit.html",
+    ),
     "runs": (
         "confab run towers-small -o runs --keep",
         "confab run towers-small -o runs --keep",

@@ -82,7 +82,9 @@ def runs(folder: str | Path) -> list[Run]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise KnowledgeError(f"{folder}: no such folder; 'confab run SCENE -o {folder} --keep' begins one")
+        raise KnowledgeError(
+            f"{folder}: no such folder; 'confab run SCENE -o FOLDER --keep' begins one, which is then FOLDER here"
+        )
     files = [folder / RECORD, *sorted(folder.glob(f"*/{RECORD}"))]
     found = [_read(file) for file in files if file.is_file()]
     if not found:

@@ -13,7 +13,6 @@ from click.exceptions import Exit
 from confab.commands.given import blame_reach, doubt, json_file, load_scene, memory_for, plan_in
 from confab.commands.options import (
     AS_JSON,
-    FOLDER,
     GOALS,
     GUI,
     MEMORY_FILE,
@@ -113,7 +112,7 @@ def plan(
                 goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
             )
     if report is not None:
-        result.report(report)
+        remark(f"the page is {result.report(report)}")
     if out is not None:
         told(result.save(out), summary(result.outcome))
     else:
@@ -169,32 +168,6 @@ def run(
     with limited(time_limit):
         folder = new_folder(out) if keep else out
         raise Exit(run_all(Job(scene, folder, goal, memory, mode, seed, noise, not no_video, gui)))
-
-
-@command(epilog=examples("runs"))
-@click.argument(
-    "folder", type=FOLDER, default="confab-out", metavar="[FOLDER]", help="Where 'confab run --keep' keeps runs."
-)
-@click.argument("names", nargs=-1, metavar="[RUN OTHER]", help="Two runs to compare.")
-@click.option("-o", "--output", "out", type=Output(REPORT), metavar="FILE.html", help="Write them as a page.")
-@AS_JSON
-@QUIET
-def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) -> None:
-    """List the runs that were kept, or compare two of them."""
-    from confab.history import compared, history_html, listed
-    from confab.history import runs as read
-
-    if len(names) not in (0, 2):
-        raise KnowledgeError(f"got {len(names)} run; wanted the names of two to compare, or none to list all")
-    found = read(folder)
-    if out is not None:
-        from confab.reasoner.files import write_whole
-
-        write_whole(out, history_html(found, f"Runs in {folder.name or folder}"))
-        told(out, f"{len(found)} runs")
-        return
-    table = compared(found, *names) if names else listed(found)
-    show_result(table.records() if as_json else table)
 
 
 @command(epilog=examples("verify"))
@@ -366,7 +339,7 @@ def execute(
     if save is not None:
         execution.save(save)
     if report is not None:
-        execution.report(report)
+        remark(f"the page is {execution.report(report)}")
     show_result(execution.json() if as_json else execution)
     raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 

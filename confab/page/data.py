@@ -295,7 +295,11 @@ def page_data(
         else "",
         "tiles": _tiles(problem, timeline if planned else None, outcome, report, execution),
         "goals": _goals(timeline, labels, planned),
-        "notes": [*_small_print(outcome), *filter(None, [result.dearer() if result is not None else ""])],
+        "notes": [
+            *data["notes"],
+            *_small_print(outcome),
+            *filter(None, [result.dearer() if result is not None else ""]),
+        ],
         "again": again or _again(scene, report, execution, timeline.unit == "s"),
     }
     if alarm := _alarm(timeline, labels, outcome, report, execution):
@@ -344,10 +348,13 @@ def timeline_data(
         "rows": rows,
         "hidden": hidden,
         "steps": _steps(timeline, labels, notes, reasons),
+        "notes": [],
     }
     ground = ground_of(timeline.problem, embodiment_of(scene))
     if ground is not None and ground.spots:
         data["map"] = _map(ground, timeline, labels)
+    elif ground is not None:
+        data["notes"] = [ground.note]
     return data
 
 

@@ -43,16 +43,23 @@ class Ground:
 
 
 def ground_of(problem: Problem, embodiment: Embodiment | None) -> Ground | None:
-    """Return the background of the map: by coordinates, else by connections, else in order; None if there are no places."""
+    """Return the background of the map: by coordinates, else by connections, else in order; None if there are no places.
+
+    With more than `MOST_SPOTS` places it has none, and its note says so.
+    """
     if embodiment is not None and embodiment.places:
         return _furnished(embodiment)
     return _connected(problem) or _in_order(problem)
 
 
-def _furnished(embodiment: Embodiment) -> Ground | None:
+def _too_many(number: int) -> Ground:
+    return Ground({}, note=f"there is no map, since {number:,} places are too many for one ({MOST_SPOTS} at most)")
+
+
+def _furnished(embodiment: Embodiment) -> Ground:
     """Return furniture and places as the film shows them: the camera stands opposite the robots (`sim.picture.view_of`)."""
     if len(embodiment.places) > MOST_SPOTS:
-        return None
+        return _too_many(len(embodiment.places))
     from confab.sim.linkage import with_open_mechanisms
 
     places, solids = with_open_mechanisms(embodiment)
@@ -98,8 +105,10 @@ def _connected(problem: Problem) -> Ground | None:
     for _, rows in sorted(problem.relations.items()):
         graph.add_edges_from(sorted(row for row in rows if len(row) == 2 and row[0] != row[1] and values >= {*row}))
     shown = max(networkx.connected_components(graph), key=lambda part: (len(part), min(part)), default=set())
-    if len(shown) < 3 or len(shown) > MOST_SPOTS:
+    if len(shown) < 3:
         return None
+    if len(shown) > MOST_SPOTS:
+        return _too_many(len(shown))
     graph = networkx.Graph(sorted((min(pair), max(pair)) for pair in graph.subgraph(shown).edges))
     places = networkx.kamada_kawai_layout(graph)
     spots = {name: (round(STRETCH * float(x), 4), round(float(y), 4)) for name, (x, y) in places.items()}
@@ -117,8 +126,10 @@ def _in_order(problem: Problem) -> Ground | None:
     held = {symbol.arguments[0] for symbol in problem.initial if symbol.arguments}
     lists = [problem.classes.get(kind, ()) for kind in sorted(kinds)]
     places = max((those for those in lists if not held & {*those}), key=len, default=())
-    if len(places) < 3 or len(places) > MOST_SPOTS:
+    if len(places) < 3:
         return None
+    if len(places) > MOST_SPOTS:
+        return _too_many(len(places))
     wide = max(3, round((2.2 * len(places)) ** 0.5))
     names = sorted(places, key=natural)
     spots = {name: (float(number % wide), float(number // wide)) for number, name in enumerate(names)}

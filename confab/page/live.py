@@ -109,7 +109,6 @@ class Following:
                 {"name": "interventions and changes of plan", "text": str(len(marks))},
             ],
             "goals": [],
-            "notes": [],
             "again": "",
         }
         return data

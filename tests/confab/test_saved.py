@@ -4,8 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import confab
+from confab.cli import app
 from confab.sim.verdict import Verdict
 from confab.sim.verify import Rollout, StepReport
 
@@ -67,3 +69,16 @@ def test_an_episode_of_another_scene_or_in_turtle_is_refused(scene: confab.Scene
         scene.read_episode(done.save(tmp_path / "towers.json"))
     with pytest.raises(confab.KnowledgeError, match="with_episodes"):
         scene.read_episode(done.save(tmp_path / "towers.ttl"))
+
+
+def test_the_page_of_what_was_saved_is_written_by_a_command(tmp_path: Path) -> None:
+    page, visit = tmp_path / "page.html", tmp_path / "visit.json"
+    invoke = CliRunner().invoke
+    assert invoke(app, ["execute", "towers-small", "-o", str(visit)]).exit_code == 0
+    done = invoke(app, ["report", "towers-small", "--episode", str(visit), "-o", str(page)])
+    assert done.exit_code == 0, done.output
+    assert '"status":"reached"' in page.read_text()
+    assert invoke(app, ["report", "towers-small", "-o", str(page)]).exit_code == 0
+    assert '"status":"a plan, checked"' in page.read_text()
+    wrong = invoke(app, ["report", "towers-small", "--plan", str(visit), "-o", str(page)])
+    assert "belong together" in str(wrong.exception)

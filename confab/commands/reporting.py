@@ -1,0 +1,79 @@
+"""The page as a file: of a plan, an execution or a verification that was saved, and of runs that were kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from confab.commands.given import load_scene, plan_in
+from confab.commands.options import AS_JSON, FOLDER, GOALS, PATH, QUIET, SCENE, TIME_LIMIT, Output, command
+from confab.examples import examples
+from confab.progress import progress
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import REPORT
+from confab.terminal import limited, show_result, told
+
+
+@command(epilog=examples("report"))
+@SCENE
+@click.option("-o", "--output", "out", type=Output(REPORT), required=True, metavar="FILE.html", help="File to write.")
+@GOALS
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="With --verdicts: the plan that was verified.")
+@click.option("--verdicts", type=PATH, metavar="VERDICTS.json", help="Show what 'confab verify -o' wrote.")
+@click.option("--episode", type=PATH, metavar="EPISODE.json", help="Show what 'confab execute -o' wrote.")
+@TIME_LIMIT
+@QUIET
+def report(
+    scene: str,
+    out: Path,
+    goal: tuple[str, ...],
+    plan: Path | None,
+    verdicts: Path | None,
+    episode: Path | None,
+    time_limit: float | None,
+) -> None:
+    """Write the page of a plan, or of what was saved, into a file."""
+    from confab.page.data import page_data
+    from confab.page.frozen import write_page
+
+    if (plan is None) != (verdicts is None):
+        raise KnowledgeError("--plan and --verdicts belong together; give both, or none")
+    if episode is not None and (goal or plan is not None):
+        raise KnowledgeError("--episode shows an execution alone; leave out --goal, --plan and --verdicts")
+    with limited(time_limit):
+        loaded = load_scene(scene)
+        if episode is not None:
+            data = page_data(loaded, execution=loaded.read_episode(episode))
+        elif plan is not None and verdicts is not None:
+            data = page_data(loaded, report=loaded.read_report(verdicts, plan_in(plan, loaded)))
+        else:
+            with progress("planning"):
+                data = page_data(loaded, loaded.plan(goal))
+        told(write_page(out, data), data["headline"])
+
+
+@command(epilog=examples("runs"))
+@click.argument(
+    "folder", type=FOLDER, default="confab-out", metavar="[FOLDER]", help="Where 'confab run --keep' keeps runs."
+)
+@click.argument("names", nargs=-1, metavar="[RUN OTHER]", help="Two runs to compare.")
+@click.option("-o", "--output", "out", type=Output(REPORT), metavar="FILE.html", help="Write them as a page.")
+@AS_JSON
+@QUIET
+def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+    """List the runs that were kept, or compare two of them."""
+    from confab.history import compared, history_html, listed
+    from confab.history import runs as read
+
+    found = read(folder)
+    if len(names) not in (0, 2):
+        raise KnowledgeError(f"got {len(names)} run; wanted two to compare ('confab runs {folder} 001 002'), or none")
+    if out is not None:
+        from confab.reasoner.files import write_whole
+
+        write_whole(out, history_html(found, f"Runs in {folder.name or folder}"))
+        told(out, f"{len(found)} runs")
+        return
+    table = compared(found, *names) if names else listed(found)
+    show_result(table.records() if as_json else table)
