@@ -28,6 +28,18 @@ from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Problem
+from confab.timing import (
+    Minimise,
+    asks_for_times,
+    checked_minimise,
+    concurrent,
+    lanes,
+    may_overlap_by_need,
+    needs_others_meanwhile,
+    schedule_json,
+    scheduled,
+    with_unit_costs,
+)
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -39,6 +51,7 @@ if TYPE_CHECKING:
     from confab.physics import Report
     from confab.planner.causal_links import Purpose
     from confab.planner.certificates import Certificate
+    from confab.planner.timed.plan import TimedPlan
     from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
 
@@ -63,6 +76,7 @@ class Options(TypedDict, total=False):
     engine: str | None
     level: int | None
     leave_levels: bool
+    minimise: Minimise | None
 
 
 def plan(
@@ -76,6 +90,7 @@ def plan(
     engine: str | None = None,
     level: int | None = None,
     leave_levels: bool = True,
+    minimise: Minimise | None = None,
     *,
     goal: Facts = (),
 ) -> Result:
@@ -107,6 +122,9 @@ def plan(
     leave_levels : bool
         Whether steps of a lower level may stand where a level has no plan that can be refined; the outcome says where, and
         what they break that only the level above asks.
+    minimise : str, optional
+        ``makespan``: the plan gets a schedule (`Result.timed`), with its turns taken by any of the actors that could. ``cost``:
+        the same as `optimal`. ``steps``: the same, with every step at a cost of 1. If left out, steps are few, without a proof.
 
     Raises
     ------
@@ -115,6 +133,9 @@ def plan(
     LimitError
         The time was over before the search began; if it is over later, the outcome says so.
     """
+    checked_minimise(minimise)
+    if minimise in ("cost", "steps"):
+        optimal = True
     if level is not None and engine in (None, NO_ENGINE):
         raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
     if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
@@ -143,9 +164,8 @@ def plan(
 
             memory = Memory.load(memory, scene)
         how = "optimal" if optimal else mode
-        return _plan(
-            scene, [*several(goals), *several(goal)], memory, how, deadline, observed, engine, level, leave_levels
-        )
+        wanted = [*several(goals), *several(goal)]
+        return _plan(scene, wanted, memory, how, deadline, observed, engine, level, leave_levels, minimise)
 
 
 def _plan(
@@ -158,6 +178,7 @@ def _plan(
     engine: str | None,
     level: int | None,
     leave_levels: bool,
+    minimise: Minimise | None,
 ) -> Result:
     begin, asked = perf_counter(), scene.knowledge.round_trips
     links = memory if isinstance(memory, Links) else memory.links if memory is not None and mode == "paper" else None
@@ -197,7 +218,8 @@ def _plan(
             from confab.engines import some_installed
 
             seconds *= OURS if some_installed(problem) else 1.0
-        request = Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels)
+        alike = with_unit_costs(problem) if minimise == "steps" else problem
+        request = Request(alike, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels)
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
         outcome = solve(replace(request, limits=Limits(work=OURS_WORK)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
@@ -213,6 +235,13 @@ def _plan(
         reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
+    timed = None
+    if needs_others_meanwhile(problem):
+        problem = problem if seen.whole else whole()
+        outcome, timed = concurrent(problem, deadline)
+        queries = scene.knowledge.round_trips - asked
+        seconds = {**scene.seconds, "quantify": quantified}
+        return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
         outcome = search(without(problem, [behavior for behavior, _ in faulty]))
         if outcome.status is not Status.SOLVED:
@@ -231,9 +260,14 @@ def _plan(
         anew = whole()
         if anew != problem:
             problem, outcome = anew, search(anew)
+    if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
+        outcome, timed = concurrent(problem, deadline)
+    elif asks_for_times(problem, minimise):
+        outcome, timed = scheduled(problem, outcome, deadline)
     queries = scene.knowledge.round_trips - asked
     part = None if problem is not seen.problem or seen.whole else seen
-    return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries, part, tuple(goals))
+    seconds = {**scene.seconds, "quantify": quantified}
+    return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed)
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
@@ -277,6 +311,7 @@ class Result:
     queries: int = 0
     part: Reading | None = None
     goals: tuple[str, ...] = ()
+    timed: TimedPlan | None = None
 
     def faults(self, plan: Plan) -> list[Fault]:
         """Return the faults of a plan for the same task in the whole scene; empty if the plan is valid."""
@@ -345,6 +380,10 @@ class Result:
         """The causal links of each step, by its path (`confab.planner.causal_links`)."""
         from confab.planner.causal_links import purposes
 
+        if needs_others_meanwhile(self.problem):
+            raise KnowledgeError(
+                "steps of this plan need others meanwhile; reasons are told of sequences of steps only"
+            )
         return purposes(self.problem, self.plan)
 
     def why(self, step: AnyStep) -> Because:
@@ -475,7 +514,8 @@ class Result:
 
     def json(self) -> dict[str, Any]:
         """Return the result as JSON data (docs/command-line.md)."""
-        return {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
+        data = {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
+        return data if self.timed is None else {**data, "schedule": schedule_json(self.timed)}
 
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON and return where."""
@@ -488,14 +528,18 @@ class Result:
         """Return a tree for rich."""
         from confab.show import plan_tree, summary
 
-        return plan_tree(self.plan, summary(self.outcome)) if self.solved else summary(self.outcome)
+        if not self.solved:
+            return summary(self.outcome)
+        more = () if self.timed is None else ("", *lanes(self.timed))
+        return plan_tree(self.plan, "\n".join((summary(self.outcome), *more)))
 
     def __repr__(self) -> str:
         """Return the summary and the steps of the most abstract level."""
         from confab.show import summary
 
         steps = self.outcome.plan.steps if self.outcome.plan else ()
-        return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps)])
+        more = () if self.timed is None else lanes(self.timed)
+        return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps), *more])
 
     def report(self, path: str | Path) -> Path:
         """Write the plan, with its reasons, as one HTML page, and return where."""

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
@@ -213,6 +214,67 @@ class AmountEffect:
 Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
+# ---------------------------------------------------------------------------------------------------------------- time
+
+
+class Span(Enum):
+    """The part of a step at which a condition is asked, or an effect made."""
+
+    START = "atStart"
+    THROUGHOUT = "throughout"  # of an effect: it is in the making until the end
+    END = "atEnd"
+
+
+@dataclass(frozen=True)
+class Timing:
+    """A behaviour in time.
+
+    Attributes
+    ----------
+    duration : Expression, optional
+        Seconds, evaluated where the behaviour begins. None: as long as its refinement or, of a primitive, as was measured.
+    actors : tuple of str
+        Terms of the behaviour that can be in one step at a time.
+    conditions, effects : tuple of pairs
+        All conditions and effects as they are written, each with its span.
+    """
+
+    duration: Expression | None = None
+    actors: tuple[str, ...] = ()
+    conditions: tuple[tuple[Span, Condition], ...] = ()
+    effects: tuple[tuple[Span, Effect], ...] = ()
+
+    def asked(self, span: Span) -> tuple[Condition, ...]:
+        """Return the conditions of a span."""
+        return tuple(condition for at, condition in self.conditions if at is span)
+
+    def made(self, span: Span) -> tuple[Effect, ...]:
+        """Return the effects of a span."""
+        return tuple(effect for at, effect in self.effects if at is span)
+
+
+@dataclass(frozen=True)
+class Times:
+    """What a task says of time, in seconds from the begin of the plan.
+
+    Attributes
+    ----------
+    deadlines : mapping of Symbol to seconds
+        From when on a goal holds, at the latest.
+    windows : mapping of individual to pairs of seconds
+        When an individual is available; None as the end of a window: for good. An individual without a window always is.
+    measured : mapping of behaviour to seconds
+        How long behaviours without a stated duration took on average.
+    events : mapping of behaviour to seconds
+        Behaviours that nobody does: they happen at that time (PDDL's timed initial literals).
+    """
+
+    deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)
+    windows: Mapping[str, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
+    measured: Mapping[str, Fraction] = field(default_factory=dict)
+    events: Mapping[str, Fraction] = field(default_factory=dict)
+
+
 # ---------------------------------------------------------------------------------------------------------- behaviours
 
 
@@ -231,7 +293,7 @@ class Behavior:
     Effects are applied in order, false facts first, so that a fact which one binding makes both false and true is true, as in
     PDDL. The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
     the individuals that it names only as members of a class. A `price` replaces `cost`, and a precondition requires that the price
-    is defined (`priced`).
+    is defined (`priced`). `timing` says when its conditions are asked and its effects made (`confab.reasoner.timing`).
     """
 
     name: str
@@ -244,6 +306,7 @@ class Behavior:
     amounts: tuple[AmountEffect, ...] = ()
     spread: frozenset[str] = frozenset()
     price: Expression | None = None
+    timing: Timing | None = None
 
     def __post_init__(self) -> None:
         """Sort the effects."""
@@ -258,9 +321,15 @@ class Behavior:
         return None if self.price is None else Comparison(self.price, ">=", Fraction(0))
 
     @cached_property
+    def lasting(self) -> Comparison | None:
+        """The conditions of a calculated duration: it is a number, and not negative."""
+        duration = None if self.timing is None else self.timing.duration
+        return None if isinstance(duration, Fraction | None) else Comparison(duration, ">=", Fraction(0))
+
+    @cached_property
     def asked(self) -> tuple[Condition, ...]:
-        """The preconditions without those of the price."""
-        return tuple(condition for condition in self.preconditions if condition != self.priced)
+        """The preconditions without those of the price and the duration."""
+        return tuple(condition for condition in self.preconditions if condition not in (self.priced, self.lasting))
 
     @cached_property
     def every_effect(self) -> tuple[ValueEffect | AmountEffect, ...]:
@@ -370,6 +439,8 @@ class Problem:
         For statistics that back off; the planner's search doesn't use it.
     value_levels : mapping of individual to level
         The first level on which a value exists, where that isn't 1.
+    times : Times, optional
+        Deadlines, windows and measured durations (`confab.reasoner.timing`).
     """
 
     scene: str
@@ -380,6 +451,7 @@ class Problem:
     goal: State
     parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     value_levels: Mapping[str, int] = field(default_factory=dict)
+    times: Times | None = None
 
     def values(self, symbol: Symbol, level: int) -> tuple[str, ...]:
         """Return the values that a symbol can have on a level, in declared order."""

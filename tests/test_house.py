@@ -23,6 +23,7 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "hierarchical": {"grounded"},
     "experience": {"hierarchical", "paper"},
     "acting": {"hierarchical"},
+    "timed": {"grounded"},
 }
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 
@@ -177,6 +178,7 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 "plan_costs",
                 "validation",
                 "checked_amounts",
+                "checked_conditions",
                 "checked_definitions",
                 "certified",
                 "certifying",

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from confab.explaining import Explanation
     from confab.memory import Memory
     from confab.planning import Result
+    from confab.timing import Minimise
 
 
 @command(epilog=examples("plan"))
@@ -67,6 +68,11 @@ if TYPE_CHECKING:
     "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
 )
 @click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
+@click.option(
+    "--minimise",
+    metavar="makespan|cost|steps",
+    help="Makespan: schedule the steps, several actors at once; cost and steps: as --optimal.",
+)
 @click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write the plan and its reasons as a page.")
 @click.option("-o", "--output", "out", type=Output(PLAN), metavar="PLAN.json", help="Write the plan into this file.")
 @SCENE_IRI
@@ -85,6 +91,7 @@ def plan(
     diff: str | None,
     engine: str | None,
     level: int | None,
+    minimise: Minimise | None,
     report: Path | None,
     out: Path | None,
     iri: str | None,
@@ -109,7 +116,16 @@ def plan(
         limit = None if time_limit is None else deadline
         with progress("planning"):
             result = loaded.plan(
-                goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
+                goal or (),
+                remembered,
+                mode,
+                limit,
+                optimal,
+                observed,
+                engine,
+                level,
+                leave_levels=levels == "free",
+                minimise=minimise,
             )
     if report is not None:
         remark(f"the page is {result.report(report)}")

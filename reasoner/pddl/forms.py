@@ -8,7 +8,8 @@ from itertools import product
 from math import prod
 from typing import TypeAlias
 
-from confab.reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
+from confab.reasoner.pddl.syntax import CHANGES, Typed, either
+from confab.reasoner.pddl.words import Form, Word
 
 Atom = tuple[str, ...]
 """A predicate and its terms."""

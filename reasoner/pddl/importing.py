@@ -49,7 +49,9 @@ from confab.reasoner.pddl.forms import (
     words_of,
 )
 from confab.reasoner.pddl.invariants import Invariants, Part
-from confab.reasoner.pddl.syntax import COMPARISONS, Form, Pddl, PddlError, Typed, Word, is_number
+from confab.reasoner.pddl.syntax import COMPARISONS, Pddl, PddlError, Typed, is_number
+from confab.reasoner.pddl.timing import Variables, happenings, snapped, timing
+from confab.reasoner.pddl.words import Form, Word
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -133,6 +135,8 @@ class _Import:
         self.numeric = {name: tuple(numeric_of(action.effect)) for name, action in self.pddl.actions.items()}
         forms = [f for a in self.pddl.actions.values() for f in (a.precondition, a.effect)]
         forms += [axiom.condition for axiom in self.pddl.axioms]
+        durations = [a.durative.duration for a in self.pddl.actions.values() if a.durative is not None]
+        forms += [Form((one,), 0, 0) for one in durations]
         read = {word for form in (*forms, self.pddl.goal) for word in functions_read(form)}
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
         self.weights = self.costing(changed)
@@ -142,11 +146,13 @@ class _Import:
         conditions += [axiom.condition for axiom in self.pddl.axioms]
         whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
         whens += [f for effects in self.effects.values() for e in effects for f in e.when]
-        asked = [self.pddl.goal, *conditions, *whens, *(a for a in counted if isinstance(a, Form))]
+        asked = [self.pddl.goal, *conditions, *whens, *(a for a in (*counted, *durations) if isinstance(a, Form))]
         heads = {form.head for form in asked if form} | {word for form in asked for word in functions_read(form)}
         self.measures = (heads & self.pddl.functions.keys()) - self.amounts
         self.derived = {axiom.predicate for axiom in self.pddl.axioms}
         self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects} | self.derived
+        self.happening = {atom[0] for _, atom, _ in self.pddl.timed}
+        self.changing |= self.happening
         self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
         self.facts = dict.fromkeys(self.pddl.initial)
 
@@ -209,6 +215,9 @@ class _Import:
         behaviors = {b.name: b for b in map(self.behavior, pddl.actions) if b is not None}
         initial = self.initial(situations, classes)
         goal, reach = self.goal(situations)
+        events, all_happened, times = happenings(self, _Variables(self), situations, classes)
+        behaviors |= {event.name: event for event in events}
+        goal |= all_happened
         if reach:
             behaviors[reach.name] = reach
         elif ("situation", "goal reached") in self.names:
@@ -218,7 +227,7 @@ class _Import:
             classes[WORLD] = (THE_WORLD,)
         scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
         domain = Domain(situations, behaviors, rules=rules)
-        return Problem(scene, domain, classes, relations, initial, goal, parents)
+        return Problem(scene, domain, classes, relations, initial, goal, parents, times=times)
 
     def rules(self) -> dict[str, tuple[Rule, ...]]:
         """Return the rules of each derived predicate.
@@ -249,8 +258,9 @@ class _Import:
     ) -> dict[str, SituationType]:
         """Return the situation types, invariants first, and record in `places` the translation of each predicate."""
         found: dict[str, SituationType] = {}
-        candidates = frozenset(self.changing - self.derived)
-        for parts in Invariants(self.pddl, self.effects, candidates, frozenset(self.changing), self.sets).found():
+        candidates = frozenset(self.changing - self.derived - self.happening)
+        pddl, effects = snapped(self.pddl, self.effects)
+        for parts in Invariants(pddl, effects, candidates, frozenset(self.changing), self.sets).found():
             name = self.name("situation", "+".join(p.predicate for p in parts), parts[0].predicate.upper())
             own = []
             for part in parts:
@@ -425,13 +435,18 @@ class _Import:
         if found is None:
             return None
         conditions = tuple(dict.fromkeys(found))
-        effects = self.value_effects(name, variables, conditions)
-        amounts = self.amount_effects(name, variables, conditions)
+        effects = self.value_effects(self.effects[name], variables, conditions)
+        amounts = self.amount_effects(name, self.numeric[name], variables, conditions)
         used = {word for atom in words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
         named = self.name("action", name, name.upper())
         behavior = Behavior(named, self.level, parameters, (), conditions, effects, amounts=amounts)
+        if action.durative is not None:
+            lies = timing(self, action.durative, variables, conditions)
+            if lies.duration is not None and not isinstance(lies.duration, Fraction):
+                conditions = (*conditions, Comparison(lies.duration, ">=", Fraction(0)))
+            behavior = replace(behavior, preconditions=conditions, timing=lies)
         price = self.price(name)
         if not price and not self.pddl.minimize:
             price = Fraction(1)
@@ -485,11 +500,11 @@ class _Import:
         return Measure(self.name("static", f"({item.head})"), terms)
 
     def amount_effects(
-        self, name: str, variables: _Variables, conditions: Sequence[Condition]
+        self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[AmountEffect, ...]:
         """Return an action's effects on amounts."""
         found = []
-        for effect in self.numeric[name]:
+        for effect in effects:
             if effect.function.head not in self.amounts:
                 continue
             if effect.head == "assign" and not self.everywhere(effect.function.head):
@@ -517,12 +532,11 @@ class _Import:
         return sum(words[0] == function for words in self.pddl.numbers) == things
 
     def value_effects(
-        self, name: str, variables: _Variables, conditions: Sequence[Condition]
+        self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
         """Return an action's effects, deletions first."""
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
-        effects = self.effects[name]
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
             when = self.simplified(
                 c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)

@@ -15,7 +15,8 @@ from functools import cached_property
 from itertools import combinations
 
 from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_of
-from confab.reasoner.pddl.syntax import Action, Form, Pddl
+from confab.reasoner.pddl.syntax import Action, Pddl
+from confab.reasoner.pddl.words import Form
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
 """For each arity, the possible positions of the object and of the value."""

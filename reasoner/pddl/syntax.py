@@ -17,13 +17,15 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
+from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
+from confab.reasoner.pddl.words import Form, Word
+
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
 """A variable begins at its '?', as in (aircraft?a), a type at its name, as in (?b -boat)."""
 COMPARISONS = ("<", "<=", "=", ">=", ">")
 CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 SECTIONS = {
-    ":durative-action": "durative actions",
     ":constraints": "trajectory constraints",
     ":process": "processes",
     ":event": "events",
@@ -38,29 +40,6 @@ class PddlError(ValueError):
 
 
 @dataclass(frozen=True)
-class Word:
-    """A name or number in lower case, with its place."""
-
-    text: str
-    line: int
-    column: int
-
-
-@dataclass(frozen=True)
-class Form:
-    """A list in parentheses, with its place."""
-
-    items: tuple[Word | Form, ...]
-    line: int
-    column: int
-
-    @property
-    def head(self) -> str:
-        """The first word; empty if there is none."""
-        return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
-
-
-@dataclass(frozen=True)
 class Typed:
     """A name (of a type, an object or, with its question mark, a variable) and its type."""
 
@@ -71,13 +50,17 @@ class Typed:
 
 @dataclass(frozen=True)
 class Action:
-    """An action as written; the words of `precondition` and `effect` have been checked."""
+    """An action as it is written; `precondition` and `effect` are forms whose words have been checked.
+
+    Those of a durative action are what it asks and does as a whole (`confab.reasoner.pddl.durative`); `durative` has the parts.
+    """
 
     name: str
     parameters: tuple[Typed, ...]
     precondition: Form | None
     effect: Form | None
     place: Word
+    durative: Durative | None = None
 
 
 @dataclass(frozen=True)
@@ -103,6 +86,7 @@ class Pddl:
     axioms: list[Axiom] = field(default_factory=list)
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
+    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # facts that begin or end to hold
     goal: Form | None = None
     minimize: Form | None = None  # what is to be as little as can be
 
@@ -244,7 +228,7 @@ class _Reader:
                 self.pddl.predicates |= dict(self.signatures(rest, "predicate"))
             elif section.head == ":functions":
                 self.functions(rest)
-            elif section.head == ":action":
+            elif section.head in (":action", ":durative-action"):
                 actions.append(section)
             elif section.head == ":derived":
                 axioms.append(section)
@@ -376,11 +360,13 @@ class _Reader:
         name = self.word(form.items[1], "the action's name")
         if name.text in self.pddl.actions:
             raise self.fail(name, f"a second action '{name.text}'")
+        durative = form.head == ":durative-action"
+        known = (":parameters", *((":duration", ":condition") if durative else (":precondition",)), ":effect")
         parts: dict[str, Form] = {}
         rest = form.items[2:]
         for key, value in zip(rest[::2], rest[1::2], strict=False):
             word = self.word(key, "a keyword such as :effect")
-            if word.text not in (":parameters", ":precondition", ":effect"):
+            if word.text not in known:
                 raise self.fail(word, f"unknown part {word.text} of an action")
             if not isinstance(value, Form):
                 raise self.fail(value, f"wanted a list behind {word.text}")
@@ -389,6 +375,9 @@ class _Reader:
             raise self.fail(rest[-1], "wanted a keyword and a list")
         parameters = tuple(self.typed(parts[":parameters"].items if ":parameters" in parts else ()))
         variables = self.scope(parameters, {})
+        if durative:
+            self.durative(form, name, parameters, variables, parts)
+            return
         precondition, effect = parts.get(":precondition"), parts.get(":effect")
         if precondition and precondition.items:
             self.condition(precondition, variables)
@@ -396,6 +385,34 @@ class _Reader:
             self.effect(effect, variables)
         given = precondition if precondition and precondition.items else None
         self.pddl.actions[name.text] = Action(name.text, parameters, given, effect, name)
+
+    def durative(
+        self,
+        form: Form,
+        name: Word,
+        parameters: tuple[Typed, ...],
+        variables: Mapping[str, str],
+        parts: Mapping[str, Form],
+    ) -> None:
+        """Take a durative action; its parts are checked as those of any action, each by itself."""
+        if ":duration" not in parts:
+            raise self.fail(form, f"durative action '{name.text}' has no :duration")
+        try:
+            duration = duration_in(parts[":duration"])
+            found = Durative(
+                duration,
+                tuple(timed(parts.get(":condition"), "condition", duration)),
+                tuple(timed(parts.get(":effect"), "effect", duration)),
+            )
+        except NotTimedError as error:
+            raise self.fail(error.at, str(error)) from error
+        self.number(duration, variables)
+        for _, one in found.conditions:
+            self.condition(one, variables)
+        for _, one in found.effects:
+            self.effect(one, variables)
+        asked, made = whole(found, form)
+        self.pddl.actions[name.text] = Action(name.text, parameters, asked, made, name, found)
 
     def axiom(self, form: Form) -> None:
         """Read ``(:derived (name ?x …) condition)``; a variable without a type has the type of the predicate."""
@@ -570,7 +587,8 @@ class _Reader:
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
         if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]):
-            raise self.fail(item, "timed initial literals are not supported")
+            self.timed_fact(item)
+            return
         if item.head == "=":
             names = [word.text for word in item.items[1:] if isinstance(word, Word)]
             if len(names) == 2 and names[0] == names[1] in self.pddl.objects:
@@ -586,6 +604,16 @@ class _Reader:
         else:
             self.stated(item, "stated")
             self.pddl.initial.append(self.atom(item, {}))
+
+    def timed_fact(self, item: Form) -> None:
+        """Take a fact that begins or ends to hold at a time (PDDL 2.2's timed initial literals)."""
+        seconds, literal = self.constant(item.items[1]), item.items[2]
+        true = not (isinstance(literal, Form) and literal.head == "not")
+        inner = literal if true else literal.items[1] if isinstance(literal, Form) and len(literal.items) == 2 else None
+        if seconds < 0 or not isinstance(inner, Form) or inner.head not in self.pddl.predicates:
+            raise self.fail(item, "wanted (at TIME (predicate …)) or (at TIME (not (predicate …))), the time from 0 on")
+        self.stated(inner, "stated")
+        self.pddl.timed.append((seconds, self.atom(inner, {}), true))
 
 
 def is_number(item: Word | Form) -> bool:

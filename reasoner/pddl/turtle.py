@@ -18,6 +18,7 @@ from confab.reasoner.language import measures
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -29,11 +30,16 @@ from confab.reasoner.symbols import (
     RelationCondition,
     Rule,
     SituationType,
+    Span,
     Symbol,
+    Times,
+    Timing,
     ValueCondition,
+    ValueEffect,
     Witness,
     substituted,
 )
+from confab.reasoner.timing import timing_of
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS, XSD
 
 HEADER = f"""\
@@ -214,22 +220,28 @@ class _Writer:
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
         self.where, self.nodes = one.name, []
         self.terms = {t.name: f":{one.name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
-        conditions = [self.condition(c) for c in one.asked]
+        timing = timing_of(one)
+        timed = sorted(timing.conditions, key=lambda pair: pair[0] is Span.THROUGHOUT)
+        known = {c for _, c in timed}
+        asked = [*timed, *((Span.THROUGHOUT, c) for c in one.asked if c not in known)]
+        conditions = [self.spanned(self.condition(c), span) for span, c in asked if c not in (one.priced, one.lasting)]
         effects = []
-        for position, effect in enumerate(one.effects, start=1):
+        values = [(span, e) for span, e in timing.effects if isinstance(e, ValueEffect)]
+        changes = [(span, e) for span, e in timing.effects if isinstance(e, AmountEffect)]
+        for position, (span, effect) in enumerate(values, start=1):
             when = [self.condition(c) for c in effect.when]
             iri = f":{one.name}.effect{position:03}"
             at = self.value(Symbol(effect.situation, effect.arguments), effect.value)
             self.nodes.append(f"{iri} a owl:NamedIndividual, c:ValueEffect ; {at}{_some('c:when', when)} .")
-            effects.append(iri)
-        for position, change in enumerate(one.amounts, start=len(one.effects) + 1):
+            effects.append(self.spanned(iri, span))
+        for position, (span, change) in enumerate(changes, start=len(values) + 1):
             when = [self.condition(c) for c in change.when]
             iri = f":{one.name}.effect{position:03}"
             at = " ; ".join([f"c:situationType {self.iri(change.situation)}", *self.arguments(change.arguments)])
             by = self.side("right", change.amount)
             said = f'c:AmountEffect ; {at} ; c:change "{change.operation}" ; {by}{_some("c:when", when)}'
             self.nodes.append(f"{iri} a owl:NamedIndividual, {said} .")
-            effects.append(iri)
+            effects.append(self.spanned(iri, span))
         cost = [] if one.cost == 1 else [f"{one.cost:f}"]
         price = [] if one.price is None else [self.calculation(one.price)]
         yield self.node(
@@ -240,6 +252,7 @@ class _Writer:
             ("c:index", str(index)),
             ("c:cost", cost),
             ("c:price", price),
+            *self.lasting(one.name, timing),
             ("c:parameter", [self.terms[p.name] for p in one.parameters]),
             ("c:precondition", conditions),
             ("c:postcondition", effects),
@@ -249,6 +262,23 @@ class _Writer:
         for variable in one.variables:
             yield self.term(self.terms[variable.name][1:], "c:Variable", None, variable.kind)
         yield from self.nodes
+
+    def spanned(self, iri: str, span: Span) -> str:
+        """Say the span of a condition or an effect, if it isn't throughout; return its IRI."""
+        if span is not Span.THROUGHOUT:
+            self.nodes.append(f"{iri} c:during c:{span.value} .")
+        return iri
+
+    def lasting(self, name: str, timing: Timing) -> Iterator[tuple[str, str | Sequence[str]]]:
+        """Yield what is said of the duration and the actors of a behaviour."""
+        if isinstance(timing.duration, Fraction):
+            yield "c:duration", seconds_text(timing.duration)
+        elif timing.duration is not None:
+            yield "c:calculatedDuration", self.calculation(timing.duration)
+        yield "c:actor", [self.put(actor) for actor in timing.actors]
+        at = (self.problem.times or Times()).events.get(name)
+        if at is not None:
+            yield "c:happensAt", seconds_text(at)
 
     def rule(self, name: str, one: Rule) -> Iterator[str]:
         self.where, self.nodes = name, []
@@ -428,6 +458,16 @@ class _Writer:
                 yield f'{iri} a owl:NamedIndividual, c:Comparison ; {at} ; c:sign "{sign}" ; c:amount {decimal(limit)} .'
                 continue
             yield f"{iri} a owl:NamedIndividual, c:ValueCondition ; {self.value(fact.symbol, fact.value)} ."
+
+
+def seconds_text(seconds: Fraction) -> str:
+    """Return seconds as a literal in Turtle.
+
+    >>> seconds_text(Fraction(5, 2))
+    '"PT2.5S"^^xsd:dayTimeDuration'
+    """
+    text = written(seconds) if _ends(seconds) else written(Fraction(round(seconds * 10**12), 10**12))
+    return f'"PT{text}S"^^xsd:dayTimeDuration'
 
 
 def _ends(number: Fraction) -> bool:

@@ -40,10 +40,13 @@ from confab.reasoner.symbols import (
     Parameter,
     RelationCondition,
     Rule,
+    Span,
+    Timing,
     ValueCondition,
     ValueEffect,
     Witness,
 )
+from confab.reasoner.timing import projected, seconds_of
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
 
 SIGNS = ("+", "-", "*", "/")
@@ -359,23 +362,61 @@ class Parts:
         """Return a behaviour with all its parts."""
         parameters = tuple(map(self.parameter, ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
-        effects = [self.effect(effect) for effect in self.values(iri, "postcondition")]
-        price = self.price(iri)
+        asked = [(self.span(one), c) for one in self.values(iri, "precondition") for c in self.group(one)]
+        made = [(self.span(one), self.effect(one)) for one in self.values(iri, "postcondition")]
+        price, duration = self.price(iri), self.duration(iri)
+        more = [c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)]
+        more += [Comparison(n, ">=", Fraction(0)) for n in (price, duration) if not isinstance(n, Fraction | None)]
+        preconditions, effects = projected(asked, made)
+        timing = Timing(
+            duration,
+            tuple(map(self.term, self.values(iri, "actor"))),
+            (*asked, *((Span.THROUGHOUT, condition) for condition in more)),
+            tuple(made),
+        )
+        plain = not timing.actors and duration is None and all(s is Span.THROUGHOUT for s, _ in (*asked, *made))
         return Behavior(
             name=self.names.short(iri),
             level=self.level(iri),
             parameters=parameters,
             variables=tuple(map(self.parameter, used)),
-            preconditions=(
-                *self.conditions(iri, "precondition"),
-                *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
-                *([] if price is None else [Comparison(price, ">=", Fraction(0))]),
-            ),
+            preconditions=(*preconditions, *more),
             effects=tuple(effect for effect in effects if isinstance(effect, ValueEffect)),
             cost=self.cost(iri),
             amounts=tuple(effect for effect in effects if isinstance(effect, AmountEffect)),
             price=price,
+            timing=None if plain else timing,
         )
+
+    def span(self, iri: str) -> Span:
+        """Return the span of a condition or an effect of a behaviour."""
+        if not self.values(iri, "during"):
+            return Span.THROUGHOUT
+        said = self.one(iri, "during")
+        found = next((span for span in Span if CORE + span.value == said), None)
+        if found is None:
+            raise KnowledgeError(f"<{iri}>: :during is <{said}>; wanted :atStart, :throughout or :atEnd")
+        return found
+
+    def duration(self, iri: str) -> Expression | None:
+        """Return the duration of a behaviour in seconds; None if none is stated."""
+        if self.values(iri, "calculatedDuration"):
+            if self.values(iri, "duration"):
+                raise KnowledgeError(f"<{iri}> has a :duration and a :calculatedDuration; keep one of them")
+            return self.expression(self.one(iri, "calculatedDuration"))
+        return self.seconds(iri, "duration")
+
+    def seconds(self, iri: str, name: str) -> Fraction | None:
+        """Return the seconds of a duration that a property gives; None if it gives none."""
+        if not self.values(iri, name):
+            return None
+        found = seconds_of(self.one(iri, name))
+        if found is None:
+            said = self.one(iri, name)[:40]
+            raise KnowledgeError(
+                f"<{iri}>: :{name} is '{said}'; wanted an xsd:dayTimeDuration that isn't negative, like PT2.5S"
+            )
+        return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
         """Return a rule of a situation type with arguments of some classes; an individual among its terms is compared."""
@@ -418,4 +459,4 @@ class Parts:
 
 
 def _is_part(node: Node) -> bool:
-    return not is_a(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level")
+    return not is_a(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level", "Window")

@@ -54,6 +54,7 @@ from confab.reasoner.reading.rows import (
     superclasses,
     whole_number,
 )
+from confab.reasoner.reading.times import with_times
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -87,6 +88,7 @@ KINDS = (
     "Relation",
     "Calculation",
     "Rule",
+    "Window",
 )  # of the schema's nodes
 
 SCHEMA = f"""
@@ -334,7 +336,8 @@ def reading_of(
     initial = _initial(known.domain, known.classes, stated, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
-    return Reading(with_task(problem, known.parts, schema.of_kind("Task")), names, schema, whole)
+    wanted = with_task(problem, known.parts, schema.of_kind("Task"))
+    return Reading(with_times(wanted, known.parts, schema), names, schema, whole)
 
 
 def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:

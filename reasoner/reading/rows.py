@@ -24,7 +24,8 @@ FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
 DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update"))
 DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
-"""What the core says of its nodes in numbers, signs, truth values and text; all else that it says leads to other nodes."""
+DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
+"""What the core says of its nodes in numbers, signs, durations, truth values and text; all else leads to other nodes."""
 OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9

@@ -19,7 +19,7 @@ from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGrap
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.problem import as_written, read_schema
 from confab.reasoner.reading.rows import Schema
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Span, Witness, substituted
 from confab.reasoner.updates.compiling import compiled
 from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, LABEL, SKOS, TYPE, XSD
@@ -302,6 +302,8 @@ def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, 
     """Return what an update doesn't say as the behaviour does; nothing if it says the same."""
     if behavior.price is not None:
         return "a price that is calculated stays with individuals"
+    if spans_of(behavior):
+        return "a condition or an effect at the start or the end stays with individuals"
     again = compiled_again(graph, iri, written, prefixes)
     if isinstance(again, str):
         return again
@@ -353,7 +355,16 @@ def plainly(behavior: Behavior) -> object:
         _plain(behavior.asked),
         frozenset(effects),
         frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when), e.each) for e in behavior.amounts),
+        behavior.timing and (behavior.timing.duration, behavior.timing.actors, spans_of(behavior)),
     )
+
+
+def spans_of(behavior: Behavior) -> frozenset[object]:
+    """Return which conditions and effects of a behaviour aren't throughout, with their spans."""
+    if behavior.timing is None:
+        return frozenset()
+    asked = ((span, _plain([c])) for span, c in behavior.timing.conditions if span is not Span.THROUGHOUT)
+    return frozenset((*asked, *(one for one in behavior.timing.effects if one[0] is not Span.THROUGHOUT)))
 
 
 def _plain(conditions: Iterable[Condition], depth: int = 0) -> frozenset[object]:

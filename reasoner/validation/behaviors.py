@@ -17,11 +17,13 @@ from confab.reasoner.symbols import (
     Behavior,
     Condition,
     Problem,
+    Span,
     ValueCondition,
     ValueEffect,
     Witness,
     substituted,
 )
+from confab.reasoner.timing import timing_of
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
@@ -178,8 +180,9 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
 
 
 def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
-    """Return the values that a behaviour can produce, each with its situation type."""
-    return {(e.situation, value) for e in behavior.effects for value in _individuals(e.value, behavior, problem)}
+    """Return the values that a behaviour can produce, meanwhile or in the end, each with its situation type."""
+    effects = [*behavior.effects, *(e for e in timing_of(behavior).made(Span.START) if isinstance(e, ValueEffect))]
+    return {(e.situation, value) for e in effects for value in _individuals(e.value, behavior, problem)}
 
 
 def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:

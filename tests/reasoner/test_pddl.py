@@ -262,7 +262,7 @@ PROBLEM = "(define (problem e) (:domain d)\n (:objects o - a)\n (:init {})\n (:g
         ("(p ?x)", "(assign (f) 3)", "", "(p o)", "domain:6:19: undefined function 'f' (known: none)"),
         ("(p ?x)", "(p ?x)", "(p u)", "(p o)", "problem:3:12: undefined object 'u'"),
         ("(p ?x)", "(p ?x)", "(p o o)", "(p o)", "problem:3:9: predicate 'p' takes 1 arguments, got 2"),
-        ("(p ?x)", "(p ?x)", "(at 5 (p o))", "(p o)", "problem:3:9: timed initial literals are not supported"),
+        ("(p ?x)", "(p ?x)", "(at 5 (nope o))", "(p o)", "problem:3:9: wanted (at TIME (predicate …))"),
         ("(p ?x)", "(p ?x)", "", "(p o))", "problem:4:16: ')' without '('"),
     ],
 )  # fmt: skip
@@ -274,8 +274,8 @@ def test_bad_pddl_is_refused_with_its_place(precondition: str, effect: str, init
 
 
 def test_unsupported_features_are_refused_by_name() -> None:
-    domain = "(define (domain d) (:predicates (p))\n (:durative-action f :parameters () :duration (= ?duration 1)))"
-    with pytest.raises(PddlError, match=r"domain:2:2: durative actions are not supported"):
+    domain = "(define (domain d) (:predicates (p))\n (:process f :parameters () :effect (p)))"
+    with pytest.raises(PddlError, match=r"domain:2:2: processes are not supported"):
         parse(domain, "(define (problem e) (:domain d) (:init) (:goal (p)))")
 
 

@@ -1,0 +1,150 @@
+"""Plans in time at the front desk: when a schedule is asked for, the lanes of its actors, and its form as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, Literal, TypeAlias
+
+from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.timed.plan import Slot, TimedPlan
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline
+from confab.reasoner.symbols import Problem, Span
+from confab.reasoner.timing import only_during
+
+Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
+"""What a plan is to have little of."""
+MINIMISE: tuple[Minimise, ...] = ("makespan", "cost", "steps")
+WIDTH = 72
+"""Number of columns of a lane."""
+MOST_CRITICAL = 12
+"""Maximum number of steps of the critical path that are listed."""
+
+
+def checked_minimise(minimise: str | None) -> str | None:
+    """Return what is to be little; raise `KnowledgeError` if there is no such thing."""
+    if minimise is not None and minimise not in MINIMISE:
+        raise KnowledgeError(f"--minimise is '{minimise}'; wanted one of {', '.join(MINIMISE)}")
+    return minimise
+
+
+def with_unit_costs(problem: Problem) -> Problem:
+    """Return a problem in which every step costs 1."""
+    domain = problem.domain
+    behaviors = {name: replace(one, cost=1.0, price=None) for name, one in domain.behaviors.items()}
+    return replace(problem, domain=replace(domain, behaviors=behaviors))
+
+
+def asks_for_times(problem: Problem, minimise: str | None) -> bool:
+    """Return whether a plan has to have a schedule: it is to be short in time, or the task speaks of times."""
+    times = problem.times
+    return minimise == "makespan" or (times is not None and bool(times.deadlines or times.windows or times.events))
+
+
+def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
+    """Return a plan whose steps need others meanwhile, and its schedule."""
+    from confab.planner.timed.concurrent import plan
+
+    outcome, timed = plan(problem, Limits(seconds=deadline.left))
+    return outcome, timed.plan
+
+
+def scheduled(problem: Problem, outcome: Outcome, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
+    """Return an outcome with its plan in time; without a schedule that keeps the task's times the plan is given up."""
+    from confab.planner.timed.call import in_time
+
+    if outcome.plan is None:
+        return outcome, None
+    timed = in_time(problem, outcome.plan, deadline.left)
+    if timed.plan is None:
+        return replace(outcome, status=Status.GAVE_UP, plan=None, reason=timed.reason, left=(), cost=None), None
+    return replace(outcome, plan=timed.plan.plan), timed.plan
+
+
+def needs_others_meanwhile(problem: Problem) -> bool:
+    """Return whether some behaviour is of use to others only while it lasts."""
+    return bool(only_during(problem))
+
+
+def may_overlap_by_need(problem: Problem) -> bool:
+    """Return whether steps that overlap may do what no sequence of them does: something is asked or made at a begin or an end."""
+    return any(
+        span is not Span.THROUGHOUT
+        for behavior in problem.domain.behaviors.values()
+        if behavior.timing is not None
+        for span, _ in (*behavior.timing.conditions, *behavior.timing.effects)
+    )
+
+
+# --------------------------------------------------------------------------------------------------------------- forms
+
+
+def said(seconds: Fraction) -> str:
+    """Return a time in seconds as text, to the millisecond.
+
+    >>> said(Fraction(5, 2)), said(Fraction(1, 3))
+    ('2.5', '0.333')
+    """
+    return f"{round(float(seconds), 3):g}"
+
+
+def headline(timed: TimedPlan) -> str:
+    """Return the makespan with its bound in one line."""
+    bound = said(timed.bound)
+    proved = " (no schedule of these steps is shorter)" if timed.bound == timed.makespan else ""
+    return (
+        f"makespan {said(timed.makespan)} s, {said(timed.serial)} s one step after the other; "
+        f"at least {bound} s for {timed.bounds}{proved}; by {timed.scheduler}"
+    )
+
+
+def lanes(timed: TimedPlan) -> Iterator[str]:
+    """Yield lines that show each actor's steps: ``█`` on the critical path, ``▒`` with slack, ``·`` idle."""
+    yield headline(timed)
+    end = timed.makespan
+    if not end:
+        return
+    rows = list(timed.lanes())
+    wide = max(len(name or "no actor") for name, _ in rows)
+    for name, slots in rows:
+        cells = ["·"] * WIDTH
+        for slot in slots:
+            first = int(slot.begin * WIDTH / end)
+            last = max(first + 1, int(-(-slot.end * WIDTH // end)))
+            for i in range(first, min(last, WIDTH)):
+                cells[i] = "█" if slot.critical or cells[i] == "█" else "▒"
+        busy = sum((slot.end - slot.begin for slot in slots), Fraction(0))
+        yield f"{name or 'no actor':<{wide}} |{''.join(cells)}| {len(slots)} steps, {said(busy)} s"
+    critical = sorted((slot for slot in timed.slots if slot.critical and slot.end > slot.begin), key=_in_order)
+    if critical:
+        yield "critical:"
+        yield from (f"  {said(slot.begin):>8} – {said(slot.end):<8} {slot.step}" for slot in critical[:MOST_CRITICAL])
+        if len(critical) > MOST_CRITICAL:
+            yield f"  … and {len(critical) - MOST_CRITICAL} more"
+
+
+def _in_order(slot: Slot) -> tuple[Fraction, Fraction, tuple[int, ...]]:
+    return slot.begin, slot.end, slot.step.path
+
+
+def schedule_json(timed: TimedPlan) -> dict[str, Any]:
+    """Return a plan in time as JSON data: seconds, and each step by its path (docs/command-line.md)."""
+    intervals = timed.intervals
+    of = {slot.step.path: slot for slot in timed.slots}
+    steps = []
+    for step in timed.plan.walk():
+        begin, end = intervals[step.path]
+        one: dict[str, Any] = {"path": list(step.path), "begin": float(begin), "end": float(end)}
+        if (slot := of.get(step.path)) is not None:
+            one |= {"actors": list(slot.actors), "slack": float(slot.slack)}
+        steps.append(one)
+    return {
+        "makespan": float(timed.makespan),
+        "serial": float(timed.serial),
+        "bound": float(timed.bound),
+        "bounds": timed.bounds,
+        "scheduler": timed.scheduler,
+        "steps": steps,
+    }

@@ -1,0 +1,204 @@
+"""What each step of a sequence reads and changes at its begin, throughout, and at its end.
+
+The sequence is of steps, or of begins and ends of steps where some only exist during others. It is carried out once on paper; each
+condition notes what it looks at while it is evaluated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+from typing import TypeAlias
+
+from confab.planner.checked_conditions import Arguments
+from confab.planner.plan import Step
+from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
+from confab.planner.validation import Cell, Facts, Rules
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import Behavior, Problem, Times
+
+Key: TypeAlias = "tuple[str, object]"
+"""What is read: the value of a symbol (its situation type and arguments), or which symbols have a value (and that value)."""
+
+
+class Moment(Enum):
+    """An event of a sequence: a step begins, ends, or is done as a whole."""
+
+    BEGIN = "begin"
+    END = "end"
+    WHOLE = "whole"
+
+
+Event: TypeAlias = "tuple[int, Moment]"
+"""The number of a step, and what happens to it."""
+
+
+class InapplicableError(Exception):
+    """A step can't be done where the sequence has it; the message says which and why."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """What is read, and which cells change from which value to which, at one moment or throughout."""
+
+    reads: frozenset[Key] = frozenset()
+    writes: Mapping[Cell, tuple[str, str]] | None = None
+
+    @property
+    def changes(self) -> Mapping[Cell, tuple[str, str]]:
+        """The cells that change, each with its value before and after."""
+        return self.writes or {}
+
+
+@dataclass(frozen=True)
+class Activity:
+    """A step with its duration in seconds, its actors, and its accesses."""
+
+    step: Step
+    duration: Fraction
+    actors: tuple[str, ...]
+    begin: Access
+    middle: Access
+    end: Access
+    at: Fraction | None = None
+    """When it happens, if nobody decides on that."""
+
+    @property
+    def accesses(self) -> tuple[Access, Access, Access]:
+        """The accesses at the begin, throughout and at the end."""
+        return self.begin, self.middle, self.end
+
+
+class Noting(Facts):
+    """Facts that note what is read of them."""
+
+    def __init__(self, problem: Problem, rules: Rules) -> None:
+        super().__init__(problem, problem.initial, rules)
+        self.reads: dict[Key, None] = {}
+
+    def value(self, situation: str, arguments: Arguments) -> str | None:
+        """Return the value of a symbol, and note that it was read."""
+        self.reads[situation, arguments] = None
+        return super().value(situation, arguments)
+
+    def holders(self, situation: str, value: str) -> Iterable[Arguments]:
+        """Return the arguments of the symbols with a value, and note that they were looked for."""
+        self.reads[situation, value] = None
+        return list(super().holders(situation, value))
+
+    def begin(self) -> None:
+        """Forget what was read."""
+        self.reads = {}
+        if self.problem.domain.rules:  # what is known to follow would be read without its reasons
+            self._definitions.forget()
+
+    def noted(self) -> frozenset[Key]:
+        """Return what was read of what is stated."""
+        rules = self.problem.domain.rules
+        return frozenset(key for key in self.reads if key[0] not in rules) if rules else frozenset(self.reads)
+
+
+def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event]) -> list[Activity]:
+    """Return the activities of steps that are carried out in the order of events.
+
+    Parameters
+    ----------
+    problem : Problem
+    steps : sequence of Step
+        Without sub-steps.
+    events : iterable of Event
+        Each step as a whole, or its begin and later its end.
+
+    Raises
+    ------
+    InapplicableError
+        A step can't be done where the events have it.
+    """
+    course = _Course(problem, steps)
+    for number, moment in events:
+        check("finding the order that the steps need")
+        if moment is not Moment.END:
+            course.begin(number)
+        if moment is not Moment.BEGIN:
+            course.end(number)
+    return course.found()
+
+
+def in_sequence(steps: Sequence[Step]) -> Iterator[Event]:
+    """Yield the events of steps that are done one after the other."""
+    yield from ((number, Moment.WHOLE) for number in range(len(steps)))
+
+
+class _Course:
+    """Steps carried out on paper."""
+
+    def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
+        self.problem, self.steps = problem, steps
+        self.rules = Rules(problem)
+        self.facts = Noting(problem, self.rules)
+        self.pieces: dict[str, Pieces] = {}
+        self.resting = default_actors(problem)
+        self.times = problem.times or Times()
+        self.made: list[dict[str, Access]] = [{} for _ in steps]
+        self.terms: dict[int, Arguments] = {}
+        self.seconds: dict[int, Fraction] = {}
+
+    def piece(self, number: int) -> Pieces:
+        """Return the pieces of a step's behaviour."""
+        name = self.steps[number].behavior
+        if name not in self.pieces:
+            self.pieces[name] = pieces_of(self.problem, self.problem.domain.behaviors[name])
+        return self.pieces[name]
+
+    def begin(self, number: int) -> None:
+        """Begin a step: what it asks at its begin, what it makes then, and what will be in the making."""
+        step, pieces = self.steps[number], self.piece(number)
+        terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
+        seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
+        if seconds is None:
+            raise InapplicableError(f"{step} has no duration there: what it is worked out from is no number from 0 on")
+        self.seconds[number] = seconds
+        self.made[number]["begin"] = self.done(step, pieces.begin, terms, True)
+        self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
+
+    def end(self, number: int) -> None:
+        """End a step: what was in the making is made, and what it asks and makes at its end."""
+        for cell, (_, after) in self.made[number]["middle"].changes.items():
+            self.facts.put(*cell, after)
+        self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
+
+    def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
+        """Do a piece of a step, or only say what it would change."""
+        if not piece.preconditions and not piece.effects and not piece.amounts:
+            return Access()
+        facts = self.facts
+        facts.begin()
+        changes = self.rules.changes(piece, terms, facts)
+        reads = facts.noted()
+        if changes is None:
+            raise InapplicableError(
+                f"{step}: its conditions ({piece.name.rsplit('@')[-1]}) don't hold where it is done"
+            )
+        before = {(name, key): Facts.value(facts, name, key) or "" for name, key, _ in changes}
+        writes = {(name, key): (before[name, key], value) for name, key, value in changes}
+        if put:
+            for cell, (_, value) in writes.items():
+                facts.put(*cell, value)
+        return Access(reads, writes)
+
+    def found(self) -> list[Activity]:
+        """Return the activities of all steps."""
+        return [
+            Activity(
+                step,
+                self.seconds[number],
+                actors_of(self.problem, self.piece(number).whole, self.terms[number], self.resting),
+                self.made[number]["begin"],
+                self.made[number]["middle"],
+                self.made[number]["end"],
+                self.times.events.get(step.behavior),
+            )
+            for number, step in enumerate(self.steps)
+        ]

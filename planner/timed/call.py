@@ -1,0 +1,207 @@
+"""From a plan to a plan in time: the order that its steps need, a schedule, who takes which turn, and the checker's word on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from importlib.util import find_spec
+from time import perf_counter
+
+import networkx
+
+from confab.planner.plan import Plan, Reason, Step, renumbered
+from confab.planner.timed.activities import Event, InapplicableError, activities, in_sequence
+from confab.planner.timed.exchange import choices_of, exchanged
+from confab.planner.timed.network import Begins, Network, network_of
+from confab.planner.timed.order import Order, order_of
+from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
+from confab.planner.timed.schedules import (
+    Candidate,
+    Choices,
+    durations_with,
+    least,
+    shortest,
+    turn_edges,
+)
+from confab.planner.timed.validation import validate_timed
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem
+
+SECONDS = 10.0
+"""Maximum number of seconds for a schedule where no limit is given; the exchanges of turns are bounded by their work, too."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """What came of scheduling: a timed plan that the checker accepts, or why there is none."""
+
+    plan: TimedPlan | None = None
+    reason: Reason | None = None
+
+
+def in_time(
+    problem: Problem,
+    plan: Plan,
+    seconds: float | None = None,
+    separation: Fraction = Fraction(0),
+    events: Sequence[Event] | None = None,
+) -> Timed:
+    """Return a plan in time.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        A plan of it.
+    seconds : float, optional
+        Limit of the search for a short schedule.
+    separation : Fraction
+        How long conflicting events are apart, in seconds: PDDL's epsilon.
+    events : sequence of Event, optional
+        In which order its primitives begin and end; one after the other if not given.
+    """
+    until = perf_counter() + (SECONDS if seconds is None else seconds)
+    steps = plan.primitives
+    its_events = list(in_sequence(steps)) if events is None else list(events)
+    try:
+        order = order_of(problem, activities(problem, steps, its_events), its_events)
+    except InapplicableError as error:
+        return Timed(reason=Reason(str(error)))
+    network = network_of(order, separation)
+    choices = choices_of(problem, plan, order, network) if events is None else Choices()
+    while True:
+        bound = least(order, network, choices)
+        found = shortest(order, network, choices, until, bound)
+        if found is None:
+            return Timed(reason=_infeasible(problem, order, network))
+        scheduler = "exchanges"
+        if found.makespan > bound and find_spec("ortools") is not None:
+            from confab.planner.timed.cpsat import shorter
+
+            found, bound = shorter(order, network, choices, found, bound, until - perf_counter())
+            scheduler = "CP-SAT"
+        timed = _timed(problem, plan, order, network, choices, found)
+        if timed is not None:
+            timed = replace(timed, bound=bound * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
+            faults = validate_timed(problem, timed, separation)
+            if not faults:
+                return Timed(timed)
+        if not choices.of:
+            said = faults[0].text if timed is not None else "its steps have no order"
+            return Timed(reason=Reason(f"the schedule is no plan in time: {said}"))
+        choices = Choices()  # what other actors would do isn't what the plan needs
+
+
+def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
+    """Return why there is no schedule: what would come too late, and by how much, if it didn't matter."""
+    free = replace(network, latest=[None] * len(network.latest))
+    found = shortest(order, free, Choices(), perf_counter())
+    if found is None:
+        return Reason("these steps have no schedule: windows, fixed times and durations exclude each other")
+    late = []
+    for i, latest in enumerate(network.latest):
+        end = found.begins.begins[i] + network.durations[i]
+        if latest is not None and end > latest:
+            late.append((end - latest, i))
+    excess, i = max(late, default=(0, 0))
+    step = order.activities[i].step
+    by, ends = float(order.latest.get(i, 0)), float((found.begins.begins[i] + network.durations[i]) * network.unit)
+    return Reason(
+        f"these steps miss a deadline: {step} ends at {ends:g} s in the schedule that was found; it has to by {by:g} s "
+        f"({float(excess * network.unit):g} s less)",
+        (str(step),),
+    )
+
+
+def _timed(
+    problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: Candidate
+) -> TimedPlan | None:
+    """Return a schedule as a plan in time, with the turns taken by their actors; None if its levels have no order then."""
+    renamed: dict[int, dict[str, str]] = {}
+    for resource, line in enumerate(found.turns):
+        for own, number in line:
+            if own != resource:
+                one, other = order.resources[own].actor, order.resources[resource].actor
+                if one is not None and other is not None:
+                    for member in order.resources[own].turns[number].members:
+                        renamed.setdefault(member, {})[one] = other
+    durations = durations_with(network, choices, found.turns)
+    edges = (*network.edges, *turn_edges(order, found.turns))
+    arcs = network.arcs(edges, durations)
+    slack = _slack(arcs, durations, found.begins)
+    new = exchanged(problem, plan, renamed) if renamed else plan
+    slots = []
+    for i, (step, activity) in enumerate(zip(new.primitives, order.activities, strict=True)):
+        begin = found.begins.begins[i]
+        actors = tuple(renamed.get(i, {}).get(a, a) for a in activity.actors)
+        slots.append(
+            Slot(
+                step,
+                begin * network.unit,
+                (begin + durations[i]) * network.unit,
+                actors,
+                slack[i] * network.unit,
+            )
+        )
+    waits = tuple(sorted({(i, j) for i, after in enumerate(arcs) for j, _ in after}))
+    timed = TimedPlan(new, tuple(slots), arcs=waits)
+    exchanged_turns = any(line != sorted(line) for line in found.turns)
+    return _ordered(problem, timed) if renamed or exchanged_turns else timed
+
+
+def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins) -> list[int]:
+    """Return by how much each activity could begin later without a longer makespan."""
+    latest = [begins.makespan - lasts for lasts in durations]
+    order = sorted(range(len(latest)), key=lambda i: -begins.begins[i])
+    for _ in range(len(latest)):
+        changed = False
+        for i in order:
+            for j, apart in arcs[i]:
+                if latest[j] - apart < latest[i]:
+                    latest[i] = latest[j] - apart
+                    changed = True
+        if not changed:
+            break
+    return [max(last - begin, 0) for last, begin in zip(latest, begins.begins, strict=True)]
+
+
+def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
+    """Return a timed plan whose tree has the order of its schedule, in which its steps can be done one after the other.
+
+    If there is no such order, the tree's own is kept if it is one; else nothing is returned.
+    """
+    own = None if validate(problem, timed.plan) else timed
+    numbers = {slot.step.path: i for i, slot in enumerate(timed.slots)}
+    begins = [slot.begin for slot in timed.slots]
+    after: dict[int, list[int]] = {}
+    for i, j in timed.arcs:
+        after.setdefault(i, []).append(j)
+
+    def sorted_steps(steps: tuple[Step, ...]) -> tuple[Step, ...] | None:
+        inside = [[numbers[one.path] for one in step.walk() if not one.steps] for step in steps]
+        of = {leaf: k for k, leaves in enumerate(inside) for leaf in leaves}
+        graph: networkx.DiGraph[int] = networkx.DiGraph()
+        graph.add_nodes_from(range(len(steps)))
+        graph.add_edges_from((of[i], of[j]) for i in of for j in after.get(i, ()) if j in of and of[i] != of[j])
+        try:
+            order = list(networkx.lexicographical_topological_sort(graph, lambda k: min(begins[i] for i in inside[k])))
+        except networkx.NetworkXUnfeasible:
+            return None
+        found = []
+        for k in order:
+            below = sorted_steps(steps[k].steps) if steps[k].steps else ()
+            if below is None:
+                return None
+            found.append(replace(steps[k], steps=below))
+        return tuple(found)
+
+    steps = sorted_steps(timed.plan.steps)
+    if steps is None:
+        return own
+    plan = Plan(renumbered(steps))
+    old = [numbers[one.path] for one in Plan(steps).primitives]
+    place = {number: i for i, number in enumerate(old)}
+    slots = tuple(replace(timed.slots[n], step=new) for n, new in zip(old, plan.primitives, strict=True))
+    arcs = tuple(sorted((place[i], place[j]) for i, j in timed.arcs))
+    return replace(timed, plan=plan, slots=slots, arcs=arcs)

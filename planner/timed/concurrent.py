@@ -1,0 +1,489 @@
+"""Plans that need concurrency: the begins and ends of steps as operators of the flat core, with a simple temporal network.
+
+A behaviour with a value that holds only while it lasts is cut into two, its begin and its end; all others stay whole, and are cut
+only where no plan is found otherwise. A first search knows no durations; what it finds is scheduled. Where that has no schedule, a
+second search keeps a network of the events since nothing was running, and gives up whatever can't be ended in time.
+
+state       bits of the cut task, as in `confab.planner.grounded.best_first`
+window      the events since nothing was running, each with what it reads and writes
+h           relaxed-plan heuristic of a state, and one for each step that is running
+
+Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008; Coles et al., "Extending the use of
+inference in temporal planning as forwards search", ICAPS 2009 (steps that need no cut).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from math import lcm
+from time import perf_counter
+from typing import TypeAlias
+
+from confab.planner.grounded.best_first import search
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.hff import heuristic
+from confab.planner.grounded.task import Task
+from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
+from confab.planner.timed.activities import Event, Moment
+from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.pieces import duration_of
+from confab.planner.validation import Facts
+from confab.reasoner.language import walk
+from confab.reasoner.limits import OutOfTimeError, check
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    Behavior,
+    Effect,
+    Problem,
+    SituationType,
+    Span,
+    ValueCondition,
+    ValueEffect,
+)
+from confab.reasoner.timing import only_during, projected, timing_of
+
+BEGIN, END, RUNNING, HELD = "@begin", "@end", "@running", "@held"
+FIRST = 0.5
+"""The share of the time that the search without durations is given."""
+MOST_STATES = 300_000
+"""Maximum number of states of the search with durations."""
+_Key: TypeAlias = "tuple[int, tuple[int, ...]]"
+
+
+def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -> tuple[Outcome, Timed]:
+    """Return a plan with required concurrency, in time.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one level.
+    limits : Limits
+    separation : Fraction
+        How long conflicting events are apart, in seconds.
+
+    Returns
+    -------
+    Outcome
+        Its plan has the steps in the order of their begins; "unsolvable" is never said.
+    Timed
+        The plan in time, if there is one.
+    """
+    began = perf_counter()
+
+    def ended(reason: str) -> tuple[Outcome, Timed]:
+        said = Reason(reason)
+        return Outcome(Status.GAVE_UP, reason=said, seconds=perf_counter() - began), Timed(reason=said)
+
+    if len(problem.domain.levels) > 1:
+        return ended("steps that need others meanwhile are planned on scenes with one level only; this one has more")
+    deadline = limits.end()
+    some, every = only_during(problem), frozenset(name for name, b in problem.domain.behaviors.items() if b.timing)
+    counts = Counts()
+    try:
+        for names, guarded in ((some, True), (some, False), (every, False)):
+            cut = _Cut(problem, names, guarded)
+            task = ground(cut.problem, deadline=deadline) if names else Reason("nothing is cut")
+            if isinstance(task, Reason):
+                continue
+            finder = _Finder(cut, task, separation, deadline, counts)
+            for found in finder.without_durations(limits) if guarded else finder.in_time():
+                steps, events = cut.steps(task, found)
+                left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+                timed = in_time(problem, steps, left, separation, events)
+                if timed.plan is not None:
+                    seconds = perf_counter() - began
+                    its = Outcome(Status.SOLVED, timed.plan.plan, search={task.level: counts}, seconds=seconds)
+                    return its, timed
+    except (UngroundableError, OutOfTimeError) as error:
+        return ended(str(error))
+    except MemoryError:
+        return ended(OUT_OF_MEMORY.text)
+    return ended("no plan was found whose steps fit into one another in time")
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A problem some of whose behaviours are cut into begin and end.
+
+    If `guarded`, a symbol that a cut behaviour asks for throughout can't be changed meanwhile, nor asked for throughout by another.
+    """
+
+    whole: Problem
+    behaviors: frozenset[str]
+    guarded: bool = False
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The problem with begins and ends in place of these behaviours."""
+        domain = self.whole.domain
+        situations, behaviors = dict(domain.situations), dict[str, Behavior]()
+        for name, behavior in domain.behaviors.items():
+            if name not in self.behaviors:
+                behaviors[name] = replace(behavior, timing=None)
+                continue
+            kinds = tuple(parameter.kind for parameter in behavior.parameters)
+            running = SituationType(name + RUNNING, kinds, "Truth", default=FALSE, boolean=True)
+            situations[running.name] = running
+            for part in self.parts(behavior, running):
+                behaviors[part.name] = part
+        if self.guarded:
+            for name in sorted(self.held()):
+                situations[name + HELD] = replace(
+                    domain.situations[name], name=name + HELD, range="Truth", rest=None, default=FALSE, boolean=True
+                )
+            behaviors = {name: self.guard(behavior) for name, behavior in behaviors.items()}
+        return replace(self.whole, domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}))
+
+    def held(self) -> frozenset[str]:
+        """Return the situation types that cut behaviours ask for throughout and that others change."""
+        behaviors = self.whole.domain.behaviors
+        return frozenset(
+            situation
+            for name in self.behaviors
+            for situation, _ in self.asked(name)
+            if any(situation in other.changes for other in behaviors.values() if other.name != name)
+        )
+
+    def asked(self, name: str) -> list[tuple[str, tuple[str, ...]]]:
+        """Return the symbols that a cut behaviour asks for throughout."""
+        asked = timing_of(self.whole.domain.behaviors[name]).asked(Span.THROUGHOUT)
+        return [(c.situation, c.arguments) for c in asked if isinstance(c, ValueCondition)]
+
+    def guard(self, behavior: Behavior) -> Behavior:
+        """Return a behaviour that changes nothing that is held; the begin of a cut one holds symbols, and its end frees them."""
+        name, _, part = behavior.name.partition("@")
+        held = self.held()
+        own = [cell for cell in self.asked(name) if cell[0] in held] if part else []
+        changed = [(e.situation, e.arguments) for e in behavior.every_effect if e.situation in held and not e.each]
+        free = [cell for cell in changed if cell not in own] if f"@{part}" == END else [*changed, *own]
+        conditions = [ValueCondition(situation + HELD, arguments, FALSE) for situation, arguments in free]
+        value = FALSE if f"@{part}" == END else TRUE
+        effects = [ValueEffect(situation + HELD, arguments, value) for situation, arguments in own]
+        return replace(
+            behavior,
+            preconditions=tuple(dict.fromkeys((*behavior.preconditions, *conditions))),
+            effects=tuple(dict.fromkeys((*behavior.effects, *effects))),
+        )
+
+    def parts(self, behavior: Behavior, running: SituationType) -> Iterator[Behavior]:
+        """Yield the begin and the end of a behaviour as behaviours."""
+        timing, its = timing_of(behavior), tuple(parameter.name for parameter in behavior.parameters)
+        begun = [(Span.START, e) for e in timing.made(Span.START)]
+        asked, _ = projected([one for one in timing.conditions if one[0] is not Span.END], begun)
+        free = ValueCondition(running.name, its, FALSE)
+        made = (*timing.made(Span.START), ValueEffect(running.name, its, TRUE))
+        yield _behavior(behavior, behavior.name + BEGIN, (*asked, free), made)
+        held = (*timing.asked(Span.THROUGHOUT), *timing.asked(Span.END))
+        made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), ValueEffect(running.name, its, FALSE))
+        ended = _behavior(behavior, behavior.name + END, (*held, replace(free, value=TRUE)), made)
+        yield replace(ended, cost=0.0, price=None)
+
+    def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[Event]]:
+        """Return the steps of a sequence of operators, numbered in the order of their begins, and the events."""
+        steps: list[Step] = []
+        events: list[Event] = []
+        open_: dict[tuple[str, tuple[str, ...]], int] = {}
+        for operator in operators:
+            name, arguments, bindings = task.describe(operator)
+            behavior, _, part = name.partition("@")
+            if f"@{part}" == END:
+                events.append((open_.pop((behavior, arguments)), Moment.END))
+                continue
+            number = len(steps)
+            identity = self.whole.id_of(behavior, arguments)
+            steps.append(Step((number,), identity, task.level, behavior, arguments, bindings))
+            if part:
+                open_[behavior, arguments] = number
+            events.append((number, Moment.BEGIN if part else Moment.WHOLE))
+        return Plan(tuple(steps)), events
+
+
+def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effects: Sequence[Effect]) -> Behavior:
+    return replace(
+        behavior,
+        name=name,
+        preconditions=tuple(dict.fromkeys(conditions)),  # type: ignore[arg-type]
+        effects=tuple(e for e in effects if isinstance(e, ValueEffect)),
+        amounts=tuple(e for e in effects if isinstance(e, AmountEffect)),
+        timing=None,
+    )
+
+
+@dataclass(frozen=True)
+class _Event:
+    """An event of a window: the number of its step there, whether it begins and ends it, what it reads and what it writes."""
+
+    step: int
+    begins: bool
+    ends: bool
+    reads: int
+    writes: int
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A state with the way to it: the events since nothing was running, and the operators that are to end what runs."""
+
+    state: int
+    window: tuple[_Event, ...]
+    lasts: tuple[int, ...]
+    running: Mapping[int, int]  # the operator that ends a step, and the step's number in the window
+    held: int  # bits that what runs asks for throughout
+
+
+@dataclass
+class _Finder:
+    """Looks for sequences of operators of a cut task."""
+
+    cut: _Cut
+    task: Task
+    separation: Fraction
+    deadline: float | None
+    counts: Counts = field(default_factory=Counts)
+
+    def __post_init__(self) -> None:
+        self.named = [self.task.describe(operator)[:2] for operator in range(len(self.task))]
+        self.end_of = {
+            (name.partition("@")[0], arguments): operator
+            for operator, (name, arguments) in enumerate(self.named)
+            if name.endswith(END)
+        }
+        seconds = [self._seconds(*one) for one in self.named]
+        self.unit = Fraction(1, lcm(self.separation.denominator, *(s.denominator for s in seconds)))
+        self.lasts = [int(s / self.unit) for s in seconds]
+        self.apart = int(self.separation / self.unit)
+        self.marks = sum(
+            1 << bit
+            for bit, fact in enumerate(self.task.facts)
+            if fact.symbol.situation.endswith(RUNNING) and fact.value == TRUE
+        )
+
+    def _seconds(self, name: str, arguments: tuple[str, ...]) -> Fraction:
+        whole = self.cut.whole
+        behavior = whole.domain.behaviors[name.partition("@")[0]]
+        found = duration_of(whole, behavior, arguments, self.facts)
+        return Fraction(0) if found is None else found
+
+    @cached_property
+    def facts(self) -> Facts:
+        """The initial state, by which durations are estimated."""
+        return Facts(self.cut.whole, self.cut.whole.initial)
+
+    def without_durations(self, limits: Limits) -> Iterator[list[int]]:
+        """Yield a sequence of operators that leads to the goal with nothing running, if a search without durations finds one."""
+        first = search(self.task, limits, limits.end(FIRST))
+        self.counts.add(first.counts)
+        if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
+            yield whole
+
+    def ending(self, operator: int) -> int | None:
+        """Return the operator that ends what an operator begins; None if it can never end."""
+        name, arguments = self.named[operator]
+        return self.end_of.get((name.partition("@")[0], arguments))
+
+    def completed(self, operators: list[int]) -> list[int] | None:
+        """Return operators with the ends of what runs at last; None if that undoes a goal, or an end isn't possible."""
+        state, _ = self.task.carried_out(self.task.initial, operators)
+        if not state & self.marks:
+            return operators
+        open_ = dict.fromkeys(
+            self.ending(operator) for operator in operators if self.named[operator][0].endswith(BEGIN)
+        )
+        for operator in open_:
+            after = None if operator is None else self.task.applied(state, operator)
+            if operator is not None and after is not None and after & self.task.goal == self.task.goal:
+                state, operators = after, [*operators, operator]
+        return None if state & self.marks else operators
+
+    def in_time(self) -> Iterator[list[int]]:
+        """Yield sequences that a search with durations finds, the greedy one first."""
+        task, evaluate = self.task, heuristic(self.task)
+        root = _Node(task.initial, (), (), {}, 0)
+        began = evaluate(task.initial)
+        if began is None:
+            return
+        came_from: dict[_Key, tuple[_Key, int] | None] = {}
+        key = self.key(root)
+        came_from[key] = None
+        number = 0
+        queue: list[tuple[int, int, int, _Node, list[int]]] = [(began[0], 0, 0, root, self.ranked(began))]
+        while queue and len(came_from) < MOST_STATES:
+            check("searching for steps that fit into one another", 0.0)
+            if self.deadline is not None and perf_counter() > self.deadline:
+                return
+            h, tries, _, node, operators = heapq.heappop(queue)
+            for position, operator in enumerate(operators):
+                after = self.after(node, operator)
+                self.counts.generated += 1
+                if after is None or (next_key := self.key(after)) in came_from:
+                    continue
+                came_from[next_key] = self.key(node), operator
+                if after.state & task.goal == task.goal and not after.running:
+                    yield self.path(came_from, next_key)
+                found = evaluate(after.state)
+                self.counts.evaluated += 1
+                if found is None:
+                    continue
+                self.counts.expanded += 1
+                number += 1
+                rank = found[0] + len(after.running)
+                heapq.heappush(queue, (rank, 0, -number, after, self.ranked(found)))
+                if rank < h:
+                    rest = operators[position + 1 :]
+                    if rest:
+                        heapq.heappush(queue, (h, tries + 1, -number, node, rest))
+                    break
+
+    def key(self, node: _Node) -> _Key:
+        """Return what tells nodes apart: the state, and how long each running step has been busy with others."""
+        busy = sorted((end, self.busy(node, step)) for end, step in node.running.items())
+        return node.state, tuple(number for pair in busy for number in pair)
+
+    def busy(self, node: _Node, step: int) -> int:
+        """Return the time that the events of a window take, at least, since a step of it began: those that its end waits for."""
+        end = next(operator for operator, its in node.running.items() if its == step)
+        times = self.times(node, {end: step})
+        return 0 if times is None else times[-1]
+
+    def ranked(self, evaluation: tuple[int, Sequence[int], Sequence[int]]) -> list[int]:
+        """Return the applicable operators of a state, the preferred ones first."""
+        _, relaxed_plan, applicable = evaluation
+        possible = set(applicable)
+        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
+        return [*preferred, *sorted(possible.difference(preferred))]
+
+    def after(self, node: _Node, operator: int) -> _Node | None:
+        """Return the node after an operator; None if it isn't applicable, breaks what runs, or lets something end too late."""
+        task = self.task
+        state = task.applied(node.state, operator)
+        if state is None or state == node.state:
+            return None
+        reads, writes = self.access(operator)
+        name = self.named[operator][0]
+        running, lasts, window = dict(node.running), node.lasts, node.window
+        if name.endswith(END):
+            step = running.pop(operator)
+            window = (*window, _Event(step, False, True, reads, writes))
+        else:
+            begins = name.endswith(BEGIN)
+            step, lasts = len(lasts), (*lasts, self.lasts[operator])
+            window = (*window, _Event(step, True, not begins, reads, writes))
+            if begins:
+                end = self.ending(operator)
+                if end is None:
+                    return None
+                running[end] = step
+        held = 0
+        for end in running:
+            held |= self.held(end)
+        kept = node.held & ~self.held(operator) if name.endswith(END) else node.held
+        if kept & ~state:
+            return None
+        if not running:
+            if node.running and self.times(_Node(state, window, lasts, {}, 0), {}) is None:
+                return None
+            return _Node(state, (), (), {}, 0)
+        found = _Node(state, window, lasts, running, held)
+        return found if self.times(found, running) is not None else None
+
+    def access(self, operator: int) -> tuple[int, int]:
+        """Return what an operator reads and writes, each a bit per symbol: also a symbol that has its old value in the end."""
+        if operator not in self.accesses:
+            name, arguments = self.named[operator]
+            behavior = self.cut.whole.domain.behaviors[name.partition("@")[0]]
+            timing, part = timing_of(behavior), name.partition("@")[2]
+            left_out = {"begin": Span.END, "end": Span.START}.get(part)
+            terms = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
+            terms |= {f"?{name}": value for name, value in self.task.describe(operator)[2].items()}
+            effects = [
+                e for span, e in timing.effects if span is not left_out and (part != "begin" or span is Span.START)
+            ]
+            asked = [c for span, c in timing.conditions if span is not left_out]
+            every = [one for c in (*asked, *(c for e in effects for c in e.when)) for one in walk(c)]
+            read = [(c.situation, c.arguments) for c in every if isinstance(c, ValueCondition)]
+            self.accesses[operator] = (
+                self.bits(read, terms),
+                self.bits([(e.situation, e.arguments) for e in effects], terms),
+            )
+        return self.accesses[operator]
+
+    def bits(self, cells: Iterable[tuple[str, tuple[str, ...]]], terms: Mapping[str, str]) -> int:
+        """Return the bits of symbols with terms put in."""
+        found = 0
+        for situation, arguments in cells:
+            cell = situation, tuple(terms.get(a, a) for a in arguments)
+            found |= 1 << self.places.setdefault(cell, len(self.places))
+        return found
+
+    @cached_property
+    def accesses(self) -> dict[int, tuple[int, int]]:
+        """What operators read and write, as far as was asked."""
+        return {}
+
+    @cached_property
+    def places(self) -> dict[tuple[str, tuple[str, ...]], int]:
+        """The bits of symbols in accesses."""
+        return {}
+
+    def held(self, end: int) -> int:
+        """Return the bits that a running step asks for throughout: those that its end asks for and its begin leaves."""
+        if end not in self._held:
+            whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
+            asked = self.task.known(end)[0]
+            its = timing_of(whole).asked(Span.END)
+            self._held[end] = 0 if its else asked
+        return self._held[end]
+
+    @cached_property
+    def _held(self) -> dict[int, int]:
+        return {}
+
+    def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
+        """Return the earliest times of the steps of a window, if these running ones end next; None if they end too late.
+
+        The last entry is how long it takes from the begin of the first ending step to what its end waits for.
+        """
+        events = list(node.window)
+        for end, step in ending.items():
+            events.append(_Event(step, False, True, *self.access(end)))
+        arcs: list[tuple[int, int, int]] = []
+        lasts = node.lasts
+        for j, later in enumerate(events):
+            for earlier in events[:j]:
+                if earlier.step == later.step or not (
+                    earlier.writes & (later.reads | later.writes) or earlier.reads & later.writes
+                ):
+                    continue
+                high = lasts[earlier.step] if earlier.ends else 0
+                low = 0 if later.begins else lasts[later.step]
+                arcs.append((earlier.step, later.step, high - low + self.apart))
+        begins = [0] * len(lasts)
+        for _ in range(len(lasts) + 1):
+            changed = False
+            for i, j, least in arcs:
+                if begins[i] + least > begins[j]:
+                    begins[j] = begins[i] + least
+                    changed = True
+            if not changed:
+                first = next(iter(ending.values()), None)
+                waits = [begins[i] + least + lasts[j] - begins[j] for i, j, least in arcs if j == first]
+                return [*begins, max(waits, default=0)]
+        return None
+
+    def path(
+        self,
+        came_from: Mapping[_Key, tuple[_Key, int] | None],
+        key: _Key,
+    ) -> list[int]:
+        """Return the operators that lead to a node."""
+        found = []
+        while (step := came_from[key]) is not None:
+            key, operator = step
+            found.append(operator)
+        return found[::-1]

@@ -1,0 +1,153 @@
+"""A shorter schedule, and a lower bound, by the constraint solver CP-SAT of OR-Tools (the extra `time`).
+
+Turns are intervals that don't overlap on their resource; a turn that several actors could take is an optional interval on each of
+them, one of which is present. The solver chooses the order of turns and their actors; begins are then the earliest that follow.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from confab.planner.timed.network import Network, earliest
+from confab.planner.timed.order import BEGIN, END, Order
+from confab.planner.timed.schedules import Candidate, Choices, TurnId, durations_with, turn_edges
+
+WORK = 8.0
+"""Maximum deterministic time of the solver, about seconds."""
+LARGEST = 2**40
+"""Maximum makespan in units of the network."""
+
+
+def shorter(
+    order: Order, network: Network, choices: Choices, found: Candidate, bound: int, seconds: float
+) -> tuple[Candidate, int]:
+    """Return the best schedule that the solver finds, at least as short as a given one, and a lower bound.
+
+    Parameters
+    ----------
+    order : Order
+    network : Network
+    choices : Choices
+        Of the same order.
+    found : Candidate
+        A schedule.
+    bound : int
+        A lower bound of the makespan.
+    seconds : float
+        Limit of the search.
+    """
+    if seconds <= 0 or found.makespan > LARGEST:
+        return found, bound
+    from ortools.sat.python import cp_model
+
+    model: Any = cp_model.CpModel()
+    solver: Any = cp_model.CpSolver()
+    solver.parameters.max_time_in_seconds = seconds
+    solver.parameters.max_deterministic_time = WORK
+    solver.parameters.num_workers = 1
+    solver.parameters.random_seed = 0
+    made = _Model(model, order, network, choices, found, bound)
+    status = solver.Solve(model)
+    best = max(bound, round(solver.BestObjectiveBound()))
+    if network.tick > network.separation and any(network.least(*edge) > network.separation for edge in network.edges):
+        best = bound  # what is apart by a tick in this model could be apart by less
+    if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        return found, bound if status == cp_model.INFEASIBLE else best
+    turns = made.turns(solver)
+    begins = earliest(network, turn_edges(order, turns), durations_with(network, choices, turns))
+    if begins is None or begins.makespan >= found.makespan:
+        return found, min(best, found.makespan)
+    return Candidate(turns, begins), min(best, begins.makespan)
+
+
+class _Model:
+    """The variables and constraints of a schedule."""
+
+    def __init__(
+        self, model: Any, order: Order, network: Network, choices: Choices, found: Candidate, bound: int
+    ) -> None:
+        self.model, self.order, self.network, self.choices, self.found = model, order, network, choices, found
+        self.horizon = found.makespan + network.separation
+        self.horizon = max([self.horizon, *(at for at in network.at if at is not None)])
+        self.lasts = [self.duration(i) for i in range(len(network.durations))]
+        self.begins = [model.NewIntVar(0, self.horizon, "") for _ in network.durations]
+        self.begin_of: dict[TurnId, Any] = {}
+        self.present: dict[tuple[TurnId, int], Any] = {}
+        self.activities()
+        self.resources()
+        makespan = model.NewIntVar(bound, found.makespan, "")
+        for i, at in enumerate(network.at):
+            if at is None:
+                model.Add(makespan >= self.begins[i] + self.lasts[i])
+        model.Minimize(makespan)
+        for variable, hint in zip(self.begins, found.begins.begins, strict=True):
+            model.AddHint(variable, hint)
+
+    def duration(self, activity: int) -> Any:
+        """Return how long an activity lasts: a number, or a variable if that depends on its actor."""
+        its = {m[activity] for m in self.choices.lasts.values() if activity in m} | {self.network.durations[activity]}
+        return next(iter(its)) if len(its) == 1 else self.model.NewIntVar(min(its), max(its), "")
+
+    def activities(self) -> None:
+        model, network = self.model, self.network
+        for i, high, j, low in network.edges:
+            early = self.begins[i] + (self.lasts[i] if high == END else 0)
+            late = self.begins[j] + (self.lasts[j] if low == END else 0)
+            model.Add(early + network.least(i, high, j, low) <= late)
+        for i, (at, latest, windows) in enumerate(zip(network.at, network.latest, network.windows, strict=True)):
+            if at is not None:
+                model.Add(self.begins[i] == at)
+            if latest is not None:
+                model.Add(self.begins[i] + self.lasts[i] <= latest)
+            inside = [model.NewBoolVar("") for _ in windows]
+            if inside:
+                model.AddExactlyOne(inside)
+            for one, (opens, closes) in zip(inside, windows, strict=True):
+                model.Add(self.begins[i] >= opens).OnlyEnforceIf(one)
+                if closes is not None:
+                    model.Add(self.begins[i] + self.lasts[i] <= closes).OnlyEnforceIf(one)
+
+    def resources(self) -> None:
+        model, apart = self.model, self.network.separation
+        takes: list[list[tuple[Any, int]]] = [[] for _ in self.order.resources]
+        for resource, one in enumerate(self.order.resources):
+            readers = sum(turn.reading for turn in one.turns)
+            for number, turn in enumerate(one.turns):
+                key = (resource, number)
+                begin = self.begin_of[key] = model.NewIntVar(0, self.horizon, "")
+                end = model.NewIntVar(0, self.horizon + apart, "")
+                size = model.NewIntVar(0, self.horizon + apart, "")
+                for member, which in turn.lows:
+                    model.Add(begin <= self.begins[member] + (0 if which == BEGIN else self.lasts[member]))
+                for member, which in turn.highs:
+                    model.Add(end >= self.begins[member] + (0 if which == BEGIN else self.lasts[member]) + apart)
+                able = self.choices.of.get(key, (resource,))
+                demand = 1 if turn.reading else max(readers, 1)
+                if len(able) == 1:
+                    takes[resource].append((model.NewIntervalVar(begin, size, end, ""), demand))
+                    continue
+                chosen = [model.NewBoolVar("") for _ in able]
+                model.AddExactlyOne(chosen)
+                for target, is_it in zip(able, chosen, strict=True):
+                    self.present[key, target] = is_it
+                    takes[target].append((model.NewOptionalIntervalVar(begin, size, end, is_it, ""), demand))
+                    for member in turn.members:
+                        if not isinstance(self.lasts[member], int):
+                            lasts = self.choices.lasts.get((key, target), {})
+                            its = lasts.get(member, self.network.durations[member])
+                            model.Add(self.lasts[member] == its).OnlyEnforceIf(is_it)
+        for resource, intervals in enumerate(takes):
+            demands = {demand for _, demand in intervals}
+            if len(demands) > 1:
+                model.AddCumulative([i for i, _ in intervals], [d for _, d in intervals], max(demands))
+            elif intervals and not all(turn.reading for turn in self.order.resources[resource].turns):
+                model.AddNoOverlap([i for i, _ in intervals])
+
+    def turns(self, solver: Any) -> list[list[TurnId]]:
+        """Return the turns of each resource in the order of the solution."""
+        found: list[list[TurnId]] = [[] for _ in self.order.resources]
+        for key in sorted(self.begin_of, key=lambda one: (solver.Value(self.begin_of[one]), one)):
+            able = self.choices.of.get(key, (key[0],))
+            taken = [t for t in able if len(able) == 1 or solver.Value(self.present[key, t])]
+            found[taken[0]].append(key)
+        return found

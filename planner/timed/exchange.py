@@ -1,0 +1,178 @@
+"""Which actor could take which turn in place of the one that takes it in the plan.
+
+The other actor is of every class of the one that it replaces, every symbol about it is at first as that about the replaced one,
+and what never changes (relations, classes, the numbers of durations) allows its steps. Whether the result is a plan, the checker
+decides.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from confab.planner.plan import Plan, Step
+from confab.planner.timed.network import Network
+from confab.planner.timed.order import Order
+from confab.planner.timed.pieces import duration_of, pieces_of
+from confab.planner.timed.schedules import Choices, TurnId
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.amounts import situations_in
+from confab.reasoner.symbols import (
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+)
+
+
+def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> Choices:
+    """Return by which actors the turns of an order could be taken.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        Its primitives are the steps of the order's activities.
+    order : Order
+    network : Network
+        Of the same order; in its unit durations are told.
+    """
+    actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
+    every = _of_the_classes(problem, actors)
+    if not any(every.values()):
+        return Choices()
+    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    whole = _whole_steps(plan, order)
+    of: dict[TurnId, tuple[int, ...]] = {}
+    lasts: dict[tuple[TurnId, int], dict[int, int]] = {}
+    for actor, resource in actors.items():
+        for number, turn in enumerate(order.resources[resource].turns):
+            if turn.reading or not whole(actor, turn.members):
+                continue
+            able = [resource]
+            for other in every[actor]:
+                durations = _durations(problem, rules, facts, order, network, turn.members, {actor: other})
+                if durations is not None:
+                    able.append(actors[other])
+                    lasts[(resource, number), actors[other]] = durations
+            if len(able) > 1:
+                of[resource, number] = tuple(able)
+    return Choices(of, lasts)
+
+
+def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, str]]) -> Plan:
+    """Return a plan whose primitives have other actors, and so have the steps above them.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+    renamed : mapping of primitive to the names of its actors
+        By the numbers of the primitives.
+    """
+    numbers = {step.path: i for i, step in enumerate(plan.primitives)}
+
+    def other(step: Step) -> Step:
+        inside = tuple(map(other, step.steps))
+        names: dict[str, str] = {}
+        for one in step.walk():
+            if not one.steps:
+                names |= renamed.get(numbers[one.path], {})
+        if not names:
+            return step
+        arguments = tuple(names.get(a, a) for a in step.arguments)
+        bindings = {variable: names.get(value, value) for variable, value in step.bindings.items()}
+        number = problem.id_of(step.behavior, arguments)
+        return replace(step, id=number, arguments=arguments, bindings=bindings, steps=inside)
+
+    return Plan(tuple(map(other, plan.steps)))
+
+
+def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
+    """Return for each actor the others of all of its classes, about which every symbol is at first as about it."""
+    actors = list(actors)
+    kinds: dict[str, set[str]] = {
+        a: {kind for kind, members in problem.classes.items() if a in members} for a in actors
+    }
+    about: dict[str, set[tuple[str, tuple[str, ...], str]]] = defaultdict(set)
+    for symbol, value in problem.initial.items():
+        for actor in actors:
+            if actor in symbol.arguments or value == actor:
+                put = tuple("" if a == actor else a for a in symbol.arguments)
+                about[actor].add((symbol.situation, put, "" if value == actor else value))
+    wanted = {a for symbol, value in problem.goal.items() for a in (*symbol.arguments, value)}
+    return {
+        one: [
+            other
+            for other in actors
+            if other != one and kinds[one] == kinds[other] and about[one] == about[other] and not {one, other} & wanted
+        ]
+        for one in actors
+    }
+
+
+def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
+    """Return a function that tells whether all steps that name an actor lie inside some primitives, or outside of them."""
+    numbers = {step.path: i for i, step in enumerate(plan.primitives)}
+    naming: dict[str, list[set[int]]] = defaultdict(list)
+    for step in plan.walk():
+        if step.steps:
+            inside = {numbers[one.path] for one in step.walk() if not one.steps}
+            for argument in dict.fromkeys(step.arguments):
+                naming[argument].append(inside)
+    involved = {
+        actor: {i for i, one in enumerate(order.activities) if actor in one.step.arguments or actor in one.actors}
+        for actor in {a for one in order.activities for a in one.actors}
+    }
+
+    def whole(actor: str, members: Sequence[int]) -> bool:
+        its = set(members)
+        if any(i in its and actor not in order.activities[i].step.arguments for i in its & involved[actor]):
+            return False  # it is in a step that doesn't name it
+        return all(not (inside & its & involved[actor]) or inside & involved[actor] <= its for inside in naming[actor])
+
+    return whole
+
+
+def _durations(
+    problem: Problem,
+    rules: Rules,
+    facts: Facts,
+    order: Order,
+    network: Network,
+    members: Sequence[int],
+    names: Mapping[str, str],
+) -> dict[int, int] | None:
+    """Return the durations of activities with other actors; None if what never changes doesn't allow them."""
+    found = {}
+    for member in members:
+        step = order.activities[member].step
+        arguments = tuple(names.get(a, a) for a in step.arguments)
+        if arguments == step.arguments:
+            continue
+        behavior = problem.domain.behaviors[step.behavior]
+        given = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
+        given |= {v: names.get(value, value) for v, value in step.bindings.items()}
+        static = [c for c in behavior.preconditions if _static(c)]
+        if not rules.fits(behavior, arguments):
+            return None
+        if static and rules.satisfied(static, given, behavior.kinds, facts) is None:
+            return None
+        terms = (*arguments, *(given.get(v.name, v.name) for v in pieces_of(problem, behavior).fixed))
+        seconds = duration_of(problem, behavior, terms, facts)
+        own = order.activities[member].duration
+        seconds = own if behavior.timing is None or behavior.timing.duration is None else seconds
+        if seconds is None or (seconds / network.unit).denominator != 1:
+            return None
+        found[member] = int(seconds / network.unit)
+    return found
+
+
+def _static(condition: Condition) -> bool:
+    """Return whether a condition never changes."""
+    if isinstance(condition, RelationCondition | ClassCondition | EqualityCondition):
+        return True
+    return isinstance(condition, Comparison) and not (situations_in(condition.left) | situations_in(condition.right))

@@ -1,0 +1,194 @@
+"""A simple temporal network over the begins of activities, and the earliest begins that keep it.
+
+Times are whole numbers of a unit that divides every duration, so that nothing is rounded. An edge (i, j, c) says that `j` begins at
+least `c` after `i` begins. Dechter, Meiri and Pearl, "Temporal constraint networks", Artificial Intelligence 49 (1991).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+
+from confab.planner.timed.order import BEGIN, END, Edge, Order
+
+Arc = tuple[int, int, int]
+Window = tuple[int, int | None]
+
+
+@dataclass(frozen=True)
+class Network:
+    """The constants of a network: all but the durations, which may depend on who does what.
+
+    Attributes
+    ----------
+    unit : Fraction
+        Seconds.
+    separation : int
+        How long conflicting events are apart at least.
+    tick : int
+        How long a begin, or the end of a later activity, is at least before an end that it has to precede: of one instant, ends
+        come first, in the order of the activities.
+    durations : list of int
+    edges : tuple of Edge
+    at, latest : list of int or None
+        When an activity begins, if that is fixed; by when it ends.
+    windows : list of tuple of pairs
+        Windows of each activity; empty for any time.
+    """
+
+    unit: Fraction
+    separation: int
+    tick: int
+    durations: list[int]
+    edges: tuple[Edge, ...]
+    at: list[int | None]
+    latest: list[int | None]
+    windows: list[tuple[Window, ...]]
+
+    def least(self, i: int, high: int, j: int, low: int) -> int:
+        """Return how long the begin or end of an activity is before the begin or end of another one, at least."""
+        return self.tick if low == END and (high == BEGIN or i > j) else self.separation
+
+    def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
+        """Return for each activity those that begin some time after it does, with that time."""
+        found: list[dict[int, int]] = [{} for _ in durations]
+        for i, high, j, low in edges:
+            apart = (
+                (durations[i] if high == END else 0) - (durations[j] if low == END else 0) + self.least(i, high, j, low)
+            )
+            if found[i].get(j, apart) <= apart:
+                found[i][j] = apart
+        return [list(after.items()) for after in found]
+
+
+@dataclass(frozen=True)
+class Begins:
+    """The earliest begins, and for each the activity that it waits for (-1: none)."""
+
+    begins: list[int]
+    waits_for: list[int]
+    makespan: int
+
+
+def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[Fraction] = ()) -> Network:
+    """Return the network of an order; `more` are further times that its unit divides."""
+    fixed = [one.at for one in order.activities]
+    ends = [end for windows in order.windows.values() for window in windows for end in window if end is not None]
+    times = [separation, *(one.duration for one in order.activities), *ends, *order.latest.values(), *more]
+    unit = Fraction(1, lcm(*(time.denominator for time in (*times, *(t for t in fixed if t is not None)))))
+
+    def whole(time: Fraction) -> int:
+        return int(time / unit)
+
+    count = range(len(order.activities))
+    return Network(
+        unit,
+        whole(separation),
+        max(whole(separation), 1),
+        [whole(one.duration) for one in order.activities],
+        order.edges,
+        [None if time is None else whole(time) for time in fixed],
+        [whole(order.latest[i]) if i in order.latest else None for i in count],
+        [
+            tuple((whole(low), None if high is None else whole(high)) for low, high in order.windows.get(i, ()))
+            for i in count
+        ],
+    )
+
+
+def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
+    """Return the earliest begins that keep a network and further edges; None if there are none.
+
+    Parameters
+    ----------
+    network : Network
+    edges : iterable of Edge
+        In addition to those of the network.
+    durations : sequence of int, optional
+        In place of the network's.
+    """
+    lasts = network.durations if durations is None else durations
+    arcs = network.arcs((*network.edges, *edges), lasts)
+    count = len(lasts)
+    begins, waits = [0] * count, [-1] * count
+    for i in range(count):
+        first = network.at[i] or 0
+        fitting = _fitting(network.windows[i], first, lasts[i])
+        if fitting is None:
+            return None
+        begins[i] = fitting
+    before = [0] * count
+    for after in arcs:
+        for j, _ in after:
+            before[j] += 1
+    ready = [i for i in range(count) if not before[i]]
+    for i in ready:  # which grows
+        for j, apart in arcs[i]:
+            before[j] -= 1
+            if not before[j]:
+                ready.append(j)
+            if not _moved(network, lasts, begins, waits, i, j, apart):
+                return None
+    if len(ready) < count and not _settled(network, lasts, arcs, begins, waits):
+        return None
+    for i, fixed in enumerate(network.at):
+        latest = network.latest[i]
+        if (fixed is not None and begins[i] != fixed) or (latest is not None and begins[i] + lasts[i] > latest):
+            return None
+    makespan = max((b + d for b, d, at in zip(begins, lasts, network.at, strict=True) if at is None), default=0)
+    return Begins(begins, waits, makespan)
+
+
+def _moved(
+    network: Network, lasts: Sequence[int], begins: list[int], waits: list[int], i: int, j: int, apart: int
+) -> bool:
+    """Move the begin of `j` so that it keeps an arc from `i`; return whether there is a time for it."""
+    wanted = begins[i] + apart
+    if wanted <= begins[j]:
+        return True
+    fitting = _fitting(network.windows[j], wanted, lasts[j])
+    if fitting is None:
+        return False
+    begins[j], waits[j] = fitting, i
+    return True
+
+
+def _settled(
+    network: Network,
+    lasts: Sequence[int],
+    arcs: Sequence[Sequence[tuple[int, int]]],
+    begins: list[int],
+    waits: list[int],
+) -> bool:
+    """Move begins until all arcs are kept, where they form circles; return whether that ends."""
+    waiting, count = deque(range(len(lasts))), [0] * len(lasts)
+    queued = [True] * len(lasts)
+    while waiting:
+        i = waiting.popleft()
+        queued[i] = False
+        for j, apart in arcs[i]:
+            old = begins[j]
+            if not _moved(network, lasts, begins, waits, i, j, apart):
+                return False
+            if begins[j] != old:
+                count[j] += 1
+                if count[j] > len(lasts):  # it moves with itself
+                    return False
+                if not queued[j]:
+                    queued[j] = True
+                    waiting.append(j)
+    return True
+
+
+def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int | None:
+    """Return the first time from `begin` on at which an activity fits into a window."""
+    if not windows:
+        return begin
+    for low, high in windows:
+        first = max(low, begin)
+        if high is None or first + lasts <= high:
+            return first
+    return None

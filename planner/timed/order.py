@@ -1,0 +1,310 @@
+"""The order that activities need: what has to precede what, and whose turns can be exchanged.
+
+Two accesses to one key conflict unless both only read. Conflicting accesses keep the order of the sequence, so that every schedule
+is equivalent to it, with one exception: a *turn* leads a symbol away from its first value and back to it. The turns of a symbol
+(or of an actor, with all symbols about it) can be taken in any order, one at a time: a hand takes and puts down many things.
+
+Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998); blocks: Siddiqui and Haslum, "Block-structured plan
+deordering", AI 2012.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import pairwise
+
+from confab.planner.timed.activities import Activity, Event, InapplicableError, Key, Moment
+from confab.planner.validation import Cell
+from confab.reasoner.symbols import FALSE, Problem, Times
+
+BEGIN, END = 0, 1
+Edge = tuple[int, int, int, int]
+"""The begin (0) or end (1) of an activity isn't later than the begin or end of another one: activity, which, activity, which."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Activities that use a resource without a break: from the first of `lows` to the last of `highs`, each a begin or an end.
+
+    Turns that only read can be taken at the same time.
+    """
+
+    members: tuple[int, ...]
+    lows: tuple[tuple[int, int], ...]
+    highs: tuple[tuple[int, int], ...]
+    reading: bool = False
+
+
+@dataclass(frozen=True)
+class Resource:
+    """A symbol or an actor whose turns exclude each other, in the order of the sequence; `actor` is its name if it is one."""
+
+    turns: tuple[Turn, ...]
+    actor: str | None = None
+
+
+@dataclass(frozen=True)
+class Order:
+    """Activities with what any schedule of them has to keep.
+
+    Attributes
+    ----------
+    activities : tuple of Activity
+    edges : tuple of Edge
+    resources : tuple of Resource
+    latest : mapping of activity to seconds
+        By when it has to end.
+    windows : mapping of activity to pairs of seconds
+        When it can take place: begin and end within one of them.
+    """
+
+    activities: tuple[Activity, ...]
+    edges: tuple[Edge, ...]
+    resources: tuple[Resource, ...]
+    latest: Mapping[int, Fraction] = field(default_factory=dict)
+    windows: Mapping[int, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Record:
+    """An access to a key: from the begin or end `low` of an activity to its begin or end `high`."""
+
+    activity: int
+    low: int
+    high: int
+    written: tuple[str, str] | None  # value before and after, if it changes
+    position: int  # of `low` among the events
+
+
+def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[Event]) -> Order:
+    """Return the order that activities need.
+
+    Parameters
+    ----------
+    problem : Problem
+    activities : sequence of Activity
+        As `confab.planner.timed.activities.activities` returns them for the same events.
+    events : iterable of Event
+
+    Raises
+    ------
+    InapplicableError
+        The events have an activity change what another one that isn't over needs throughout.
+    """
+    records, touched, starts, ends = _records(activities, events)
+    times = problem.times or Times()
+    fixed = {(s.situation, s.arguments) for s in times.deadlines}
+    returning = {cell for cell in records if cell not in fixed and _returns(problem, cell, records[cell])}
+    actors = dict.fromkeys(actor for one in activities for actor in one.actors)
+    owned = {actor: [c for c in returning if actor in c[1] and _sole(c, actors)] for actor in actors}
+    resources = [_actor(actor, activities, {c: records[c] for c in owned[actor]}, starts, ends) for actor in actors]
+    resources += [Resource((), other) for other in _idle(problem, actors)]
+    loose = sorted(cell for cell in returning if not any(actor in cell[1] for actor in actors))
+    resources += [Resource(_turns([records[cell]], ends)) for cell in loose]
+    own = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
+    own |= {cell: len(resources) - len(loose) + i for i, cell in enumerate(loose)}
+    turn_of = [{m: t for t, turn in enumerate(r.turns) for m in turn.members} for r in resources]
+    edges = dict[Edge, None]()
+    for key, found in records.items():
+        apart = turn_of[own[key]] if key in own else None
+        edges.update(dict.fromkeys(_chained(found, ends, activities, apart)))
+    edges.update(dict.fromkeys(_touching(records, touched, ends)))
+    for resource in resources:
+        for turn in resource.turns if resource.actor is not None else ():
+            its = [m for m in turn.members if resource.actor in activities[m].actors]
+            edges.update(dict.fromkeys((one, END, other, BEGIN) for one, other in pairwise(its)))
+    return Order(
+        tuple(activities),
+        tuple(edges),
+        tuple(one for one in resources if one.actor is not None or len(one.turns) > 1),
+        _latest(problem, times, records),
+        _windows(times, activities),
+    )
+
+
+def _records(
+    activities: Sequence[Activity], events: Iterable[Event]
+) -> tuple[dict[Cell, list[_Record]], dict[Key, list[_Record]], dict[int, int], dict[int, int]]:
+    """Return the accesses to each symbol, those that look for symbols with a value, where activities begin, and where they end."""
+    cells: dict[Cell, list[_Record]] = defaultdict(list)
+    values: dict[Key, list[_Record]] = defaultdict(list)
+    starts: dict[int, int] = {}
+    ends: dict[int, int] = {}
+    position = 0
+    for number, moment in events:
+        one = activities[number]
+        parts = [(one.begin, BEGIN, BEGIN), (one.middle, BEGIN, END)] if moment is not Moment.END else []
+        starts.setdefault(number, position)
+        if moment is Moment.WHOLE:
+            position += 1
+        if moment is not Moment.BEGIN:
+            ends[number] = position
+            parts.append((one.end, END, END))
+        for access, low, high in parts:
+            at = position - (moment is Moment.WHOLE and low == BEGIN)
+            for key in access.reads:
+                if isinstance(key[1], str):
+                    values[key].append(_Record(number, low, high, None, at))
+                elif key not in access.changes:
+                    cells[key].append(_Record(number, low, high, None, at))  # type: ignore[index]
+            for cell, pair in access.changes.items():
+                cells[cell].append(_Record(number, low, high, pair, at))
+        position += 1
+    return cells, values, starts, ends
+
+
+def _returns(problem: Problem, cell: Cell, records: Sequence[_Record]) -> bool:
+    """Return whether a symbol comes back to its first value at the end, and is away from it in between."""
+    written = [record.written for record in records if record.written is not None]
+    first = written[0][0] if written else FALSE
+    return bool(written) and written[-1][1] == first
+
+
+def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
+    """Return whether a symbol is about one actor only."""
+    return sum(argument in actors for argument in cell[1]) == 1
+
+
+def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
+    """Return the turns of the symbols to which groups of records are accesses."""
+    first = [next(r.written[0] for r in records if r.written is not None) for records in groups]
+    order = sorted(
+        ((record.position, i, record) for i, records in enumerate(groups) for record in records),
+        key=lambda entry: (entry[0], entry[2].low),
+    )
+    now, found, current, until = list(first), list[list[_Record]](), list[_Record](), -1
+    for position, i, record in order:
+        if current and now == first and position > until:
+            found.append(current)
+            current = []
+        current.append(record)
+        until = max(until, ends[record.activity])
+        if record.written is not None:
+            now[i] = record.written[1]
+    if current:
+        found.append(current)
+    return tuple(map(_turn, found))
+
+
+def _turn(records: Sequence[_Record]) -> Turn:
+    members = tuple(dict.fromkeys(record.activity for record in records))
+    lows = tuple(dict.fromkeys((r.activity, r.low) for r in records))
+    highs = tuple(dict.fromkeys((r.activity, r.high) for r in records))
+    return Turn(members, lows, highs, all(record.written is None for record in records))
+
+
+def _actor(
+    actor: str,
+    activities: Sequence[Activity],
+    cells: Mapping[Cell, Sequence[_Record]],
+    starts: Mapping[int, int],
+    ends: Mapping[int, int],
+) -> Resource:
+    """Return the turns of an actor: as long as it is busy, or a symbol about it hasn't come back to its first value."""
+    its = sorted((n for n, one in enumerate(activities) if actor in one.actors), key=lambda n: starts[n])
+    busy = [_Record(n, BEGIN, END, ("", ""), starts[n]) for n in its]
+    return Resource(_turns([busy, *cells.values()], ends), actor)
+
+
+def _idle(problem: Problem, actors: Iterable[str]) -> list[str]:
+    """Return the individuals that are of all classes of an actor and take no turn."""
+    known = set(actors)
+    kinds = {a: [frozenset(m) for m in problem.classes.values() if a in m] for a in known}
+    others = {one for its in kinds.values() if its for one in frozenset.intersection(*its)}
+    return sorted(others - known)
+
+
+def _chained(
+    records: Sequence[_Record],
+    ends: Mapping[int, int],
+    activities: Sequence[Activity],
+    turn_of: Mapping[int, int] | None,
+) -> Iterator[Edge]:
+    """Yield the edges between conflicting accesses to a symbol; if there are turns, only within one."""
+    last: _Record | None = None
+    readers: list[_Record] = []
+    turn: int | None = None
+    for record in records:
+        if turn_of is not None and turn_of[record.activity] != turn:
+            turn, last, readers = turn_of[record.activity], None, []
+        same = record.written is not None and record.written[0] == record.written[1]
+        for other in (*((last,) if last else ()), *(readers if record.written is not None else ())):
+            if other.activity == record.activity:
+                continue
+            if other.high == END and ends[other.activity] > record.position:
+                if same and other.written is None:
+                    continue
+                raise InapplicableError(
+                    f"{activities[record.activity].step} is done while {activities[other.activity].step} needs "
+                    "what it changes, or changes what it needs"
+                )
+            yield other.activity, other.high, record.activity, record.low
+        if record.written is None:
+            readers.append(record)
+        else:
+            last, readers = record, [r for r in readers if r.activity == record.activity and r.high == END]
+
+
+def _touching(
+    records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]], ends: Mapping[int, int]
+) -> Iterator[Edge]:
+    """Yield the edges between a look for all symbols with a value and whatever comes to have it or ceases to."""
+    if not values:
+        return
+    touches: dict[Key, list[_Record]] = defaultdict(list)
+    for (situation, _), found in records.items():
+        for record in found:
+            for value in set(record.written or ()):
+                if record.written is not None and record.written[0] != record.written[1]:
+                    touches[situation, value].append(record)
+    for key, looks in values.items():
+        for look in looks:
+            for touch in touches.get(key, ()):
+                if touch.activity == look.activity:
+                    continue
+                one, other = (touch, look) if touch.position < look.position else (look, touch)
+                if one.high == END and ends[one.activity] > other.position:
+                    raise InapplicableError("a step looks for what another one that isn't over changes")
+                yield one.activity, one.high, other.activity, other.low
+
+
+def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]) -> dict[int, Fraction]:
+    """Return by when activities have to end so that goals hold in time: those that change them last."""
+    found: dict[int, Fraction] = {}
+    for symbol, seconds in times.deadlines.items():
+        its = [r for r in records.get((symbol.situation, symbol.arguments), ()) if r.written is not None]
+        if symbol in problem.goal and its:
+            found[its[-1].activity] = min(seconds, found.get(its[-1].activity, seconds))
+    return found
+
+
+def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
+    """Return when activities can take place, where not at any time: within a window of each individual that they name."""
+    found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
+    for number, one in enumerate(activities):
+        for individual in dict.fromkeys((*one.step.arguments, *one.actors)):
+            if individual in times.windows:
+                its = times.windows[individual]
+                found[number] = its if number not in found else common(found[number], its)
+    return found
+
+
+def common(
+    one: Sequence[tuple[Fraction, Fraction | None]], other: Sequence[tuple[Fraction, Fraction | None]]
+) -> tuple[tuple[Fraction, Fraction | None], ...]:
+    """Return the windows that lie in one of each of two sets of windows.
+
+    >>> common([(Fraction(0), Fraction(9))], [(Fraction(5), None)])
+    ((Fraction(5, 1), Fraction(9, 1)),)
+    """
+    found = []
+    for low, high in one:
+        for from_, until in other:
+            bounds = [end for end in (high, until) if end is not None]
+            both = (max(low, from_), min(bounds) if bounds else None)
+            if both[1] is None or both[0] <= both[1]:
+                found.append(both)
+    return tuple(sorted(found, key=lambda window: window[0]))

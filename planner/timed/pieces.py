@@ -1,0 +1,127 @@
+"""A behaviour cut at its begin and its end: what is asked and made at the begin, throughout, and at the end.
+
+==========  ==========================================  =========================================================
+piece       conditions                                  effects
+==========  ==========================================  =========================================================
+begin       at the start                                at the start
+middle      throughout                                  in the making: they are determined at the begin
+end         at the end                                  at the end
+==========  ==========================================  =========================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from confab.planner.checked_amounts import worth
+from confab.planner.checked_conditions import Arguments, ConditionReader, variables_of
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.symbols import (
+    AmountEffect,
+    Behavior,
+    Condition,
+    Effect,
+    Parameter,
+    Problem,
+    Span,
+    Times,
+    Timing,
+    ValueEffect,
+)
+from confab.reasoner.timing import on_each, timing_of
+
+SECOND = Fraction(1)
+"""The duration of a primitive of which nothing states or measures one, in seconds."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """The pieces of a behaviour. Each has its parameters and, behind them, `fixed`: variables that the preconditions determine."""
+
+    whole: Behavior
+    fixed: tuple[Parameter, ...]
+    timing: Timing
+    begin: Behavior
+    middle: Behavior
+    end: Behavior
+
+
+def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
+    """Return the pieces of a behaviour of a problem."""
+    timing = timing_of(behavior)
+    fixed = _fixed(behavior)
+
+    def piece(name: str, conditions: Sequence[Condition], effects: Sequence[Effect]) -> Behavior:
+        spread = on_each(effects, problem.classes)
+        return replace(
+            behavior,
+            name=f"{behavior.name}@{name}",
+            parameters=(*behavior.parameters, *fixed),
+            variables=tuple(v for v in behavior.variables if v not in fixed),
+            preconditions=tuple(conditions),
+            effects=tuple(e for e in spread if isinstance(e, ValueEffect)),
+            amounts=tuple(e for e in spread if isinstance(e, AmountEffect)),
+            price=None,
+            timing=None,
+        )
+
+    begin, middle, end = (
+        piece(span.value, timing.asked(span), timing.made(span)) for span in (Span.START, Span.THROUGHOUT, Span.END)
+    )
+    return Pieces(behavior, fixed, timing, begin, middle, end)
+
+
+def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
+    """Return the variables that the preconditions of a behaviour determine."""
+    named = set[str]().union(*map(variables_of, behavior.preconditions))
+    return tuple(variable for variable in behavior.variables if variable.name in named)
+
+
+def terms_at(rules: Rules, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
+    """Return what the parameters of a behaviour's pieces stand for where it begins."""
+    behavior = pieces.whole
+    if not pieces.fixed:
+        return arguments
+    given = {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
+    found = rules.satisfied(behavior.preconditions, given, behavior.kinds, facts) or given
+    return (*arguments, *(found.get(v.name, v.name) for v in pieces.fixed))
+
+
+def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
+    """Return the seconds that a step takes where it begins; None if its duration is no number, or negative.
+
+    `arguments` are terms as `terms_at` returns them.
+    """
+    stated = timing_of(behavior).duration
+    if stated is None:
+        measured = (problem.times or Times()).measured
+        return measured.get(behavior.name, SECOND)
+    names = [term.name for term in (*behavior.parameters, *_fixed(behavior))]
+    reader = ConditionReader(Rules(problem), names)
+    its = worth(stated, reader.key, problem.relations)
+    seconds = its(facts.value, [*arguments, *list(reader.places)[len(arguments) :]])
+    return None if seconds is None or seconds < 0 else seconds
+
+
+def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, resting: frozenset[str]) -> tuple[str, ...]:
+    """Return the actors of a step: those that its behaviour names, else the first argument that is a resting individual.
+
+    `resting` has what `default_actors` returns.
+    """
+    stated = timing_of(behavior).actors
+    if stated:
+        given: Mapping[str, str] = dict(
+            zip((t.name for t in (*behavior.parameters, *_fixed(behavior))), arguments, strict=False)
+        )
+        return tuple(dict.fromkeys(given.get(actor, actor) for actor in stated))
+    return next(((argument,) for argument in arguments if argument in resting), ())
+
+
+def default_actors(problem: Problem) -> frozenset[str]:
+    """Return the individuals of the classes that have a situation type with a rest value, if no behaviour names an actor."""
+    if any(timing_of(behavior).actors for behavior in problem.domain.behaviors.values()):
+        return frozenset()
+    kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
+    return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))

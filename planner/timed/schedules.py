@@ -1,0 +1,259 @@
+"""A schedule of an order: in which order each resource takes its turns, which actor takes which turn, and when activities begin.
+
+Greedily at first: turns in the order of the sequence, each by the actor that is free first. Then by exchanging turns on the
+critical path (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem", Management
+Science 42, 1996). Where OR-Tools is installed, CP-SAT goes on from there (`confab.planner.timed.cpsat`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from time import perf_counter
+
+from confab.planner.timed.network import Begins, Network, earliest
+from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn
+
+ROUNDS = 100
+"""Maximum number of exchanges that are made without a shorter schedule."""
+MOST_ARCS = 400_000
+"""Maximum number of arcs that are followed while turns are exchanged."""
+TABU = 8
+"""Number of exchanges during which an exchange isn't undone."""
+
+TurnId = tuple[int, int]
+"""The number of a resource and that of a turn of it."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """By which actors turns can be taken: for each turn the resources, its own first, with the durations of its members there."""
+
+    of: Mapping[TurnId, tuple[int, ...]] = field(default_factory=dict)
+    lasts: Mapping[tuple[TurnId, int], Mapping[int, int]] = field(default_factory=dict)
+
+
+@dataclass
+class Candidate:
+    """For each resource its turns in order; `begins` is what follows from that."""
+
+    turns: list[list[TurnId]]
+    begins: Begins
+
+    @property
+    def makespan(self) -> int:
+        """The end of the last activity."""
+        return self.begins.makespan
+
+
+def shortest(order: Order, network: Network, choices: Choices, until: float, bound: int = 0) -> Candidate | None:
+    """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`; None if none is found.
+
+    A schedule as short as a lower bound is the last that is tried.
+
+    Parameters
+    ----------
+    order : Order
+    network : Network
+        Of the same order.
+    choices : Choices
+    until : float
+    """
+    search = _Search(order, network, choices)
+    starts = [search.evaluated(turns) for turns in search.starts()]
+    found = [start for start in starts if start is not None]
+    if not found:
+        return None
+    return search.improved(min(found, key=lambda one: one.makespan), until, bound)
+
+
+def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
+    """Yield the edges by which turns are taken one after the other; those that only read, at the same time."""
+    for line in turns:
+        last: Turn | None = None
+        readers: list[Turn] = []
+        for resource, number in line:
+            turn = order.resources[resource].turns[number]
+            before = [*((last,) if last else ()), *(() if turn.reading else readers)]
+            for other in before:
+                yield from ((i, high, j, low) for i, high in other.highs for j, low in turn.lows if i != j)
+            if turn.reading:
+                readers.append(turn)
+            else:
+                last, readers = turn, []
+
+
+def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
+    """Return the durations of activities where turns are taken by certain actors."""
+    found = list(network.durations)
+    for resource, line in enumerate(turns):
+        for turn in line:
+            if turn[0] != resource:
+                for member, lasts in choices.lasts[turn, resource].items():
+                    found[member] = lasts
+    return found
+
+
+class _Search:
+    def __init__(self, order: Order, network: Network, choices: Choices) -> None:
+        self.order, self.network, self.choices = order, network, choices
+        self.turns_of: list[list[TurnId]] = [[] for _ in order.activities]
+        for resource, one in enumerate(order.resources):
+            for number, turn in enumerate(one.turns):
+                for member in turn.members:
+                    self.turns_of[member].append((resource, number))
+
+    def evaluated(self, turns: list[list[TurnId]]) -> Candidate | None:
+        """Return what follows from turns; None if they can't be taken so."""
+        durations = durations_with(self.network, self.choices, turns)
+        begins = earliest(self.network, turn_edges(self.order, turns), durations)
+        return None if begins is None else Candidate(turns, begins)
+
+    def starts(self) -> Iterator[list[list[TurnId]]]:
+        """Yield the turns of the sequence, and those with each turn taken by the actor that is free first."""
+        own = [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)]
+        yield own
+        if self.choices.of:
+            yield self.shared()
+
+    def shared(self) -> list[list[TurnId]]:
+        """Return the turns in the order of the sequence, each with the actor on which it can begin first.
+
+        Only the work of each actor is added up here; an actor whose turn isn't over takes no other one.
+        """
+        work = [0] * len(self.order.resources)
+        lines: list[list[TurnId]] = [[] for _ in self.order.resources]
+        left: dict[TurnId, int] = {}
+        holding: dict[int, TurnId] = {}
+        for its_turns in self.turns_of:
+            for turn in its_turns:
+                resource = turn[0]
+                if turn not in left:
+                    left[turn] = len(self.order.resources[resource].turns[turn[1]].members)
+                    able = self.choices.of.get(turn, (resource,))
+                    free = [one for one in able if one not in holding] or [resource]
+                    chosen = min(free, key=lambda one: (work[one] + self.cost(turn, one), able.index(one)))
+                    lines[chosen].append(turn)
+                    work[chosen] += self.cost(turn, chosen)
+                    if self.order.resources[resource].actor is not None:
+                        holding[chosen] = turn
+                left[turn] -= 1
+                if not left[turn]:
+                    for one in [one for one, its in holding.items() if its == turn]:
+                        del holding[one]
+        return lines
+
+    def cost(self, turn: TurnId, resource: int) -> int:
+        """Return the work of a turn for an actor."""
+        its = self.choices.lasts.get((turn, resource), {})
+        members = self.order.resources[turn[0]].turns[turn[1]].members
+        return sum(its.get(member, self.network.durations[member]) for member in members)
+
+    def improved(self, best: Candidate, until: float, bound: int) -> Candidate:
+        """Return a schedule after exchanges of turns on the critical path."""
+        now, barren = best, 0
+        left = MOST_ARCS // (1 + len(self.network.edges) + len(self.network.durations))
+        tabu: dict[tuple[TurnId, TurnId], int] = {}
+        step = 0
+        while best.makespan > bound and barren < ROUNDS and left > 0 and perf_counter() < until:
+            step += 1
+            barren += 1
+            options: list[tuple[int, int, tuple[TurnId, TurnId], Candidate]] = []
+            for pair, turns in self.neighbours(now):
+                left -= 1
+                if left < 0 or perf_counter() > until:
+                    break
+                other = self.evaluated(turns)
+                if other is None or (tabu.get(pair, 0) > step and other.makespan >= best.makespan):
+                    continue
+                options.append((other.makespan, len(options), pair, other))
+            if not options:
+                break
+            _, _, pair, now = min(options)[:4]
+            tabu[pair[1], pair[0]] = step + TABU
+            if now.makespan < best.makespan:
+                best, barren = now, 0
+        return best
+
+    def neighbours(self, now: Candidate) -> Iterator[tuple[tuple[TurnId, TurnId], list[list[TurnId]]]]:
+        """Yield exchanges of neighbouring turns, and moves of turns to other actors, on the critical path."""
+        critical = set(self.critical(now))
+        for resource, line in enumerate(now.turns):
+            for i, (one, other) in enumerate(pairwise(line)):
+                if self.meets(one, critical) and self.meets(other, critical):
+                    yield (one, other), self.replaced(now, {resource: [*line[:i], other, one, *line[i + 2 :]]})
+            for turn in line:
+                able = self.choices.of.get(turn, ())
+                if able and self.meets(turn, critical):
+                    for target in able:
+                        if target != resource:
+                            for turns in self.moved(now, turn, resource, target):
+                                yield (turn, (resource, -1 - target)), turns
+
+    def moved(self, now: Candidate, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
+        """Yield the turns with one given to another actor, among its turns by their begins, or one earlier or later."""
+
+        def begin(one: TurnId) -> int:
+            its = self.order.resources[one[0]].turns[one[1]]
+            return min(now.begins.begins[member] for member in its.members)
+
+        there = now.turns[target]
+        place = sum(begin(one) <= begin(turn) for one in there)
+        left = [one for one in now.turns[resource] if one != turn]
+        for at in range(max(place - 1, 0), min(place + 1, len(there)) + 1):
+            yield self.replaced(now, {resource: left, target: [*there[:at], turn, *there[at:]]})
+
+    def replaced(self, now: Candidate, lines: Mapping[int, list[TurnId]]) -> list[list[TurnId]]:
+        return [lines.get(i, line) for i, line in enumerate(now.turns)]
+
+    def meets(self, turn: TurnId, critical: set[int]) -> bool:
+        """Return whether a turn has an activity on the critical path."""
+        return not critical.isdisjoint(self.order.resources[turn[0]].turns[turn[1]].members)
+
+    def critical(self, now: Candidate) -> list[int]:
+        """Return the activities on the critical path, the last first."""
+        durations = durations_with(self.network, self.choices, now.turns)
+        ends = [b + d for b, d in zip(now.begins.begins, durations, strict=True)]
+        found, current = list[int](), max(range(len(ends)), key=lambda i: (self.network.at[i] is None, ends[i]))
+        while current >= 0 and current not in found:
+            found.append(current)
+            current = now.begins.waits_for[current]
+        return found
+
+
+def least(order: Order, network: Network, choices: Choices) -> int:
+    """Return a lower bound of the makespan of any schedule of these activities by any of the actors that may take their turns.
+
+    The longest chain that every schedule has; or the work of actors that may replace each other, divided by their number.
+    """
+    lasts = list(network.durations)
+    for its in choices.lasts.values():
+        for member, other in its.items():
+            lasts[member] = min(lasts[member], other)
+    edges = network.edges
+    if lasts != network.durations:  # what ends no earlier than another one could begin later if it were shorter
+        edges = tuple(edge for edge in edges if edge[3] == BEGIN)
+    free = replace(network, edges=edges, tick=network.separation, latest=[None] * len(lasts))
+    chain = earliest(free, (), lasts)
+    bound = chain.makespan if chain is not None else 0
+    groups: dict[tuple[int, ...], list[TurnId]] = {}
+    for resource, one in enumerate(order.resources):
+        for number in range(len(one.turns)):
+            able = tuple(sorted(choices.of.get((resource, number), (resource,))))
+            groups.setdefault(able, []).append((resource, number))
+    for able in groups:
+        inside = [turn for other, turns in groups.items() if set(other) <= set(able) for turn in turns]
+        work = sum(_work(order, lasts, turn) for turn in inside)
+        bound = max(bound, -(-work // len(able)))
+    return bound
+
+
+def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
+    """Return how long a turn lasts at least: for an actor as long as it is busy, for a symbol as its longest activity."""
+    resource = order.resources[turn[0]]
+    its = resource.turns[turn[1]]
+    if resource.actor is not None:
+        return sum(lasts[m] for m in its.members if resource.actor in order.activities[m].actors)
+    whole = [m for m in its.members if (m, BEGIN) in its.lows and (m, END) in its.highs]
+    return 0 if its.reading else max((lasts[m] for m in whole), default=0)

@@ -1,0 +1,271 @@
+"""Is this a plan in time? A checker that shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
+
+The primitives are carried out on paper at their times: at each instant what ends does so first. Every condition is evaluated where
+its span asks for it, those of `throughout` again after every event. What is in the making belongs to its step: a step that reads
+or changes it meanwhile is at fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from confab.planner.checked_conditions import Arguments
+from confab.planner.plan import Step
+from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
+from confab.planner.timed.plan import Slot, TimedPlan
+from confab.planner.validation import Cell, Change, Facts, Fault, Rules, validate
+from confab.reasoner.amounts import meets
+from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
+from confab.reasoner.timing import only_during
+
+
+def validate_timed(problem: Problem, timed: TimedPlan, separation: Fraction = Fraction(0)) -> list[Fault]:
+    """Return what is wrong with a plan in time; nothing if it is one.
+
+    Parameters
+    ----------
+    problem : Problem
+    timed : TimedPlan
+    separation : Fraction
+        How long conflicting events have to be apart at least, in seconds: PDDL's epsilon.
+    """
+    faults: list[Fault] = []
+    if only_during(problem):
+        sequence = None  # what holds only during a step no sequence of whole steps shows
+    else:
+        faults += validate(problem, timed.plan)
+        sequence = _in_sequence(problem, timed.plan.primitives)
+    if [slot.step for slot in timed.slots] != list(timed.plan.primitives):
+        faults.append(Fault((), "the schedule isn't of the plan's primitives"))
+    return faults or list(_Clock(problem, timed, separation, sequence).run())
+
+
+@dataclass
+class _Running:
+    """A step that has begun: its slot, its pieces and their terms, and the cells in the making with their values to come."""
+
+    slot: Slot
+    pieces: Pieces
+    terms: Arguments
+    making: list[Change]
+    number: int
+
+
+class _Watched(Facts):
+    """Facts that note which cells, and which holders of which value, they are asked for."""
+
+    def __init__(self, problem: Problem, rules: Rules) -> None:
+        super().__init__(problem, problem.initial, rules)
+        self.cells: set[Cell] = set()
+        self.values: set[tuple[str, str]] = set()
+
+    def value(self, situation: str, arguments: Arguments) -> str | None:
+        self.cells.add((situation, arguments))
+        return super().value(situation, arguments)
+
+    def holders(self, situation: str, value: str) -> Iterable[Arguments]:
+        self.values.add((situation, value))
+        return list(super().holders(situation, value))
+
+    def clear(self) -> None:
+        self.cells, self.values = set(), set()
+        if self.problem.domain.rules:
+            self._definitions.forget()
+
+
+Effects = tuple[tuple[Cell, str], ...]
+
+
+def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
+    """Return what each step changes if they are done one after the other, and which one changes a cell last."""
+    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    found, last = list[Effects](), dict[Cell, int]()
+    for number, step in enumerate(steps):
+        changes = rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or []
+        net = {(situation, key): value for situation, key, value in changes}
+        for cell, value in net.items():
+            facts.put(*cell, value)
+            last[cell] = number
+        found.append(tuple(sorted(net.items())))
+    return found, last
+
+
+class _Clock:
+    """A timed plan carried out on paper."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        timed: TimedPlan,
+        separation: Fraction,
+        sequence: tuple[list[Effects], dict[Cell, int]] | None,
+    ) -> None:
+        self.problem, self.timed, self.separation, self.sequence = problem, timed, separation, sequence
+        self.rules = Rules(problem)
+        self.facts = _Watched(problem, self.rules)
+        self.times = problem.times or Times()
+        self.resting = default_actors(problem)
+        self.running: dict[int, _Running] = {}
+        self.pieces: dict[str, Pieces] = {}
+        self.made: dict[int, dict[Cell, str]] = {}
+        self.last: dict[Cell, int] = {}
+        self.since: dict[Cell, Fraction] = {}  # when a cell was changed last
+        self.asked: dict[
+            Cell, Fraction
+        ] = {}  # when a cell was asked last, by another step than the one that changes it
+        self.read_by: dict[Cell, int] = {}
+
+    def run(self) -> Iterator[Fault]:
+        """Yield what is wrong, until something can't be done at all."""
+        yield from self.actors()
+        slots = self.timed.slots
+        # Of the events of one instant what ends comes first; what takes no time begins and ends at once, in the plan's order.
+        events = sorted(
+            [(s.begin, 1, n, 0) for n, s in enumerate(slots)]
+            + [(s.end, 1 if s.begin == s.end else 0, n, 1) for n, s in enumerate(slots)]
+        )
+        for time, _, number, which in events:
+            faults = list(self.ended(number, time) if which else self.begun(number, slots[number], time))
+            yield from faults
+            if faults:
+                return
+            broken = [f for one in self.running.values() if one.number != number for f in self.holds(one)]
+            yield from broken
+            if broken:
+                return
+        yield from self.in_the_end()
+
+    def piece(self, name: str) -> Pieces:
+        if name not in self.pieces:
+            self.pieces[name] = pieces_of(self.problem, self.problem.domain.behaviors[name])
+        return self.pieces[name]
+
+    def actors(self) -> Iterator[Fault]:
+        """Yield where an actor is in two steps at once, or a step takes place where one that it names isn't available."""
+        lanes: dict[str, list[Slot]] = {}
+        for slot in self.timed.slots:
+            behavior = self.problem.domain.behaviors[slot.step.behavior]
+            fixed = self.piece(behavior.name).fixed
+            terms = (*slot.step.arguments, *(slot.step.bindings.get(v.name, v.name) for v in fixed))
+            its = actors_of(self.problem, behavior, terms, self.resting)
+            for actor in its:
+                lanes.setdefault(actor, []).append(slot)
+            for one in dict.fromkeys((*slot.step.arguments, *its)):
+                windows = self.times.windows.get(one)
+                if windows is not None and not any(
+                    low <= slot.begin and (high is None or slot.end <= high) for low, high in windows
+                ):
+                    yield Fault(slot.step.path, f"{slot.step}: {one} isn't available from {slot.begin} to {slot.end} s")
+        for actor, its_slots in sorted(lanes.items()):
+            busy: Slot | None = None
+            for slot in sorted(its_slots, key=lambda s: (s.begin, s.end)):
+                if busy is not None and slot.begin < busy.end:
+                    yield Fault(slot.step.path, f"{slot.step}: {actor} is in {busy.step} until {busy.end} s")
+                busy = slot if busy is None or slot.end >= busy.end else busy
+
+    def begun(self, number: int, slot: Slot, time: Fraction) -> Iterator[Fault]:
+        """Begin a step."""
+        step, pieces, facts = slot.step, self.piece(slot.step.behavior), self.facts
+        fixed = self.times.events.get(step.behavior)
+        if fixed is not None and fixed != time:
+            yield Fault(step.path, f"{step}: it happens at {fixed} s, not at {time} s")
+        facts.clear()
+        terms = terms_at(self.rules, pieces, step.arguments, facts)
+        seconds = duration_of(self.problem, pieces.whole, terms, facts)
+        if seconds is None or slot.end - slot.begin != seconds:
+            yield Fault(step.path, f"{step}: it takes {slot.end - slot.begin} s here; its duration is {seconds} s")
+            return
+        one = _Running(slot, pieces, terms, [], number)
+        self.made[number] = {}
+        yield from self.done(one, pieces.begin, time)
+        facts.clear()
+        making = self.rules.changes(pieces.middle, terms, facts)
+        if making is None:
+            yield Fault(step.path, f"{step}: what it asks throughout doesn't hold at its begin ({time} s)")
+            return
+        yield from self.foreign(one, [(name, key) for name, key, _ in making], time)
+        one.making = making
+        self.running[number] = one
+
+    def ended(self, number: int, time: Fraction) -> Iterator[Fault]:
+        """End a step."""
+        one = self.running.pop(number)
+        self.facts.clear()
+        for name, key, value in one.making:
+            self.put(one, (name, key), value, time)
+        yield from self.done(one, one.pieces.end, time)
+        if self.sequence is not None:
+            wanted = dict(self.sequence[0][number])
+            if self.made[number] != wanted:
+                cells = sorted({c for c, _ in self.made[number].items() ^ wanted.items()})
+                yield Fault(one.slot.step.path, f"{one.slot.step}: it changes {cells[0][0]} otherwise than in sequence")
+
+    def done(self, one: _Running, piece: Behavior, time: Fraction) -> Iterator[Fault]:
+        """Do the begin or the end of a step."""
+        if not piece.preconditions and not piece.effects and not piece.amounts:
+            return
+        self.facts.clear()
+        changes = self.rules.changes(piece, one.terms, self.facts)
+        if changes is None:
+            what = piece.name.rsplit("@")[-1]
+            yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks ({what}) doesn't hold at {time} s")
+            return
+        yield from self.foreign(one, [(name, key) for name, key, _ in changes], time)
+        for name, key, value in changes:
+            self.put(one, (name, key), value, time)
+
+    def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
+        """Give a cell a value."""
+        self.facts.put(*cell, value)
+        self.made[one.number][cell] = value
+        self.last[cell] = one.number
+        self.since[cell] = time
+
+    def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
+        """Yield where a step reads or changes what is in the making in another one, or was touched a moment ago."""
+        read, values = set(self.facts.cells), set(self.facts.values)
+        for other in self.running.values():
+            if other.number == one.number:
+                continue
+            for name, key, value in other.making:
+                old = Facts.value(self.facts, name, key)
+                if (name, key) in read or (name, key) in changed or {(name, old), (name, value)} & values:
+                    yield Fault(
+                        one.slot.step.path,
+                        f"{one.slot.step}: {other.slot.step} is changing {name} of {', '.join(key)} at {time} s",
+                    )
+                    return
+        for cell in (read | set(changed)) if self.separation else ():
+            if cell in self.since and self.last.get(cell) != one.number and time - self.since[cell] < self.separation:
+                yield Fault(one.slot.step.path, f"{one.slot.step}: {cell[0]} of {', '.join(cell[1])} changed just then")
+                return
+            asked_by_another = cell in changed and self.read_by.get(cell, one.number) != one.number
+            if asked_by_another and time - self.asked[cell] < self.separation:
+                yield Fault(one.slot.step.path, f"{one.slot.step}: {cell[0]} was asked for just then")
+                return
+        for cell in read if self.separation else ():
+            self.asked[cell], self.read_by[cell] = time, one.number
+
+    def holds(self, one: _Running) -> Iterator[Fault]:
+        """Yield where what a running step asks throughout doesn't hold any more."""
+        if one.pieces.middle.preconditions:
+            self.facts.clear()
+            if self.rules.changes(one.pieces.middle, one.terms, self.facts) is None:
+                yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks throughout ceases to hold")
+
+    def in_the_end(self) -> Iterator[Fault]:
+        """Yield the goals that aren't reached, or not in time, and the cells that another step than in sequence changes last."""
+        for symbol, wanted in self.problem.goal.items():
+            got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
+            if not meets(got, wanted):
+                yield Fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
+            latest = self.times.deadlines.get(symbol)
+            since = self.since.get((symbol.situation, symbol.arguments), Fraction(0))
+            if latest is not None and since > latest:
+                yield Fault((), f"the goal {symbol} = {wanted} is reached at {since} s; it has to be by {latest} s")
+        if self.sequence is not None:
+            for cell, number in sorted(self.sequence[1].items()):
+                if self.last.get(cell) != number:
+                    yield Fault((), f"{cell[0]} of {', '.join(cell[1])} gets its last value from another step")

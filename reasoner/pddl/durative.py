@@ -1,0 +1,144 @@
+"""Durative actions of PDDL 2.1: the parts at the start, over all and at the end, and what an action asks and does as a whole.
+
+As a whole, a condition that an effect at the start brings about isn't asked, and an effect at the start that the end takes
+back isn't seen: it is the action as it is if nothing else happens meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from confab.reasoner.pddl.words import Form, Word
+
+SPANS = {("at", "start"): "start", ("over", "all"): "all", ("at", "end"): "end"}
+DURATION = "?duration"
+
+
+@dataclass(frozen=True)
+class Durative:
+    """A durative action's duration, and its conditions and effects, each with `start`, `all` or `end`."""
+
+    duration: Word | Form
+    conditions: tuple[tuple[str, Form], ...]
+    effects: tuple[tuple[str, Form], ...]
+
+
+class NotTimedError(ValueError):
+    """A part of a durative action has no time, or one that isn't supported; `at` is where it stands."""
+
+    def __init__(self, at: Word | Form, text: str) -> None:
+        super().__init__(text)
+        self.at = at
+
+
+def duration_in(form: Form) -> Word | Form:
+    """Return a duration as a number or an expression; where only bounds are given, the least one."""
+    if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
+        return duration_in(form.items[2])
+    bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]
+    found: dict[str, Word | Form] = {}
+    for one in bounds:
+        if (
+            one.head not in ("=", "<=", ">=")
+            or len(one.items) != 3
+            or not (isinstance(one.items[1], Word) and one.items[1].text == DURATION)
+        ):
+            raise NotTimedError(one, "wanted (= ?duration …), or bounds by (>= ?duration …) and (<= ?duration …)")
+        found.setdefault(one.head, one.items[2])
+    chosen = found.get("=") or found.get(">=") or found.get("<=")
+    if chosen is None:
+        raise NotTimedError(form, "wanted (= ?duration …)")
+    return chosen
+
+
+def timed(form: Form | None, what: str, duration: Word | Form) -> Iterator[tuple[str, Form]]:
+    """Yield the conditions or effects of a durative action, each with its span; in them, the duration in place of its name."""
+    if form is None or not form.items:
+        return
+    words = tuple(item.text for item in form.items[:2] if isinstance(item, Word))
+    if form.head == "and":
+        for item in form.items[1:]:
+            if not isinstance(item, Form):
+                raise NotTimedError(item, f"wanted a {what} with its time, got '{item.text}'")
+            yield from timed(item, what, duration)
+    elif words in SPANS and len(form.items) == 3 and isinstance(form.items[2], Form):
+        if words == ("over", "all") and what == "effect":
+            raise NotTimedError(form, "an effect is (at start …) or (at end …)")
+        yield SPANS[words], _put(form.items[2], duration)
+    elif form.head == "forall" and len(form.items) == 3 and isinstance(form.items[2], Form):
+        for span, inner in timed(form.items[2], what, duration):
+            yield span, replace(form, items=(*form.items[:2], inner))
+    elif form.head == "when" and len(form.items) == 3 and all(isinstance(one, Form) for one in form.items[1:]):
+        asked = list(timed(form.items[1], "condition", duration))  # type: ignore[arg-type]
+        for span, inner in timed(form.items[2], what, duration):  # type: ignore[arg-type]
+            if any(at != span for at, _ in asked):
+                raise NotTimedError(form, "a condition of an effect at another time than the effect is not supported")
+            yield span, replace(form, items=(form.items[0], _both([one for _, one in asked], form), inner))
+    elif form.head in ("increase", "decrease") and any(_names(item, "#t") for item in form.items):
+        raise NotTimedError(form, "continuous effects are not supported (#t)")
+    else:
+        raise NotTimedError(form, f"wanted (at start …), (over all …) or (at end …), got ({form.head or '…'} …)")
+
+
+def whole(parts: Durative, place: Form) -> tuple[Form | None, Form | None]:
+    """Return the precondition and the effect of a durative action as a whole."""
+    begun = {_text(e) for span, effect in parts.effects if span == "start" for e in _conjuncts(effect)}
+    ended = {
+        _text(_atom(e)) for span, effect in parts.effects if span == "end" for e in _conjuncts(effect) if _plain(e)
+    }
+    asked = [
+        c
+        for span, condition in parts.conditions
+        for c in _conjuncts(condition)
+        if span == "start" or _text(c) not in begun
+    ]
+    made = [
+        e
+        for span, effect in parts.effects
+        for e in _conjuncts(effect)
+        if span == "end" or not _plain(e) or _text(_atom(e)) not in ended
+    ]
+    return (_both(asked, place) if asked else None), (_both(made, place) if made else None)
+
+
+def _both(forms: list[Form], place: Form) -> Form:
+    return Form((Word("and", place.line, place.column), *forms), place.line, place.column)
+
+
+def _conjuncts(form: Form) -> Iterator[Form]:
+    if form.head == "and":
+        for item in form.items[1:]:
+            if isinstance(item, Form):
+                yield from _conjuncts(item)
+    elif form.items:
+        yield form
+
+
+def _plain(form: Form) -> bool:
+    """Return whether an effect makes one atom true or false."""
+    return form.head not in ("when", "forall", "assign", "increase", "decrease", "scale-up", "scale-down")
+
+
+def _atom(form: Form) -> Form:
+    inner = form.items[1] if form.head == "not" and len(form.items) == 2 else form
+    return inner if isinstance(inner, Form) else form
+
+
+def _text(form: Word | Form) -> str:
+    return form.text if isinstance(form, Word) else f"({' '.join(map(_text, form.items))})"
+
+
+def _put(form: Form, duration: Word | Form) -> Form:
+    """Return a form with the duration in place of its name."""
+    return replace(
+        form,
+        items=tuple(
+            _put(item, duration) if isinstance(item, Form) else duration if item.text == DURATION else item
+            for item in form.items
+        ),
+    )
+
+
+def _names(item: Word | Form, text: str) -> bool:
+    return item.text == text if isinstance(item, Word) else any(_names(one, text) for one in item.items)

@@ -1,0 +1,161 @@
+"""What durative actions and timed facts of PDDL become: timings of behaviours, and behaviours that happen at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Protocol
+
+from confab.reasoner.amounts import Expression
+from confab.reasoner.pddl.durative import Durative
+from confab.reasoner.pddl.forms import Effect, NumericEffect, conjuncts, effects_of, numeric_of, words_of
+from confab.reasoner.pddl.syntax import Action, Pddl
+from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    Behavior,
+    Condition,
+    SituationType,
+    Span,
+    Symbol,
+    Times,
+    Timing,
+    ValueCondition,
+    ValueEffect,
+)
+from confab.reasoner.symbols import Effect as AnyEffect
+
+SPANS = {"start": Span.START, "all": Span.THROUGHOUT, "end": Span.END}
+MOMENT, PASSED = "Moment", "passed"
+
+
+class Variables(Protocol):
+    """The variables of a behaviour that aren't its parameters."""
+
+    def condition(
+        self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
+    ) -> Iterator[Condition]:
+        """Yield the conditions whose conjunction a formula is."""
+
+
+class Table(Protocol):
+    """What reads actions: see `confab.reasoner.pddl.importing`."""
+
+    pddl: Pddl
+    level: int
+
+    def name(self, kind: str, pddl_name: str, wanted: str | None = None) -> str:
+        """Return our name for a PDDL name of a kind."""
+
+    def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
+        """Return a conjunction without what always holds, or None if it never holds."""
+
+    def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
+        """Return what a number, a function or a calculation is here."""
+
+    def value_effects(
+        self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
+    ) -> tuple[ValueEffect, ...]:
+        """Return effects of an action that make atoms true or false."""
+
+    def amount_effects(
+        self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
+    ) -> tuple[AmountEffect, ...]:
+        """Return effects of an action on amounts."""
+
+
+def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequence[Condition]) -> Timing:
+    """Return the timing of a durative action.
+
+    Parameters
+    ----------
+    table : Table
+        What reads the action.
+    parts : Durative
+    variables : Variables
+        Those of the behaviour that aren't its parameters.
+    conditions : sequence of Condition
+        What the action asks as a whole.
+    """
+    asked: list[tuple[Span, Condition]] = []
+    made: list[tuple[Span, AnyEffect]] = []
+    for span, form in parts.conditions:
+        found = table.simplified(c for one in conjuncts(form) for c in variables.condition(one))
+        asked += [(SPANS[span], one) for one in found or ()]
+    for span in ("start", "end"):
+        forms = [form for at, form in parts.effects if at == span]
+        values = tuple(effect for form in forms for effect in effects_of(form))
+        numbers = tuple(effect for form in forms for effect in numeric_of(form))
+        own = (*conditions, *(c for at, c in asked if at is not Span.THROUGHOUT))
+        made += [(SPANS[span], one) for one in table.value_effects(values, variables, own)]
+        made += [(SPANS[span], one) for one in table.amount_effects("", numbers, variables, own)]
+    return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(dict.fromkeys(made)))
+
+
+def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
+    """Return a domain in which each durative action is two, for what looks for invariants: its start, and its end.
+
+    A fact is taken away safely if it is asked for where it is taken away: the end may add one in place of a fact that the start
+    took away, unless the start adds one, too.
+    """
+    actions: dict[str, Action] = {}
+    found: dict[str, tuple[Effect, ...]] = {}
+    for name, action in pddl.actions.items():
+        parts = action.durative
+        if parts is None:
+            actions[name], found[name] = action, tuple(effects[name])
+            continue
+        asked = {
+            span: [one for at, form in parts.conditions if at in its for one in conjuncts(form)]
+            for span, its in (("start", ("start",)), ("end", ("all", "end")))
+        }
+        made = {
+            span: [one for at, form in parts.effects if at == span for one in effects_of(form)]
+            for span in ("start", "end")
+        }
+        taken = [e for e in made["start"] if not e.true]
+        kept = [] if any(e.true for e in made["start"]) else taken
+        held = [form for form in asked["start"] if words_of(form) in {e.atom for e in kept}]
+        for span, forms, own in (
+            ("start", asked["start"], made["start"]),
+            ("end", [*asked["end"], *held], [*made["end"], *kept]),
+        ):
+            key = f"{name} {span}"
+            actions[key] = replace(action, name=key, precondition=_all(forms, action.place), durative=None)
+            found[key] = tuple(own)
+    return replace(pddl, actions=actions), found
+
+
+def _all(forms: Sequence[Form], place: Word) -> Form | None:
+    return Form((Word("and", place.line, place.column), *forms), place.line, place.column) if forms else None
+
+
+def happenings(
+    table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
+) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
+    """Return the behaviours that happen at their times one after the other, the goal that all do, and their times."""
+    pddl = table.pddl
+    moments = sorted({time for time, _, _ in pddl.timed})
+    if not moments:
+        return [], {}, None
+    kind = table.name("type", MOMENT, MOMENT)
+    passed = table.name("situation", PASSED, PASSED.upper())
+    names = [table.name("object", f"moment {i}", f"moment_{i}") for i in range(1, len(moments) + 1)]
+    classes[kind] = tuple(names)
+    situations[passed] = SituationType(passed, (kind,), "Truth", default=FALSE, boolean=True)
+    behaviors, times, before = [], dict[str, Fraction](), dict[str, ValueCondition]()
+    for number, (time, name) in enumerate(zip(moments, names, strict=True), start=1):
+        its = tuple(Effect(atom, true) for at, atom, true in pddl.timed if at == time)
+        effects = (*table.value_effects(its, variables, ()), ValueEffect(passed, (name,), TRUE))
+        asked = (*before.values(), ValueCondition(passed, (name,), FALSE))
+        action = table.name("action", f"happening {number}", f"HAPPENING_{number}")
+        spans = tuple((Span.END, effect) for effect in effects)
+        lies = Timing(Fraction(0), (), tuple((Span.START, condition) for condition in asked), spans)
+        behaviors.append(Behavior(action, table.level, (), (), asked, effects, 0.0, timing=lies))
+        times[action] = time
+        before = {passed: ValueCondition(passed, (name,), TRUE)}
+    goal = {Symbol(passed, (name,)): TRUE for name in names[-1:]}
+    return behaviors, goal, Times(events=times)

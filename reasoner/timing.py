@@ -1,0 +1,140 @@
+"""How behaviours lie in time: durations, actors, and the spans of conditions and effects (docs/levels.md, "In time").
+
+A behaviour's own preconditions and effects are its *projection*: what has to hold before it, and what holds after it, if nothing
+else happens meanwhile. Every planner reads these. `Timing` says in addition when each of them is asked or made.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+from confab.reasoner.language import walk
+from confab.reasoner.symbols import (
+    Behavior,
+    Condition,
+    Effect,
+    Problem,
+    Span,
+    Timing,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    made_of,
+)
+
+
+def timing_of(behavior: Behavior) -> Timing:
+    """Return a behaviour's timing; without one, everything is throughout."""
+    if behavior.timing is not None:
+        return behavior.timing
+    conditions = tuple((Span.THROUGHOUT, condition) for condition in behavior.preconditions)
+    return Timing(None, (), conditions, tuple((Span.THROUGHOUT, effect) for effect in behavior.every_effect))
+
+
+def projected(
+    conditions: Sequence[tuple[Span, Condition]], effects: Sequence[tuple[Span, Effect]]
+) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
+    """Return the preconditions and effects of a behaviour that is done without anything else meanwhile.
+
+    A condition that an effect at the start brings about isn't asked before; an effect at the start that a later one replaces
+    isn't seen afterwards.
+    """
+    given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
+    later = {(e.situation, e.arguments) for span, e in effects if span is not Span.START and not e.when and not e.each}
+
+    def brought_about(span: Span, condition: Condition) -> bool:
+        return (
+            span is not Span.START
+            and isinstance(condition, ValueCondition)
+            and not condition.negated
+            and ValueEffect(condition.situation, condition.arguments, condition.value) in given
+        )
+
+    asked = tuple(dict.fromkeys(c for span, c in conditions if not brought_about(span, c)))
+    made = tuple(e for span, e in effects if span is not Span.START or (e.situation, e.arguments) not in later)
+    return asked, tuple(dict.fromkeys(made))
+
+
+def only_during(problem: Problem) -> frozenset[str]:
+    """Return the behaviours with a value that holds only while they last, and that another one, or the goal, can ask for.
+
+    Their plans need concurrency: no sequence of whole steps shows such a value.
+    """
+    found = set[str]()
+    for behavior in problem.domain.behaviors.values():
+        for effect in _passing(behavior):
+            if any(
+                _asks(problem, other, effect)
+                for other in problem.domain.behaviors.values()
+                if other.name != behavior.name and other.level == behavior.level
+            ) or any(s.situation == effect.situation and v == effect.value for s, v in problem.goal.items()):
+                found.add(behavior.name)
+    return frozenset(found)
+
+
+def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
+    """Return the effects at the start of a behaviour whose value its end takes away."""
+    if behavior.timing is None:
+        return ()
+    last = {
+        (e.situation, e.arguments): e.value
+        for span, e in behavior.timing.effects
+        if span is not Span.START and isinstance(e, ValueEffect) and not e.when
+    }
+    return tuple(
+        effect
+        for effect in behavior.timing.made(Span.START)
+        if isinstance(effect, ValueEffect)
+        and last.get((effect.situation, effect.arguments), effect.value) != effect.value
+    )
+
+
+def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
+    """Return whether a condition of a behaviour can hold because a symbol has the value of an effect."""
+    whens = [c for _, made in timing_of(behavior).effects for c in made.when]
+    asked = [c for _, condition in timing_of(behavior).conditions for c in walk(condition)]
+    kinds = dict(behavior.kinds)
+    for one in (*asked, *(c for when in whens for c in walk(when))):
+        if isinstance(one, Witness):
+            kinds[one.variable] = one.kind
+        if not isinstance(one, ValueCondition) or one.situation != effect.situation:
+            continue
+        both = {one.value, effect.value}
+        if any(value.startswith("?") for value in both):
+            members = problem.members(kinds.get(one.value, "")) if one.value.startswith("?") else None
+            if members is None or effect.value.startswith("?") or effect.value in members or one.negated:
+                return True
+        elif (one.value == effect.value) is not one.negated:
+            return True
+    return False
+
+
+def on_each(effects: Sequence[Effect], classes: Mapping[str, Sequence[str]]) -> tuple[Effect, ...]:
+    """Return effects with each one on all individuals of a class replaced by effects on the individuals."""
+    found: list[Effect] = []
+    for effect in effects:
+        every = () if effect.each is None else classes.get(effect.each.kind, ())
+        found += [effect] if effect.each is None else [made_of(effect, one) for one in every]
+    return tuple(found)
+
+
+DAY_TIME = re.compile(
+    r"P(?=.)(?:(?P<days>\d{1,9})D)?(?:T(?=.)(?:(?P<hours>\d{1,9})H)?(?:(?P<minutes>\d{1,9})M)?"
+    r"(?:(?P<seconds>\d{1,9}(?:\.\d{1,12})?)S)?)?"
+)
+"""A non-negative duration as xsd:dayTimeDuration writes it."""
+PARTS = {"days": 86400, "hours": 3600, "minutes": 60, "seconds": 1}
+
+
+def seconds_of(text: str) -> Fraction | None:
+    """Return the seconds of an xsd:dayTimeDuration, or None if the text is none or is negative.
+
+    >>> seconds_of("PT1M2.5S"), seconds_of("P1D"), seconds_of("2 s")
+    (Fraction(125, 2), Fraction(86400, 1), None)
+    """
+    found = DAY_TIME.fullmatch(text)
+    if found is None:
+        return None
+    return sum((Fraction(found[name] or 0) * factor for name, factor in PARTS.items()), Fraction(0))

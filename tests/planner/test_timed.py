@@ -1,0 +1,107 @@
+"""Plans in time: schedules of hands, what random timed worlds say of them, and required concurrency."""
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import pytest
+
+from confab.planner.hierarchical.planner import plan
+from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.solve import Request, solve
+from confab.planner.timed import concurrent
+from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.plan import TimedPlan
+from confab.planner.timed.validation import validate_timed
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.timing import only_during
+from worlds.timed import World, least_makespan, problem_of, rejected, timed_world
+
+
+@cache
+def serving() -> Problem:
+    return read(load("beverage-serving")).problem
+
+
+@cache
+def served() -> TimedPlan:
+    found = plan(serving()).plan
+    assert found is not None
+    timed = in_time(serving(), found).plan
+    assert timed is not None
+    return timed
+
+
+def test_two_hands_share_the_work_in_half_the_time_and_that_is_proved() -> None:
+    assert [served().serial, served().makespan, served().bound] == [Fraction(32), Fraction(16), Fraction(16)]
+    assert [name for name, _ in served().lanes()] == ["left_hand", "right_hand"]
+
+
+def test_every_step_spans_its_refinement() -> None:
+    intervals = served().intervals
+    for step in served().plan.walk():
+        for below in step.steps:
+            assert (
+                intervals[step.path][0]
+                <= intervals[below.path][0]
+                <= intervals[below.path][1]
+                <= intervals[step.path][1]
+            )
+
+
+@pytest.mark.parametrize("number", range(0, 32, 5))
+def test_the_checker_rejects_a_step_that_begins_earlier_than_scheduled(number: int) -> None:
+    slots = list(served().slots)
+    late = [i for i, slot in enumerate(slots) if slot.begin > 0][number % 20]
+    slots[late] = replace(slots[late], begin=slots[late].begin - 1, end=slots[late].end - 1)
+    assert validate_timed(serving(), replace(served(), slots=tuple(slots)))
+
+
+def test_the_checker_rejects_a_wrong_duration() -> None:
+    slots = list(served().slots)
+    slots[-1] = replace(slots[-1], end=slots[-1].end + 1)
+    assert any("takes" in fault.text for fault in validate_timed(serving(), replace(served(), slots=tuple(slots))))
+
+
+def test_a_window_and_a_deadline_are_kept_or_said_to_be_missed() -> None:
+    found, goal = plan(serving()).plan, next(iter(serving().goal))
+    assert found is not None
+    late = replace(serving(), times=Times(windows={"right_hand": ((Fraction(5), None),)}))
+    timed = in_time(late, found).plan
+    assert timed is not None
+    assert min(slot.begin for slot in timed.slots if "right_hand" in slot.actors) >= 5
+    strict = replace(serving(), times=Times(deadlines={Symbol(goal.situation, goal.arguments): Fraction(1)}))
+    told = in_time(strict, found)
+    assert told.plan is None
+    assert told.reason is not None
+    assert "miss a deadline" in told.reason.text
+
+
+def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
+    """Return how a random world is planned: as a sequence, or with steps that overlap by need."""
+    if not only_during(problem):
+        outcome = solve(Request(problem, limits=Limits(seconds=5.0)))
+        if outcome.status is not Status.UNSOLVABLE:
+            return outcome, None if outcome.plan is None else in_time(problem, outcome.plan, 0.2)
+    return concurrent.plan(problem, Limits(seconds=5.0))
+
+
+def wrong(world: World) -> str | None:
+    """Return what is wrong with the plan of a world: it isn't one, or it is shorter than any can be."""
+    outcome, timed = planned(problem_of(world))
+    assert outcome.status is not Status.UNSOLVABLE or only_during(problem_of(world)) == frozenset()
+    if timed is None or timed.plan is None:
+        return None
+    try:
+        least = least_makespan(world)
+    except MemoryError:
+        return rejected(world, timed.plan)
+    if least is None or timed.plan.makespan < least:
+        return f"makespan {timed.plan.makespan}; the least is {least}"
+    return rejected(world, timed.plan)
+
+
+def test_plans_of_random_timed_worlds_are_plans_and_not_shorter_than_the_shortest() -> None:
+    assert {seed: said for seed in range(7_000, 7_120) if (said := wrong(timed_world(seed)))} == {}

@@ -1,0 +1,129 @@
+"""PDDL 2.1: durative actions and timed facts become scenes, whose plans unified-planning's validator accepts."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.planner.plan import Limits
+from confab.planner.solve import Request, solve
+from confab.planner.timed import concurrent
+from confab.planner.timed.call import in_time
+from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.pddl.importing import Imported, imported
+from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.symbols import Span
+from confab.reasoner.timing import only_during
+
+EPSILON = Fraction(1, 1000)
+CELLAR = """(define (domain cellar) (:requirements :typing :durative-actions) (:types match fuse)
+  (:predicates (handfree) (unused ?m - match) (mended ?f - fuse) (light ?m - match))
+  (:durative-action strike :parameters (?m - match) :duration (= ?duration 5)
+    :condition (at start (unused ?m))
+    :effect (and (at start (not (unused ?m))) (at start (light ?m)) (at end (not (light ?m)))))
+  (:durative-action mend :parameters (?f - fuse ?m - match) :duration (= ?duration 2)
+    :condition (and (at start (handfree)) (over all (light ?m)))
+    :effect (and (at start (not (handfree))) (at end (mended ?f)) (at end (handfree)))))"""
+FUSES = """(define (problem fuses) (:domain cellar) (:objects a b - match f g h - fuse)
+  (:init (handfree) (unused a) (unused b)) (:goal (and (mended f) (mended g) (mended h))) (:metric minimize (total-time)))"""
+TRUCK = """(define (domain truck) (:requirements :typing :durative-actions :fluents) (:types place truck)
+  (:predicates (at ?t - truck ?p - place) (road ?p ?q - place) (open ?p - place))
+  (:functions (length ?p ?q - place) (speed ?t - truck))
+  (:durative-action drive :parameters (?t - truck ?p ?q - place) :duration (= ?duration (/ (length ?p ?q) (speed ?t)))
+    :condition (and (at start (at ?t ?p)) (over all (road ?p ?q)) (at end (open ?q)))
+    :effect (and (at start (not (at ?t ?p))) (at end (at ?t ?q)))))"""
+WAY = """(define (problem way) (:domain truck) (:objects t u - truck x y - place)
+  (:init (at t x) (at u x) (road x y) (= (length x y) 12) (= (speed t) 4) (= (speed u) 3) (at 10 (open y)))
+  (:goal (and (at t y) (at u y))))"""
+
+
+def planned(found: Imported) -> TimedPlan:
+    problem = found.problem
+    if only_during(problem):
+        timed = concurrent.plan(problem, Limits(seconds=20.0), EPSILON)[1]
+    else:
+        plan = solve(Request(problem, limits=Limits(seconds=20.0))).plan
+        assert plan is not None
+        timed = in_time(problem, plan, 1.0, EPSILON)
+    assert timed.plan is not None, timed.reason
+    return timed.plan
+
+
+def accepted(domain: str, problem: str, found: Imported, timed: TimedPlan) -> bool:
+    """Return whether unified-planning's validator accepts a plan in time."""
+    pytest.importorskip("unified_planning")
+    from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
+    from unified_planning.io import PDDLReader
+    from unified_planning.shortcuts import get_environment
+
+    get_environment().credits_stream = None
+    read = PDDLReader().parse_problem_string(domain, problem)
+    lines = []
+    for slot in timed.slots:
+        line = found.line(slot.step.behavior, slot.step.arguments)
+        if slot.step.behavior not in (found.problem.times.events if found.problem.times else {}):
+            lines.append(f"{float(slot.begin):.6f}: ({line}) [{float(slot.end - slot.begin):.6f}]")
+    plan = PDDLReader().parse_plan_string(read, "\n".join(lines))
+    return bool(TimeTriggeredPlanValidator().validate(read, plan))
+
+
+def test_fuses_are_mended_while_a_match_burns() -> None:
+    found = imported(parse(CELLAR, FUSES))
+    timed = planned(found)
+    assert only_during(found.problem) == {"STRIKE"}
+    assert 6 < timed.makespan < 7  # three fuses, one hand
+    assert accepted(CELLAR, FUSES, found, timed)
+
+
+def test_a_duration_is_worked_out_and_a_fact_begins_to_hold_in_time() -> None:
+    found = imported(parse(TRUCK, WAY))
+    timed = planned(found)
+    seconds = {slot.step.arguments[0]: slot.end - slot.begin for slot in timed.slots if slot.step.behavior == "DRIVE"}
+    assert seconds == {"t": Fraction(3), "u": Fraction(4)}
+    assert min(slot.end for slot in timed.slots if slot.step.behavior == "DRIVE") > 10
+
+
+@pytest.mark.parametrize(("domain", "problem"), [(CELLAR, FUSES), (TRUCK, WAY)])
+def test_a_scene_file_says_everything_of_time_that_the_domain_says(domain: str, problem: str, tmp_path: Path) -> None:
+    found = imported(parse(domain, problem)).problem
+    path = tmp_path / "scene.ttl"
+    path.write_text(turtle(found, "title", "description"), encoding="utf-8")
+    read = confab.load(str(path)).problem
+    assert read.times == found.times
+    for name, behavior in found.domain.behaviors.items():
+        again = read.domain.behaviors[name]
+        assert set(again.preconditions) == set(behavior.preconditions)
+        assert set(again.effects) == set(behavior.effects)
+        assert behavior.timing is not None
+        assert again.timing is not None
+        assert again.timing.duration == behavior.timing.duration
+        assert set(again.timing.effects) == set(behavior.timing.effects)
+        for span in (Span.START, Span.END):
+            assert set(again.timing.asked(span)) == set(behavior.timing.asked(span))
+
+
+def test_a_scene_with_time_is_planned_with_its_schedule(tmp_path: Path) -> None:
+    path = tmp_path / "scene.ttl"
+    path.write_text(turtle(imported(parse(CELLAR, FUSES)).problem, "title", "description"), encoding="utf-8")
+    result = confab.load(str(path)).plan(time_limit=20)
+    assert result.timed is not None
+    assert result.json()["schedule"]["makespan"] == float(result.timed.makespan)
+    assert "makespan" in repr(result)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (":condition (unused ?m) :effect (at end (light ?m))", "wanted .at start"),
+        (":condition (at start (unused ?m)) :effect (over all (light ?m))", "an effect is .at start"),
+        (":effect (at end (when (at start (unused ?m)) (light ?m)))", "undefined predicate|takes"),
+        (":effect (when (at start (unused ?m)) (at end (light ?m)))", "at another time than the effect"),
+    ],
+)
+def test_what_has_no_time_or_another_one_is_refused_with_its_place(text: str, said: str) -> None:
+    head = CELLAR[: CELLAR.index("(:durative-action strike")]
+    domain = f"{head}\n(:durative-action strike :parameters (?m - match) :duration (= ?duration 5) {text}))"
+    with pytest.raises(PddlError, match=rf"domain:4:\d+: .*({said})"):
+        parse(domain, FUSES)

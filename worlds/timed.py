@@ -1,0 +1,267 @@
+"""Random timed worlds, and their least makespan by an exhaustive search over schedules.
+
+A world is a table of actions on a few facts: when each asks for what, when it changes what, how long it takes and which actor it
+keeps busy. The search knows neither behaviours nor plans: it tries at each whole second every action that can begin, in any order.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import permutations
+from random import Random
+
+from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Behavior,
+    Domain,
+    Problem,
+    SituationType,
+    Span,
+    Symbol,
+    Timing,
+    ValueCondition,
+    ValueEffect,
+)
+from confab.reasoner.timing import projected
+
+MOST_STATES = 20_000
+"""Maximum number of states of an exhaustive search; larger worlds are drawn anew."""
+SPANS = {"start": Span.START, "throughout": Span.THROUGHOUT, "end": Span.END}
+
+Literal = tuple[int, bool]
+
+
+@dataclass(frozen=True)
+class Action:
+    """What an action asks and does: facts with their values, at its start, throughout and at its end."""
+
+    seconds: int
+    actor: int | None
+    asks: tuple[tuple[str, Literal], ...]
+    makes: tuple[tuple[str, Literal], ...]
+
+    def at(self, span: str, of: str = "asks") -> list[Literal]:
+        """Return what is asked or made in a span."""
+        return [literal for at, literal in getattr(self, of) if at == span]
+
+
+@dataclass(frozen=True)
+class World:
+    """Actions, the facts that hold at first, and those that are wanted."""
+
+    facts: int
+    actions: tuple[Action, ...]
+    initial: frozenset[int]
+    goal: tuple[Literal, ...]
+
+
+Running = tuple[int, int]
+"""An action and the seconds until its end."""
+State = tuple[frozenset[int], frozenset[Running]]
+
+
+def timed_world(seed: int) -> World:
+    """Return a random world; the same for the same seed."""
+    rng = Random(seed)
+    while True:
+        world = _drawn(rng)
+        if not all((fact in world.initial) is value for fact, value in world.goal):
+            return world
+
+
+def _drawn(rng: Random) -> World:
+    facts = rng.randint(3, 5)
+
+    def literals(most: int, spans: tuple[str, ...]) -> tuple[tuple[str, Literal], ...]:
+        chosen = rng.sample(range(facts), min(rng.randint(0, most), facts))
+        return tuple((rng.choice(spans), (fact, rng.random() < 0.6)) for fact in chosen)
+
+    actions = []
+    for _ in range(rng.randint(2, 4)):
+        makes = list(literals(2, ("throughout", "end", "end", "start")))
+        if not makes:
+            makes = [("end", (rng.randrange(facts), True))]
+        if rng.random() < 0.4:  # a value that holds only during the action
+            fact = rng.randrange(facts)
+            makes = [one for one in makes if one[1][0] != fact]
+            makes += [("start", (fact, True)), ("end", (fact, False))]
+        taken = {literal for _, literal in makes}
+        asks = [
+            one
+            for one in literals(3, ("start", "throughout", "throughout", "end"))
+            if one[0] == "start" or not any(one[1][0] == fact for fact, _ in taken)
+        ]
+        actor = rng.choice((None, 0, 0, 1))
+        actions.append(Action(rng.randint(1, 4), actor, tuple(asks), tuple(makes)))
+    initial = frozenset(fact for fact in range(facts) if rng.random() < 0.3)
+    goal = tuple((fact, rng.random() < 0.8) for fact in rng.sample(range(facts), rng.randint(1, 2)))
+    return World(facts, tuple(actions), initial, goal)
+
+
+def least_makespan(world: World) -> int | None:
+    """Return the least makespan of any plan; None if there is no plan.
+
+    Raises
+    ------
+    MemoryError
+        The world has too many states.
+    """
+    start: State = world.initial, frozenset()
+    seen: set[State] = set()
+    queue: list[tuple[int, int, State]] = [(0, 0, start)]
+    number = 0
+    while queue:
+        time, _, state = heapq.heappop(queue)
+        if state in seen:
+            continue
+        seen.add(state)
+        if len(seen) > MOST_STATES:
+            raise MemoryError
+        facts, running = state
+        if not running and all((fact in facts) is value for fact, value in world.goal):
+            return time
+        for seconds, after in _next(world, state):
+            if after not in seen:
+                number += 1
+                heapq.heappush(queue, (time + seconds, number, after))
+    return None
+
+
+def _next(world: World, state: State) -> Iterator[tuple[int, State]]:
+    """Yield each state that may follow, with the seconds until then: an action begins, or a second passes."""
+    facts, running = state
+    for number in range(len(world.actions)):
+        after = _begun(world, facts, running, number)
+        if after is not None:
+            yield 0, after
+    if running:
+        for order in permutations(sorted(number for number, left in running if left == 1)):
+            passed = _passed(world, facts, running, order)
+            if passed is not None:
+                yield 1, passed
+
+
+def _begun(world: World, facts: frozenset[int], running: frozenset[Running], number: int) -> State | None:
+    action = world.actions[number]
+    if any(other == number for other, _ in running):
+        return None
+    if action.actor is not None and any(world.actions[other].actor == action.actor for other, _ in running):
+        return None
+    asked = action.at("start")
+    begun = action.at("start", "makes")
+    held = action.at("throughout")
+    if _taken(world, running, [*asked, *begun, *held, *action.at("throughout", "makes")]):
+        return None
+    if not _hold(facts, asked):
+        return None
+    after = _made(facts, begun)
+    if not _hold(after, held) or not _kept(world, after, running):
+        return None
+    return after, running | {(number, action.seconds)}
+
+
+def _passed(world: World, facts: frozenset[int], running: frozenset[Running], order: tuple[int, ...]) -> State | None:
+    """Return the state a second later, where actions end one after the other; None if one can't."""
+    left = frozenset((number, seconds - 1) for number, seconds in running)
+    for number in order:
+        action = world.actions[number]
+        left = frozenset(one for one in left if one[0] != number)
+        facts = _made(facts, action.at("throughout", "makes"))
+        asked, made = action.at("end"), action.at("end", "makes")
+        if _taken(world, left, [*asked, *made]) or not _hold(facts, asked):
+            return None
+        facts = _made(facts, made)
+        if not _kept(world, facts, left):
+            return None
+    return facts, left
+
+
+def _taken(world: World, running: frozenset[Running], literals: list[Literal]) -> bool:
+    """Return whether a fact is in the making in what runs."""
+    making = {fact for number, _ in running for fact, _ in world.actions[number].at("throughout", "makes")}
+    return any(fact in making for fact, _ in literals)
+
+
+def _kept(world: World, facts: frozenset[int], running: frozenset[Running]) -> bool:
+    """Return whether what runs still has what it asks for throughout."""
+    return all(_hold(facts, world.actions[number].at("throughout")) for number, _ in running)
+
+
+def _hold(facts: frozenset[int], literals: list[Literal]) -> bool:
+    return all((fact in facts) is value for fact, value in literals)
+
+
+def _made(facts: frozenset[int], literals: list[Literal]) -> frozenset[int]:
+    false = {fact for fact, value in literals if not value}
+    true = {fact for fact, value in literals if value}
+    return (facts - false) | true
+
+
+def problem_of(world: World) -> Problem:
+    """Return a world as a planning problem: facts of one thing, one behaviour for each action, which names its actor."""
+    situations = {f"F{i}": SituationType(f"F{i}", ("Thing",), "Truth", boolean=True) for i in range(world.facts)}
+    behaviors = {}
+    for number, action in enumerate(world.actions):
+        asked = tuple(
+            (SPANS[span], ValueCondition(f"F{fact}", ("it",), TRUE if value else FALSE))
+            for span, (fact, value) in action.asks
+        )
+        made = tuple(
+            (SPANS[span], ValueEffect(f"F{fact}", ("it",), TRUE if value else FALSE))
+            for span, (fact, value) in action.makes
+        )
+        conditions, effects = projected(asked, made)
+        actors = () if action.actor is None else (f"actor{action.actor}",)
+        behaviors[f"A{number}"] = Behavior(
+            f"A{number}",
+            1,
+            (),
+            (),
+            conditions,
+            tuple(e for e in effects if isinstance(e, ValueEffect)),
+            timing=Timing(Fraction(action.seconds), actors, asked, made),
+        )
+    classes = {"Thing": ("it",), "Actor0": ("actor0",), "Actor1": ("actor1",)}
+    initial = {Symbol(f"F{fact}", ("it",)): TRUE for fact in sorted(world.initial)}
+    goal = {Symbol(f"F{fact}", ("it",)): TRUE if value else FALSE for fact, value in sorted(world.goal)}
+    return Problem("urn:timed", Domain(situations, behaviors), classes, {}, initial, goal)
+
+
+def rejected(world: World, timed: TimedPlan) -> str | None:
+    """Return what is wrong with a plan in time as this world sees it, which shares no code with any checker; None if nothing is."""
+    if any(slot.begin.denominator != 1 for slot in timed.slots):
+        return "a step begins between two seconds"
+    facts, running = world.initial, frozenset[Running]()
+    begins: dict[int, list[int]] = {}
+    for slot in timed.slots:
+        begins.setdefault(int(slot.begin), []).append(int(slot.step.behavior[1:]))
+    states: set[State] = {(facts, running)}
+    for second in range(int(timed.makespan) + 1):
+        if second:
+            states = {
+                after
+                for facts, running in states
+                for order in permutations(sorted(number for number, left in running if left == 1))
+                if (after := _passed(world, facts, running, order)) is not None
+            }
+        ways = list(permutations(begins.get(second, [])))
+        states = {end for state in states for way in ways if (end := _all_begun(world, state, way)) is not None}
+        if not states:
+            return f"what begins or ends at {second} s can't"
+    if not any(not running and _hold(facts, list(world.goal)) for facts, running in states):
+        return "the goal isn't reached"
+    return None
+
+
+def _all_begun(world: World, state: State, numbers: tuple[int, ...]) -> State | None:
+    for number in numbers:
+        after = _begun(world, *state, number)
+        if after is None:
+            return None
+        state = after
+    return state
