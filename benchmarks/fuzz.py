@@ -316,7 +316,7 @@ def _import_all() -> None:
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
         "confab.planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
-        "confab.reasoner": "validation.validate graph.apart reading.affordance",
+        "confab.reasoner": "validation.validate graph.query_process reading.affordance",
     }
     for name in (
         *(f"{room}.{part}" for room, parts in rooms.items() for part in parts.split()),

@@ -54,7 +54,7 @@ from confab.reasoner.symbols import Domain, Problem
 from worlds.families import family as packed
 from worlds.families import random_table
 from worlds.lessons import problem as lesson
-from worlds.truth import TooManyError, World
+from worlds.truth import StateSpace, TooManyError
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SEED, TABLES = 100, int(os.environ.get("CONFAB_SEEDS", "3_000_000"))
@@ -320,7 +320,7 @@ def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
         pairs = frozenset(p for p in sorted(problem.relations["canReach"]) if rng.random() > 0.18 * (seed % 3))
         problem = replace(problem, relations={"canReach": pairs})
     try:
-        truth = World(problem).explore(10**6)
+        truth = StateSpace(problem).explore(10**6)
     except TooManyError:
         return None
     if truth.states < 1000 or truth.shortest == 0:

@@ -36,7 +36,7 @@ Goals = Annotated[
     list[str], Field(description="Goals that replace those of the scene's task, each like 'cup2 LOCATION location8'")
 ]
 Facts = Annotated[
-    list[str], Field(description="What is so now in place of what the scene says, each like 'cup1 LOCATION location7'")
+    list[str], Field(description="Facts that replace facts of the scene, each like 'cup1 LOCATION location7'")
 ]
 Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=MOST_SECONDS)]
 

@@ -95,7 +95,7 @@ def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mo
 
 def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
     """Return the rows of a query, tab-separated, below the names of its columns."""
-    from confab.reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.query_process import QueryLimits
 
     if "{" not in sparql:
         raise KnowledgeError("wanted a SPARQL query as text, e.g. SELECT ?o ?l WHERE { ?o k:location ?l }")

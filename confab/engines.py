@@ -125,7 +125,7 @@ def unified(domain: str, problem: str) -> unified_planning.model.Problem:
         raise KnowledgeError("this needs unified-planning: pip install unified-planning") from None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # its own use of what pyparsing calls outdated
+            warnings.simplefilter("ignore")  # it uses outdated names of pyparsing
             return PDDLReader().parse_problem_string(domain, problem)
     except Exception as error:  # of many kinds, for what it doesn't know
         raise KnowledgeError(f"unified-planning can't read this level: {error}") from error

@@ -334,7 +334,7 @@ class Execution:
         return text + (f"; never came: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
-        """Return the partial order of what was done: an edge from each primitive to those that need it done before."""
+        """Return the partial order of the executed primitives: an edge from each to those that depend on it."""
         from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
@@ -502,7 +502,7 @@ def execute(
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
-        In PyBullet: carry the plan out with all hands at once; what isn't done then, one hand after the other. Nobody interferes.
+        In PyBullet: execute the plan with all hands at once, and the rest one hand after the other, without interventions.
 
     Raises
     ------

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     import rdflib
 
     from confab.reasoner.embodiment.values import Embodiment
-    from confab.reasoner.graph.apart import QueryLimits
     from confab.reasoner.graph.mirror import Mirror
+    from confab.reasoner.graph.query_process import QueryLimits
 
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
@@ -260,8 +260,8 @@ class Known:
 
         The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
 
-        Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
-        no such name. It is answered in a process of its own: see `confab.reasoner.graph.apart`.
+        Prefixes are those of the scene's file, then those of its imports. ``:name`` is the core's if the scene's own namespace
+        has no such name. The query is answered in a process of its own: see `confab.reasoner.graph.query_process`.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class Known:
         >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
         False
         """
-        from confab.reasoner.graph.apart import ask, unheard_of
+        from confab.reasoner.graph.query_process import ask, unheard_of
 
         sparql = sparql_of(sparql)
         kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
@@ -307,7 +307,7 @@ class Known:
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
         """Return the graph for a query; missing imports are reported once."""
         from confab.following import write_following
-        from confab.reasoner.graph.apart import QueryLimits
+        from confab.reasoner.graph.query_process import QueryLimits
         from confab.reasoner.reading.affordance import SITUATION, write_situation
 
         self.settle()
@@ -354,7 +354,7 @@ class Known:
 
         `query` answers it on the initial situation.
         """
-        from confab.reasoner.graph.apart import standing_alone
+        from confab.reasoner.graph.query_process import standing_alone
         from confab.reasoner.reading.affordance import applicable_query
         from confab.reasoner.reading.quantification import behavior_named
 
@@ -380,7 +380,7 @@ class Known:
 
     def quantifying_query(self, behavior: str) -> str:
         """Return the SPARQL query that quantifies a behaviour: a row for each assignment of individuals to its parameters."""
-        from confab.reasoner.graph.apart import standing_alone
+        from confab.reasoner.graph.query_process import standing_alone
         from confab.reasoner.reading.quantification import behavior_named, query_for
 
         return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))

@@ -30,7 +30,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
     what : str
         What is being done.
     total : int, optional
-        How much there is to do; if nobody knows, the bar shows the time alone.
+        The amount of work; if unknown, the bar shows only the time.
     """
     begin = perf_counter()
     if quiet() or not sys.stderr.isatty() or log.isEnabledFor(logging.DEBUG):

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from confab.physics import Report
     from confab.planner.acting.executive import Moment
     from confab.planner.acting.world import World
-    from confab.reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.query_process import QueryLimits
     from confab.why import Account
 
 

@@ -7,10 +7,9 @@
                 newer); POST of what was turned, answered with the plan that follows
 ==============  ==========================================================================================================
 
-uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.apart`), in lanes: the first one
-is for
-short queries, and a query that takes longer than a lane allows starts again in the next one, with lower priority, so that short
-queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are refused.
+uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.query_process`), in lanes. The
+first lane is for short queries; a query that exceeds the time of a lane starts again in the next one, with lower priority, so that
+short queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are refused.
 """
 
 from __future__ import annotations
@@ -48,8 +47,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from confab.page.frozen import page_html
 from confab.page.live import Following
 from confab.page.sheet import Sheet, turned_from
-from confab.reasoner.graph.apart import QueryLimits, QueryWorker
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.query_process import QueryLimits, QueryWorker
 from confab.reasoner.limits import LimitError
 from confab.table import Table
 

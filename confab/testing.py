@@ -1,6 +1,6 @@
 """Conformance test of a world in which the executive shall act: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
 
-Each check says what was found, with numbers. The primitives of a plan are executed for real: let nobody stand beside the robot.
+Each check reports its finding with numbers. The primitives of a plan are really executed: keep people away from the robot.
 """
 
 from __future__ import annotations

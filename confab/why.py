@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from confab.labels import Labels
 from confab.page.markup import Markup, styled, tag
-from confab.planner.causal_links import Change, Kind, Need, Purpose
+from confab.planner.causal_links import FactChange, Kind, Need, Purpose
 from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Status, Step
@@ -360,7 +360,7 @@ def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labe
     return f"{by} requires that {asks}; {_instead(need.gives, labels)}"
 
 
-def _instead(changes: Sequence[Change], labels: Labels) -> str:
+def _instead(changes: Sequence[FactChange], labels: Labels) -> str:
     return "before this step, " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
 
 

@@ -36,7 +36,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True)
-class Change:
+class FactChange:
     """A fact that a step makes true, with the symbol's previous value."""
 
     fact: Fact
@@ -53,7 +53,7 @@ class Need:
     """
 
     kind: Kind
-    gives: tuple[Change, ...]
+    gives: tuple[FactChange, ...]
     by: Path = ()
     conditions: tuple[Condition, ...] = ()
 
@@ -65,7 +65,7 @@ class Purpose:
     Without a need, the goal is reached without it.
     """
 
-    gives: tuple[Change, ...]
+    gives: tuple[FactChange, ...]
     needs: tuple[Need, ...]
 
 
@@ -78,7 +78,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
     plan : Plan
         One that `confab.planner.validation.validate` finds nothing wrong with.
     """
-    gives: dict[Path, tuple[Change, ...]] = {}
+    gives: dict[Path, tuple[FactChange, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
     for level in sorted({step.level for step in plan.walk()}):
         course = _Course(problem, plan, level)
@@ -144,14 +144,14 @@ class _Course:
         self.facts = _Noting(problem, problem.initial)
         self.written: dict[Cell, _Written] = {}
         self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have, or had before, a value
-        self.gives: dict[Path, tuple[Change, ...]] = {}
+        self.gives: dict[Path, tuple[FactChange, ...]] = {}
         self.groups = {step.path: step for step in plan.walk() if step.steps and _least(step.steps) == level}
         self.whole = plan.steps if _least(plan.steps) == level else ()
 
     def links(self) -> Iterator[tuple[Path, Need]]:
         """Yield each step that is needed, with the need."""
         found: list[tuple[Path, Need]] = []
-        deeds: list[tuple[int, int, tuple[Change, ...], frozenset[Cell]]] = []
+        deeds: list[tuple[int, int, tuple[FactChange, ...], frozenset[Cell]]] = []
         open_: dict[Path, tuple[int, int, dict[Cell, str]]] = {}
         for number, step in enumerate(self.steps):
             check("explaining the plan")
@@ -185,18 +185,18 @@ class _Course:
         found = self.rules.changes(behavior, step.arguments, self.facts)
         return None if found is None else {(situation, key): value for situation, key, value in found}
 
-    def asked(self, step: Step) -> Iterator[tuple[int, tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]]]:
-        """Yield the givers of what a step needs, with the conditions that fail without them or the cells that would differ."""
+    def asked(self, step: Step) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
+        """Yield the givers of a step's needs, with the conditions that fail without them or the cells that would differ."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
         read = dict.fromkeys(cell for cell in facts.cells if cell in self.written)
         for wanted in facts.of_value:
             read.update(self.having.get(wanted, {}))
-        given: list[Change] = []
+        given: list[FactChange] = []
         for cell, value in before.items():
             if (old := facts.value(*cell)) is not None and old != value:
-                given.append(Change(Fact(Symbol(*cell), value), old))
+                given.append(FactChange(Fact(Symbol(*cell), value), old))
         self.gives[step.path] = tuple(given)
         terms = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
         bound = self.rules.satisfied(behavior.preconditions, terms, behavior.kinds, facts) or terms
@@ -212,7 +212,7 @@ class _Course:
 
     def without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
-    ) -> tuple[tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]] | None:
+    ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
         """Return what fails for a step if cells have their previous values; None if nothing does."""
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
@@ -228,7 +228,9 @@ class _Course:
         for cell, value in now.items():
             facts.put(*cell, value)
         del facts.log[mark:]
-        changes = tuple(Change(Fact(Symbol(*cell), value), self.written[cell].before) for cell, value in now.items())
+        changes = tuple(
+            FactChange(Fact(Symbol(*cell), value), self.written[cell].before) for cell, value in now.items()
+        )
         if after is None:
             return changes, tuple(broken), frozenset()
         differs = frozenset(
@@ -285,7 +287,7 @@ class _Course:
                 why = Kind.REST
             else:
                 continue
-            yield self.steps[written.by].path, Need(why, (Change(Fact(symbol, value), written.before),), path)
+            yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
 
     def followed(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the givers of the facts from which a defined goal follows.
@@ -311,7 +313,7 @@ class _Course:
             for changes in alone:
                 yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
 
-    def otherwise(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[Change, ...]:
+    def otherwise(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
         """Return the changes of some cells if a defined situation would differ without them; otherwise nothing."""
         facts, mark = self.facts, len(self.facts.log)
         now = {other: str(facts.value(*other)) for other in cells}
@@ -321,7 +323,7 @@ class _Course:
         for other, had in now.items():
             facts.put(*other, had)
         del facts.log[mark:]
-        return tuple(Change(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
+        return tuple(FactChange(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
 
     def fact_of(self, number: int, cell: Cell) -> Fact | None:
         """Return the fact that a step gives to a cell."""

@@ -89,7 +89,7 @@ class Decisions(Generic[T]):
 
 
 @dataclass
-class View:
+class CaseView:
     """Knowledge about one case; `reads` lists the entries that were read, `unknown` the symbols without an entry."""
 
     claims: Claims
@@ -299,7 +299,7 @@ class Cases:
 
     def tries(self) -> Iterator[Try]:
         """Yield the behaviours, with individuals, that may change a distinguished value or violate a claim."""
-        known = Reading(self.lowest, View(self.claims, (ANY,) * len(self.claims.symbols)))
+        known = Reading(self.lowest, CaseView(self.claims, (ANY,) * len(self.claims.symbols)))
         seen: set[tuple[str, tuple[tuple[str, str], ...]]] = set()
         wanted: dict[str, dict[tuple[Symbol, str | None], None]] = {}
         for symbol in (*self.claims.symbols, *sorted(self.certificate.always)):
@@ -328,7 +328,7 @@ class Cases:
         """Return the result of a behaviour in a case; stored by the entries on which it depends."""
         known = one.known.find(case)
         if known is None:
-            view = View(self.claims, case)
+            view = CaseView(self.claims, case)
             known = self.effects(Reading(self.lowest, view), one)
             one.known.learn(case, view.reads, known)
         return known
@@ -390,7 +390,7 @@ class Cases:
         """Whether the goal and the rest values hold in some state of a case."""
         known = self._ends.find(case)
         if known is None:
-            view = View(self.claims, case)
+            view = CaseView(self.claims, case)
             reading = Reading(self.lowest, view)
             known = all(self.met(reading, fact) for fact in self.certificate.unmet)
             self._ends.learn(case, view.reads, known)

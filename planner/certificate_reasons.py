@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from confab.planner.certificate_checks import Claims, View, own_variables, unified
+from confab.planner.certificate_checks import CaseView, Claims, own_variables, unified
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Reason
 from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
@@ -107,7 +107,7 @@ def _words(fact: Fact) -> tuple[str, ...]:
 
 
 class _Causes:
-    """The causes of what a certificate of facts claims."""
+    """The causes of the claims of a certificate of facts."""
 
     def __init__(self, problem: Problem, certificate: Certificate) -> None:
         self.problem, self.certificate = problem, certificate
@@ -380,7 +380,7 @@ def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...
 
 
 @dataclass
-class _Noting(View):
+class _Noting(CaseView):
     """A view of a case that records the claims by which it denied a fact."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)

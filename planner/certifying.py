@@ -26,8 +26,8 @@ from confab.planner.certificate_checks import (
     ANY,
     Case,
     Cases,
+    CaseView,
     Try,
-    View,
     own_variables,
     unified,
     wanted_in_the_end,
@@ -393,7 +393,9 @@ def _counted(lowest: Lowest, certificate: Certificate) -> Certificate | None:
 def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
     """Return a few facts of which at least one is unmet in each case."""
     failing = {
-        fact: {case for case in cases.came_from if not cases.met(Reading(cases.lowest, View(cases.claims, case)), fact)}
+        fact: {
+            case for case in cases.came_from if not cases.met(Reading(cases.lowest, CaseView(cases.claims, case)), fact)
+        }
         for fact in unmet
     }
     found: list[Fact] = []
@@ -419,7 +421,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
         end = before
     facts, rules = Facts(problem, problem.initial), Rules(problem)
     for before, one, after in reversed(path):
-        view = View(cases.claims, before, unknown=[])
+        view = CaseView(cases.claims, before, unknown=[])
         cases.effects(Reading(lowest, view), one)
         arguments = tuple(one.env[p.name] for p in one.behavior.parameters)
         changes = rules.changes(one.behavior, arguments, facts)
@@ -433,7 +435,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
     rests = [] if open_ else _restless(problem, lowest.level, facts)
     for fact in open_ or rests:
         if fact in cases.certificate.unmet:
-            view = View(cases.claims, path[0][2] if path else end, unknown=[])
+            view = CaseView(cases.claims, path[0][2] if path else end, unknown=[])
             cases.met(Reading(lowest, view), fact)
             if wrong := _wrong(view, facts):
                 return _told_apart(cases, relaxed, wrong)
@@ -443,7 +445,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
     return None
 
 
-def _wrong(view: View, facts: Facts) -> list[tuple[Symbol, str, bool]]:
+def _wrong(view: CaseView, facts: Facts) -> list[tuple[Symbol, str, bool]]:
     """Return the facts that a case assumes and the actual state doesn't have."""
     found = []
     for symbol, value, has in view.unknown or ():

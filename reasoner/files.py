@@ -151,7 +151,7 @@ def alone(path: Path) -> Iterator[None]:
     OSError
         There is no such folder, and it can't be made.
     LimitError
-        Somebody else has kept the folder locked for `PATIENCE` seconds.
+        Another process has kept the folder locked for `PATIENCE` seconds.
     """
     folder = _behind(path).parent
     folder.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,7 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """Return the deadline in so many seconds; None means no deadline."""
+        """Return the deadline after some seconds; None means no deadline."""
         return cls() if seconds is None else cls(perf_counter() + seconds, seconds)
 
     @property

@@ -16,7 +16,7 @@ from confab.reasoner.amounts import DECIMAL, Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
-"""Perceivers of an object's place, of what a hand holds, and of a hand's position."""
+"""Perceivers of an object's place, of the object in a hand, and of a hand's position."""
 
 
 class ImpossibleStateError(ValueError):

@@ -71,7 +71,7 @@ def tie(end: int) -> None:
 
 
 def limit_cpu(seconds: float) -> None:
-    """Allow this process so many more seconds of CPU time."""
+    """Extend the CPU limit of this process by some seconds."""
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     soft = int(used + min(seconds, MOST_SECONDS)) + 1

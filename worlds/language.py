@@ -65,7 +65,7 @@ RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 
 
-class Writer:
+class BehaviorWriter:
     """Writes one random behaviour."""
 
     def __init__(self, rng: Random, defined: Sequence[str] = (), positive: Sequence[str] = ()) -> None:
@@ -209,12 +209,13 @@ def language(seed: int, behaviors: int = 2, defined: bool = False) -> Problem:
     """Return a problem of one level with random behaviours, a random state and no goal; on request with random rules."""
     rng = Random(seed)
     names = tuple(DEFINED) if defined else ()
-    made = [Writer(rng, names).behavior(f"B{i}") for i in range(behaviors)]
+    made = [BehaviorWriter(rng, names).behavior(f"B{i}") for i in range(behaviors)]
     rules = {}
     for name in names:
         both = names[:2] if name in names[:2] else names
         rules[name] = tuple(
-            Writer(rng, both, both[:2] if name in names[:2] else (name,)).rule(name) for _ in range(rng.randint(1, 3))
+            BehaviorWriter(rng, both, both[:2] if name in names[:2] else (name,)).rule(name)
+            for _ in range(rng.randint(1, 3))
         )
     relations = {
         name: frozenset(row for row in product(*(CLASSES[kind] for kind in kinds)) if rng.random() < 0.5)

@@ -69,7 +69,7 @@ class Node:
     after: dict[int, Any] = field(default_factory=dict)
 
 
-class World:
+class StateSpace:
     """The lowest level of a problem, as states in 63 bits."""
 
     def __init__(self, problem: Problem) -> None:

@@ -44,7 +44,7 @@ def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
     """Serve a scene as a page and a SPARQL endpoint, until Ctrl-C."""
     from threading import Event
 
-    from confab.reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.query_process import QueryLimits
     from confab.serving import serving
 
     with serving(load_scene(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
@@ -122,7 +122,7 @@ def query(
     as_json: bool,
 ) -> None:
     """Ask a scene in SPARQL, or what its objects afford."""
-    from confab.reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.query_process import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
     if sparql == "-":

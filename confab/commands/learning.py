@@ -135,7 +135,7 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 
 @memory_app.command(epilog=examples("memory show"))
 @click.argument("memory", metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
-@click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="So many rows.")
+@click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="Maximum number of rows.")
 @AS_JSON
 def show(memory: str, most: int, as_json: bool) -> None:
     """Show what a memory advises: rules by kind of goal, orders of goals and methods."""

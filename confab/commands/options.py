@@ -161,7 +161,7 @@ GOALS = click.option(
 MEMORY_FILE = click.option(
     "--memory", type=PATH, metavar="FILE", help="The only place where memory is read or written."
 )
-NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan without memory, in so many words.")
+NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan explicitly without memory.")
 MODE = click.option(
     "--mode",
     default="guarded",

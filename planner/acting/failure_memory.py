@@ -53,7 +53,7 @@ class Caution:
         return Caution(counts)
 
     def __add__(self, other: Caution) -> Caution:
-        """Return the sum of what two robots have seen."""
+        """Return the sum of the counts of two robots."""
         facts = sorted({*self.counts, *other.counts})
         pairs = {fact: (self.counts.get(fact, (0, 0)), other.counts.get(fact, (0, 0))) for fact in facts}
         return Caution({fact: (a[0] + b[0], a[1] + b[1]) for fact, (a, b) in pairs.items()})
@@ -91,7 +91,7 @@ def refuted_by(
         Where everything was that took part; none, if nothing can be said. A level above is refuted only if it sees them all.
     why : str
     likewise : sequence of Refutation
-        Primitives that are refuted for the same reason, whoever does them. What is above them is refuted where nothing else does
+        Primitives that are refuted for the same reason, for any hand. What is above them is refuted where nothing else does
         what it does. Where they say all that is refuted, and more, the rest is left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()

@@ -221,7 +221,7 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 
 
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
-    """Do the open steps of what is in progress, up to a situation of rest, and take them from `pending`.
+    """Do the open steps of the step in progress, up to a situation of rest, and remove them from `pending`.
 
     If they don't lead to one, or to what isn't wanted any more, nothing is done, and the first of them is given up.
     """

@@ -17,7 +17,7 @@ from confab.planner.validation import successor
 from confab.reasoner.symbols import Problem, State, Symbol
 
 Order: TypeAlias = "networkx.DiGraph[int]"
-Apart = Callable[[Step, Step], bool]
+Compatible = Callable[[Step, Step], bool]
 """Function of two primitives: whether there is enough room to execute both at the same time."""
 
 
@@ -76,7 +76,7 @@ def schedule(
     problem: Problem,
     primitives: Sequence[Step],
     seconds_of: Mapping[int, float] | None = None,
-    apart: Apart = lambda one, other: True,
+    apart: Compatible = lambda one, other: True,
 ) -> list[Slot]:
     """Return the slots of primitives if every worker begins each of them as early as possible.
 
@@ -118,7 +118,7 @@ def ready(
     begun: Iterable[int],
     running: Sequence[int],
     urgency: Mapping[int, float],
-    apart: Apart,
+    apart: Compatible,
 ) -> list[int]:
     """Return the primitives that can begin now, the most urgent first, with room for all of them at once."""
     started, chosen = set(begun), list(running)

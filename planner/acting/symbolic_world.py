@@ -1,4 +1,4 @@
-"""A world of symbols: behaviours do exactly what they promise, unless somebody interferes or a fault is planted."""
+"""A symbolic world: behaviours have exactly their effects, except for interventions and planted faults."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class SymbolicWorld:
 
 
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
-    """Return the state after somebody has changed the world.
+    """Return the state after an intervention.
 
     An object that is moved, knocked over or taken away is let go: a hand that held it rests, and one that was at it stays where it
     was. An object that lies is at no place.

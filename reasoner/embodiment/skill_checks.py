@@ -84,7 +84,7 @@ def phase_without_end(embodiment: Embodiment) -> Iterator[Flaw]:
         for phase, missing in endless(use):
             yield (
                 phase.iri,
-                f"phase {phase.name} of {use.skill} moves ({phase.motion}), and nothing says how far",
+                f"phase {phase.name} of {use.skill} has the motion {phase.motion}, but no end",
                 "a motion ends at its goal, or earlier when a guard of e:until holds",
                 f"state e:{missing} of the phase",
             )

@@ -7,8 +7,8 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from confab.reasoner.files import as_iri_part, write_whole
-from confab.reasoner.graph.apart import QueryLimits, ask
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.graph.query_process import QueryLimits, ask
 from confab.reasoner.kinds import CONSTRUCTED, stamped
 from confab.reasoner.vocabulary import OWL, RDF
 
@@ -23,7 +23,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     KnowledgeError
         The query isn't SPARQL, or its answer is no triples, or none at all.
     LimitError
-        As `confab.reasoner.graph.apart.ask`.
+        As `confab.reasoner.graph.query_process.ask`.
     """
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     kind, _, answer = ask(graph, query, limits)

@@ -82,7 +82,7 @@ class Kept:
         name = words.name("predicate", f"not {situation}", f"not_{situation}")
         return words.atom(name, (*words.about(situation, terms), value))
 
-    def nobody(self, kind: str, situation: str, value: Term) -> Atom:
+    def none_has(self, kind: str, situation: str, value: Term) -> Atom:
         """Return "no individual of a class has a value" as an atom of a predicate of its own."""
         name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
         return self.words.atom(name, (value,))
@@ -98,4 +98,4 @@ class Kept:
         for (kind, situation), asked in self.free.items():
             its = self.problem.members(kind)
             held = {has for s, has in state.items() if s.situation == situation and s.arguments[0] in its}
-            yield from (self.nobody(kind, situation, self.words.object(v)) for v in sorted(asked - held))
+            yield from (self.none_has(kind, situation, self.words.object(v)) for v in sorted(asked - held))

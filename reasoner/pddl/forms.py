@@ -38,7 +38,7 @@ class NumericEffect:
     variables: tuple[Typed, ...] = ()
 
 
-Change: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
+FormChange: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
 """A change with its conditions and the variables over which it is quantified."""
 
 
@@ -165,7 +165,7 @@ def numeric_of(form: Form | None) -> Iterator[NumericEffect]:
             yield NumericEffect(change.head, function, change.items[2], when, variables)
 
 
-def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Change]:
+def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[FormChange]:
     """Yield the single changes of an effect, each with its conditions and quantified variables."""
     if form is None or not form.items:
         return

@@ -32,7 +32,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Call:
+class FunctionTerm:
     """The value of a function."""
 
     function: str
@@ -48,7 +48,7 @@ class Operation:
     right: Number
 
 
-Number: TypeAlias = "Fraction | Call | Operation"
+Number: TypeAlias = "Fraction | FunctionTerm | Operation"
 
 
 @dataclass(frozen=True)
@@ -115,12 +115,12 @@ class Assignment:
     """A function changes by a number: ``assign``, ``increase`` or ``decrease``."""
 
     operation: str
-    call: Call
+    call: FunctionTerm
     by: Number
 
 
 @dataclass(frozen=True)
-class Change:
+class ConditionalEffect:
     """An effect: an atom becomes true or false, or a number changes, for all bindings of a formula that held before."""
 
     what: Atom | Not | Assignment
@@ -194,10 +194,10 @@ def inside(formula: Formula) -> Iterator[Formula]:
             return
 
 
-def calls(number: Number) -> Iterator[Call]:
+def calls(number: Number) -> Iterator[FunctionTerm]:
     """Yield the functions in a number."""
     match number:
-        case Call():
+        case FunctionTerm():
             yield number
         case Operation(_, left, right):
             yield from calls(left)
@@ -220,7 +220,7 @@ def terms(formula: Formula) -> Iterator[Term]:
                 continue
 
 
-def terms_of(change: Change) -> Iterator[Term]:
+def terms_of(change: ConditionalEffect) -> Iterator[Term]:
     """Yield the terms in an effect."""
     yield from terms(change.when)
     if isinstance(change.what, Assignment):
@@ -257,7 +257,7 @@ def formula_text(formula: Formula) -> str:
             return f"(exists ({typed(variables)}) {formula_text(inner)})"
 
 
-def change_text(change: Change) -> str:
+def change_text(change: ConditionalEffect) -> str:
     """Return an effect as PDDL."""
     if isinstance(change.what, Assignment):
         text = f"({change.what.operation} {number_text(change.what.call)} {number_text(change.what.by)})"
@@ -270,7 +270,7 @@ def change_text(change: Change) -> str:
 def number_text(number: Number) -> str:
     """Return a number as PDDL; an infinite decimal fraction as a quotient."""
     match number:
-        case Call(function, its):
+        case FunctionTerm(function, its):
             return f"({' '.join([function, *(term.name for term in its)])})"
         case Operation(sign, left, right):
             return f"({sign} {number_text(left)} {number_text(right)})"

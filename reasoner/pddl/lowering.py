@@ -8,7 +8,7 @@ negated value, inequality       parameter for the value that it is instead, whic
 "no such object"                predicate for "free", kept up to date, if it can't hold twice;
                                 else one contrary per object
 symbol that may not exist       predicate that says for what it does
-rule of what is defined         its condition, in place of it; ``:derived`` if it needs itself
+defined situation               its definition; ``:derived`` if it is recursive
 two effects on one symbol       the first one under the condition that the second one isn't made
 anything else                   as it is, with ``or``, ``exists``, ``when``, ``forall``
 ==============================  ==================================================================
@@ -31,10 +31,10 @@ from confab.reasoner.pddl.formulas import TRUE as ALWAYS
 from confab.reasoner.pddl.formulas import (
     Assignment,
     Atom,
-    Call,
-    Change,
     Compare,
+    ConditionalEffect,
     Formula,
+    FunctionTerm,
     Not,
     Number,
     Operation,
@@ -76,7 +76,7 @@ class Action:
     parameters: tuple[Term, ...]
     places: tuple[int, ...]
     needs: Formula
-    changes: tuple[Change, ...]
+    changes: tuple[ConditionalEffect, ...]
     cost: Number
 
 
@@ -278,7 +278,7 @@ class Lowering:
             kind, situation, said = absent
             value = words.terms((said,), terms)[0]
             if (kind, situation) in self.kept.free:
-                scope.needs.append(self.kept.nobody(kind, situation, value))
+                scope.needs.append(self.kept.none_has(kind, situation, value))
             else:
                 members = map(words.object, sorted(self.problem.members(kind)))
                 there = [one for one in members if words.exists(situation, (one,)) == ALWAYS]
@@ -342,14 +342,14 @@ class Lowering:
         value = self.words.terms((effect.value,), inside)[0] if isinstance(effect, ValueEffect) else None
         return Cell(tuple(inside[name] for name in own), both(when), its, value), inside
 
-    def value_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[Change]:
+    def value_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
         """Yield the changes of a behaviour's effects on values; of two effects on one symbol, the later one."""
         cells = [(effect, *self.cell(effect, terms, scope)) for effect in behavior.effects]
         for number, (effect, cell, inside) in enumerate(cells):
             if self.words.situations[effect.situation].boolean:
                 atom = self.words.value(effect.situation, cell.terms, None)
                 if cell.when != NEVER:
-                    yield Change(Not(atom) if effect.value == FALSE else atom, cell.when, cell.own)
+                    yield ConditionalEffect(Not(atom) if effect.value == FALSE else atom, cell.when, cell.own)
                 continue
             later = [
                 some(other.own, both([other.when, *map(same, cell.terms, other.terms)]))
@@ -360,7 +360,7 @@ class Lowering:
             if when != NEVER:
                 yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
 
-    def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[Change]:
+    def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
         """Yield the changes when a symbol gets a value in place of its present one."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
@@ -379,33 +379,35 @@ class Lowering:
             old = Term(scope.fresh("old"), "object", self.range_of(situation))
         if old == new:
             return
-        yield Change(words.value(situation, its, new), when, own)
+        yield ConditionalEffect(words.value(situation, its, new), when, own)
         if old.name not in {term.name for term in (*scope.parameters, *own)} and old.variable:
             own, when = (*own, old), both([when, words.value(situation, its, old)])
-        yield Change(Not(words.value(situation, its, old)), when, own)
+        yield ConditionalEffect(Not(words.value(situation, its, old)), when, own)
         moves = self.kept.lacks(situation, its, new) in scope.needs if situation in self.kept.contrary else False
         moves |= any(
-            self.kept.nobody(kind, situation, new) in scope.needs and words.is_a(its[0], kind) == ALWAYS
+            self.kept.none_has(kind, situation, new) in scope.needs and words.is_a(its[0], kind) == ALWAYS
             for kind, name in self.kept.free
             if name == situation
         )
         other, both_asked = when if moves else both([when, no(same(old, new))]), old.members & new.members
         if asked := frozenset(self.kept.contrary.get(situation, ())):
             if old.members & asked and other != NEVER:
-                yield Change(self.kept.lacks(situation, its, old), other if both_asked & asked else when, own)
+                yield ConditionalEffect(
+                    self.kept.lacks(situation, its, old), other if both_asked & asked else when, own
+                )
             if new.members & asked:
-                yield Change(Not(self.kept.lacks(situation, its, new)), when, own)
+                yield ConditionalEffect(Not(self.kept.lacks(situation, its, new)), when, own)
         for (kind, name), asked_of in self.kept.free.items():
             member = words.is_a(its[0], kind) if name == situation else NEVER
             if member == NEVER:
                 continue
             if old.members & asked_of and other != NEVER:
                 left = other if both_asked & asked_of else when
-                yield Change(self.kept.nobody(kind, situation, old), both([left, member]), own)
+                yield ConditionalEffect(self.kept.none_has(kind, situation, old), both([left, member]), own)
             if new.members & asked_of:
-                yield Change(Not(self.kept.nobody(kind, situation, new)), both([when, member]), own)
+                yield ConditionalEffect(Not(self.kept.none_has(kind, situation, new)), both([when, member]), own)
 
-    def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[Change]:
+    def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
         """Yield the changes of a behaviour's effects on amounts.
 
         If one of them would be no number, the behaviour isn't applicable.
@@ -413,7 +415,7 @@ class Lowering:
         An assignment or multiplication that is followed by an increase becomes one assignment, since planners don't chain such
         effects.
         """
-        groups: dict[tuple[str, Call, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
+        groups: dict[tuple[str, FunctionTerm, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
             cell, inside = self.cell(effect, terms, scope)
             if cell.when != NEVER:
@@ -436,9 +438,9 @@ class Lowering:
                 if limit is not None and all(linear for _, _, linear in changes):
                     scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
             if all(operation in ("increase", "decrease") for operation, _, _ in changes):
-                yield from (Change(Assignment(operation, at, by), when, own) for operation, by, _ in changes)
+                yield from (ConditionalEffect(Assignment(operation, at, by), when, own) for operation, by, _ in changes)
             else:
-                yield Change(Assignment("assign", at, result), when, own)
+                yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
         """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers: PDDL has only numbers."""

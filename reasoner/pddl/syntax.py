@@ -88,7 +88,7 @@ class Pddl:
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
     timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # facts that begin or end to hold
     goal: Form | None = None
-    minimize: Form | None = None  # what is to be as little as can be
+    minimize: Form | None = None  # the metric
 
     def above(self, name: str) -> Sequence[str]:
         """Return a type and its supertypes, from the nearest to ``object``."""

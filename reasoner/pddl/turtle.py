@@ -74,7 +74,7 @@ def turtle(problem: Problem, title: str, description: str, labels: Said | None =
     labels : mapping of name to label, optional
         A name without one is its own label.
     """
-    writer = _Writer(problem, dict(labels or {}))
+    writer = _SceneWriter(problem, dict(labels or {}))
     header = HEADER.format(scene=problem.scene, title=_quoted(title), description=_quoted(description))
     return header + "\n".join(writer.lines()) + "\n"
 
@@ -84,7 +84,7 @@ def _quoted(text: str) -> str:
 
 
 @dataclass
-class _Writer:
+class _SceneWriter:
     problem: Problem
     labels: dict[str, str]
     nodes: list[str] = field(default_factory=list)  # of the behaviour being written

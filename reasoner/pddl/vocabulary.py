@@ -11,7 +11,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.language import walk
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
-from confab.reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both
+from confab.reasoner.pddl.formulas import Atom, Formula, FunctionTerm, Number, Operation, Term, both
 from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
@@ -178,23 +178,23 @@ class Vocabulary:
 
     # -------------------------------------------------------------------------------------------------------- numbers
 
-    def amount(self, situation: str, terms: Sequence[Term]) -> Call:
+    def amount(self, situation: str, terms: Sequence[Term]) -> FunctionTerm:
         """Return the function for an amount."""
         name = self.name("function", situation, situation)
         self.counted[situation] = name
         return self.call(name, self.about(situation, terms))
 
-    def measure(self, relation: str, terms: Sequence[Term]) -> Call:
+    def measure(self, relation: str, terms: Sequence[Term]) -> FunctionTerm:
         """Return the function for a relation that gives a number."""
         name = self.name("function", f"relation {relation}", relation)
         self.measured[relation] = name
         return self.call(name, terms)
 
-    def call(self, name: str, terms: Sequence[Term]) -> Call:
+    def call(self, name: str, terms: Sequence[Term]) -> FunctionTerm:
         """Return a function with its arguments."""
         for types, term in zip(self.functions.setdefault(name, [set() for _ in terms]), terms, strict=True):
             types.add(term.type)
-        return Call(name, tuple(terms))
+        return FunctionTerm(name, tuple(terms))
 
     def common(self, types: Iterable[str]) -> str:
         """Return the lowest common supertype."""
@@ -241,7 +241,7 @@ class Vocabulary:
 
     # ---------------------------------------------------------------------------------------------------- statements
 
-    def facts(self) -> Iterator[Atom | tuple[Call, Fraction]]:
+    def facts(self) -> Iterator[Atom | tuple[FunctionTerm, Fraction]]:
         """Yield the initial atoms and numbers of everything that has been named."""
         for symbol, value in self.problem.initial.items():
             boolean, its = self.situations[symbol.situation].boolean, self.terms(symbol.arguments, {})

@@ -95,9 +95,9 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                 if problem.members(kind) & {*effect.arguments}:
                     yield (
                         case.reading.names.iri(name),
-                        f"{name} changes {effect.situation} of each of a class where something is so of every {kind}",
+                        f"an effect of {name} on {effect.situation} of a whole class has a condition on all of {kind}",
                         f"in :when only the effect's own class means the same individual; {kind} means all of its individuals",
-                        f"name the effect's class there, and ask by a class condition that it is a {kind}",
+                        f"name the effect's class in the condition, and add a class condition for {kind}",
                     )
 
 
@@ -150,7 +150,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         more = f"; so neither can {some([*others, *later])}" if others or later else ""
         yield (
             names.iri(first),
-            f"{first} can never be chosen: nothing leads to {'; '.join(conditions)}{more}",
+            f"{first} is never applicable: no behaviour leads to {'; '.join(conditions)}{more}",
             why,
             mend,
         )
@@ -171,7 +171,7 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
     for situation in problem.domain.situations.values():
-        # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
+        # others may change what no behaviour changes; situation types without objects are skipped
         present = all(problem.classes.get(kind) for kind in situation.arguments)
         if situation.name not in changed or not present:
             there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
@@ -263,7 +263,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
-    asks: dict[tuple[str, str], set[str]] = {}  # of what is given: the classes of which nobody may have it already
+    asks: dict[tuple[str, str], set[str]] = {}  # for each given value, the classes of which no member may have it
     for behavior in problem.domain.behaviors.values():
         for effect in behavior.effects:
             free = {kind for c in behavior.preconditions if (kind := _none_has(c, effect))}
@@ -284,7 +284,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
                 some = ", ".join(several[:5]) + (", …" if len(several) > 5 else "")
                 yield (
                     names.iri(several[1]),
-                    f"the {situation} of {some} is {value} at first, though each behaviour giving that asks that no {kind} has it",
+                    f"the initial {situation} of {some} is {value}, but behaviours that give it require that no {kind} has it",
                     "no behaviour leads to such a situation, so it is likely not meant",
                     f"state another {situation} of all but one, or let the behaviours take several {kind} there",
                 )

@@ -42,7 +42,7 @@ def contradictions(case: Case) -> Iterator[Fault]:
     rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
     for name, behavior in (*problem.domain.behaviors.items(), *rules):
         consequence = (
-            "nothing follows from the rule" if name in problem.domain.rules else "the behaviour can never be done"
+            "nothing follows from the rule" if name in problem.domain.rules else "the behaviour is never applicable"
         )
         for clash, where in _clashes(behavior, problem):
             if clash in told:
@@ -206,11 +206,11 @@ def repeated_names(case: Case) -> Iterator[Fault]:
                     continue
                 yield (
                     names.iri(name),
-                    f"{name} says inside of a negated condition that {term} is a {one.kind}, "
-                    f"which {f'{term} is anyway' if anyway else f'no {outer} is'}",
-                    f"{term} means there what it means outside: the condition is about that one {outer}, and about no other",
-                    f"give the {one.kind} that is meant inside another name than {term}; if {term} itself is meant, leave its "
-                    "class out there",
+                    f"a negated condition of {name} requires that {term} is of the class {one.kind}, "
+                    f"{'which it is anyway' if anyway else f'which no {outer} is'}",
+                    f"{term} denotes the same {outer} inside and outside; the condition is about it",
+                    f"if another {one.kind} is meant inside, give it another name than {term}; if {term} itself is meant, remove "
+                    "its class there",
                 )
 
 

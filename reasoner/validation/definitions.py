@@ -87,7 +87,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
 
 def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
     """Return why planning doesn't evaluate an axiom about a value property, unless the effects are at fault."""
-    name, what = local_name(prop), f"that {said} isn't evaluated, since "
+    name, what = local_name(prop), f"planning doesn't evaluate that {said}, since "
     nodes = {**schema.axioms, **schema.expressions}
     into = any(
         prop in node.get(by, ())
@@ -189,7 +189,7 @@ def both(case: Case, one: str, other: str) -> bool:
     return not below[0].isdisjoint(below[1])
 
 
-WATCHED_BY_NOBODY = {
+NOT_ENFORCED = {
     OWL + "InverseFunctionalProperty": "leads to no two from one",
     OWL + "AsymmetricProperty": "never leads both ways",
     OWL + "IrreflexiveProperty": "leads from nothing to itself",
@@ -206,23 +206,23 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
     inside: dict[object, list[ox.Triple]] = defaultdict(list)
     for triple in case.triples:
         inside[triple.subject].append(triple)
-    why = "behaviours change it, and what comes of that isn't checked against this axiom"
+    why = "behaviours change it, and their results aren't checked against this axiom"
     mend = "say it as a precondition of the behaviours that could break it, or drop the axiom"
     for triple in case.triples:
         subject, predicate, value = triple.subject, triple.predicate.value, triple.object
         named = subject.value if isinstance(subject, ox.NamedNode) else ""
         other = value.value if isinstance(value, ox.NamedNode) else ""
-        if named in of and predicate == RDF + "type" and other in WATCHED_BY_NOBODY:
-            yield named, f"that {local_name(named)} {WATCHED_BY_NOBODY[other]} isn't watched in a plan", why, mend
+        if named in of and predicate == RDF + "type" and other in NOT_ENFORCED:
+            yield named, f"planning doesn't enforce that {local_name(named)} {NOT_ENFORCED[other]}", why, mend
         if named in of and predicate == OWL + "propertyDisjointWith":
-            said = f"that {local_name(named)} and {local_name(other)} never lead to the same isn't watched in a plan"
+            said = f"planning doesn't enforce that {local_name(named)} and {local_name(other)} never lead to the same individual"
             yield named, said, why, mend
         if predicate != RDFS + "subClassOf":
             continue
         if not other and _properties_in(value, inside) & of:
             yield (
                 named,
-                f"what each {local_name(named)} is said to be in every state isn't watched in a plan",
+                f"planning doesn't enforce the axiom about each {local_name(named)} in every state",
                 why,
                 mend,
             )
@@ -230,14 +230,14 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
             yield (
                 other,
                 f"an expression is said to be below {local_name(other)}, which planning doesn't conclude from",
-                "a class has whom its definition has, and who is stated",
+                "the members of a class follow from its definition, and from stated types",
                 f"define {local_name(other)} by owl:equivalentClass, or conclude it by a SWRL rule",
             )
         elif named and other and definitions.changes(named) and other not in _above(case, named):
             yield (
                 named,
-                f"each {local_name(named)} is said to be a {local_name(other)}, which planning doesn't conclude",
-                "a class has whom its definition has, and who is stated",
+                f"planning doesn't conclude that each {local_name(named)} is of the class {local_name(other)}",
+                "the members of a class follow from its definition, and from stated types",
                 f"name {local_name(other)} in the definition of {local_name(named)}, or define it as a union with that",
             )
 

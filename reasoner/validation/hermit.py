@@ -42,7 +42,7 @@ MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
 CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
 MEMORY = "-Xmx2000M"
 QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # in so short a run, thorough compilation doesn't pay
-UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # older and newer names of what it prints with
+UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # older and newer names of the output encoding
 IMPORTS = OWL + "imports"
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"
 
@@ -82,7 +82,7 @@ class Classification:
     empty : tuple of str
         IRIs of the named classes that can have no individual, prototypes among them.
     types : mapping of individual to classes
-        The most special named classes of each individual, stated or concluded; IRIs. Empty if nobody asked.
+        The most special named classes of each individual, stated or concluded; IRIs. Empty unless requested.
     """
 
     consistent: bool
@@ -208,7 +208,7 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
         yield (
             "inconsistent",
             graph.scene,
-            "the ontology is inconsistent: HermiT finds no world that is as it says",
+            "the ontology is inconsistent: HermiT finds no model of it",
             "everything follows from a contradiction, so that nothing can be concluded",
             "look at disjoint classes, functional properties, domains and ranges (Protégé: Explain inconsistent ontology)",
         )
@@ -228,7 +228,7 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
                 "unsatisfiable-precondition",
                 reading.names.iri(behavior.name),
                 f"no individual can be the {' or '.join(terms)} of {behavior.name}",
-                "what its preconditions say of that term contradicts the ontology, so that it can never be chosen",
+                "its preconditions on that term contradict the ontology, so that it is never applicable",
                 "look at the term's type and its conditions for classes that are disjoint or values that aren't in the range",
             )
 
@@ -245,13 +245,13 @@ def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
     properties = {s.value: p.value for s, p in graph.select(VALUE_PROPERTIES, SCENE)}  # type: ignore[union-attr]
     yield f"@prefix owl: <{OWL}> ."
     for behavior in reading.problem.domain.behaviors.values():
-        writer = _Writer(reading, properties, behavior)
+        writer = _ClassWriter(reading, properties, behavior)
         for term in (*behavior.parameters, *behavior.variables):
             yield f"<{_iri(behavior, term.name)}> a owl:Class ; owl:equivalentClass {writer.term(term.name, ())} ."
 
 
 @dataclass(frozen=True)
-class _Writer:
+class _ClassWriter:
     """Writes the conditions of a behaviour on a term as an OWL class, in Turtle."""
 
     reading: Reading

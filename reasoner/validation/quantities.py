@@ -133,7 +133,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
         has = "have" if len(who) > 1 else "has"
         yield (
             names.iri(who[0]),
-            f"{some} {has} no {relation}, which {readers} read{'' if ' and ' in readers else 's'} of each {kind}",
+            f"{some} {has} no {relation}, which {readers} need{'' if ' and ' in readers else 's'} of every {kind}",
             "what isn't stated compares with nothing, so that no such behaviour can be done with it",
             f"state {relation} of {some}, or give it to another class than {kind}",
         )
@@ -189,10 +189,10 @@ def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
         if lacking := ranges.lacking(behavior):
             told[lacking[1]].append((name, lacking[0]))
     for about, ((first, lacks), *others) in told.items():
-        more = f"; neither can {some([name for name, _ in others])}" if others else ""
+        more = f"; neither is {some([name for name, _ in others])}" if others else ""
         yield (
             names.iri(first),
-            f"{first} can never be done: {lacks}, and {about}{more}",
+            f"{first} is never applicable: {lacks}, and {about}{more}",
             "that is so at first, and no behaviour that can be done leads to another amount",
             "mend the amount or the bounds, state another amount in the scene, or add a behaviour that leads to one that does",
         )
@@ -267,11 +267,11 @@ class _Ranges:
                 continue
             amount = _plain_amount(Amount(effect.situation, effect.arguments))
             if quantity.most is not None and after[0] > quantity.most:
-                limit = f"of at most {written(quantity.most)}"
-                return f"it would make {amount}, {limit}, {_written(after[0])} or more", self.about(effect)
+                limit = f"above its maximum of {written(quantity.most)}"
+                return f"it would make {amount} {_written(after[0])} or more, {limit}", self.about(effect)
             if quantity.least is not None and after[1] < quantity.least:
-                limit = f"of at least {written(quantity.least)}"
-                return f"it would make {amount}, {limit}, {_written(after[1])} or less", self.about(effect)
+                limit = f"below its minimum of {written(quantity.least)}"
+                return f"it would make {amount} {_written(after[1])} or less, {limit}", self.about(effect)
         return None
 
     def about(self, part: Comparison | AmountEffect) -> str:

@@ -556,15 +556,15 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
 
     server = http.server.HTTPServer(("127.0.0.1", 0), Handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    from confab.reasoner.graph import apart
+    from confab.reasoner.graph import query_process
 
     scene, url = confab.load("living-room"), f"<http://127.0.0.1:{server.server_port}/q>"
     query = f"SELECT * WHERE {{ SERVICE SILENT {url} {{ ?a ?b ?c }} }}"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(apart, "SERVICE", re.compile("(?!)"))
+        patch.setattr(query_process, "SERVICE", re.compile("(?!)"))
         scene.query(query)
     assert not asked
-    scene.query(query, apart.QueryLimits(service=True))
+    scene.query(query, query_process.QueryLimits(service=True))
     server.shutdown()
     server.server_close()
     assert asked == ["/q"]
@@ -572,7 +572,7 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ['"SERVICE"', "<urn:SERVICE>", "?service", ":SERVICE", "'''a\nSERVICE'''"])
 def test_the_word_service_may_be_spoken_of(text: str) -> None:
-    from confab.reasoner.graph.apart import SERVICE, TEXTS
+    from confab.reasoner.graph.query_process import SERVICE, TEXTS
 
     assert SERVICE.search(TEXTS.sub(" ", f"SELECT * {{ ?a ?b {text} }}")) is None
 
@@ -775,7 +775,7 @@ main()
         ("plan living-room -o p.json", "confab.planner.validation:validate"),
         ("plan living-room -o p.json", "confab.reasoner.files:os.fsync"),
         ("learn living-room --memory m.ttl", "confab.reasoner.files:os.fsync"),
-        ("query living-room ASK{?s?p?o}", "confab.reasoner.graph.apart:QueryWorker._send"),
+        ("query living-room ASK{?s?p?o}", "confab.reasoner.graph.query_process:QueryWorker._send"),
         ("serve living-room --port 0", "socket:create_server"),
     ],
 )

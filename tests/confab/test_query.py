@@ -13,8 +13,8 @@ from confab import ontology
 from confab.authoring import new_domain
 from confab.cli import app
 from confab.following import _following
-from confab.reasoner.graph.apart import QueryLimits
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.query_process import QueryLimits
 from confab.reasoner.limits import LimitError, within
 from confab.reasoner.reading.affordance import SITUATION
 from confab.reasoner.validation.validate import quick_errors

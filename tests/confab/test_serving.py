@@ -22,7 +22,7 @@ from rdflib.plugins.stores.sparqlstore import SPARQLStore
 
 import confab
 from benchmarks.load import measured
-from confab.reasoner.graph.apart import QueryLimits
+from confab.reasoner.graph.query_process import QueryLimits
 from confab.serving import AT_ONCE, Server, serving
 
 CUPS = "SELECT ?cup ?where WHERE { ?cup a k:Cup ; k:location ?where } ORDER BY ?cup"

@@ -69,13 +69,16 @@ CARRYING = "[ a owl:Restriction ; owl:onProperty :carries ; owl:someValuesFrom :
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (HEAVY, "each FullCart is said to be a Heavy, which planning doesn't conclude"),
+        (HEAVY, "planning doesn't conclude that each FullCart is of the class Heavy"),
         (
             f"{CARRYING} rdfs:subClassOf :Cart .",
             "an expression is said to be below Cart, which planning doesn't conclude from",
         ),
-        (f":Room rdfs:subClassOf {CARRYING} .", "what each Room is said to be in every state isn't watched in a plan"),
-        (":carries a owl:InverseFunctionalProperty .", "that carries leads to no two from one isn't watched in a plan"),
+        (f":Room rdfs:subClassOf {CARRYING} .", "planning doesn't enforce the axiom about each Room in every state"),
+        (
+            ":carries a owl:InverseFunctionalProperty .",
+            "planning doesn't enforce that carries leads to no two from one",
+        ),
         (":FullCart rdfs:subClassOf :Where .", ""),
     ],
 )

@@ -24,7 +24,7 @@ from confab.reasoner.symbols import Problem, Symbol
 from tests.planner.test_wants import museum
 from worlds.families import FAMILIES, family, random_table, table, tabletop
 from worlds.rooms import rooms
-from worlds.truth import TooManyError, World
+from worlds.truth import StateSpace, TooManyError
 
 EASY = [name for name in FAMILIES if name != "packed"]
 
@@ -321,7 +321,7 @@ def test_the_benchmarks_truth_and_exhaustion_agree_though_they_share_no_code() -
     for seed in range(43_000, 43_010):
         problem = random_table(seed)
         try:
-            truth = World(problem).explore(20_000)
+            truth = StateSpace(problem).explore(20_000)
         except TooManyError:
             continue
         steps = steps_of(problem, 3)

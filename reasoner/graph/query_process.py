@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 UNION = tuple(BASE + name for name in (*GRAPHS, DERIVED))
-PROCESS = Path(__file__).with_name("asked_apart.py")
+PROCESS = Path(__file__).with_name("query_server.py")
 SECONDS, ROWS, MEGABYTES = 60.0, 100_000, 2_000
 TEXTS = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'(?:[^\\]|\\.)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',

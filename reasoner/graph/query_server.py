@@ -1,4 +1,4 @@
-"""The process that answers queries for `confab.reasoner.graph.apart`. It imports nothing else of this project.
+"""The process that answers queries for `confab.reasoner.graph.query_process`. It imports nothing else of this project.
 
 It keeps a graph and forks for each query. The fork limits its own memory, time and files (hence connections, too) and ends with
 its answer; the next message, or the end of the parent process, ends it early.
@@ -40,7 +40,7 @@ def received() -> Any:
 
 
 def read(size: int) -> bytes:
-    """Return exactly so many bytes from stdin, so that `select` reports the next message."""
+    """Return exactly this number of bytes from stdin, so that `select` reports the next message."""
     found = bytearray()
     while len(found) < size:
         part = os.read(0, min(size - len(found), 1 << 20))
