@@ -25,7 +25,7 @@ from typing import TypeAlias
 
 from confab.planner.grounded.best_first import search
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.hff import heuristic
+from confab.planner.grounded.hff import Evaluation, heuristic
 from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
 from confab.planner.timed.activities import Event, Moment
@@ -351,9 +351,9 @@ class _Finder:
         times = self.times(node, {end: step})
         return 0 if times is None else times[-1]
 
-    def ranked(self, evaluation: tuple[int, Sequence[int], Sequence[int]]) -> list[int]:
+    def ranked(self, evaluation: Evaluation) -> list[int]:
         """Return the applicable operators of a state, the preferred ones first."""
-        _, relaxed_plan, applicable = evaluation
+        _, relaxed_plan, applicable, _ = evaluation
         possible = set(applicable)
         preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
         return [*preferred, *sorted(possible.difference(preferred))]
