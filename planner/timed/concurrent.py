@@ -312,7 +312,7 @@ class _Finder:
         key = self.key(root)
         came_from[key] = None
         number = 0
-        queue: list[tuple[int, int, int, _Node, list[int]]] = [(began[0], 0, 0, root, self.ranked(began))]
+        queue: list[tuple[int, int, int, _Node, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
         while queue and len(came_from) < MOST_STATES:
             check("searching for steps that fit into one another", 0.0)
             if self.deadline is not None and perf_counter() > self.deadline:
@@ -332,7 +332,7 @@ class _Finder:
                     continue
                 self.counts.expanded += 1
                 number += 1
-                rank = found[0] + len(after.running)
+                rank = found.h + len(after.running)
                 heapq.heappush(queue, (rank, 0, -number, after, self.ranked(found)))
                 if rank < h:
                     rest = operators[position + 1 :]
@@ -353,9 +353,8 @@ class _Finder:
 
     def ranked(self, evaluation: Evaluation) -> list[int]:
         """Return the applicable operators of a state, the preferred ones first."""
-        _, relaxed_plan, applicable, _ = evaluation
-        possible = set(applicable)
-        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
+        possible = set(evaluation.applicable)
+        preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
         return [*preferred, *sorted(possible.difference(preferred))]
 
     def after(self, node: _Node, operator: int) -> _Node | None:

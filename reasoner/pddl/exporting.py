@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.formulas import (
     TRUE,
     Assignment,
@@ -36,6 +37,7 @@ from confab.reasoner.pddl.formulas import (
 from confab.reasoner.pddl.lowering import Action, Lowering
 from confab.reasoner.pddl.vocabulary import Vocabulary
 from confab.reasoner.symbols import Problem, State
+from confab.reasoner.timing import only_during
 
 LINE = "\n    "
 
@@ -65,7 +67,16 @@ def to_pddl(
     level : int, optional
     initial, goal : State, optional
         In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
+
+    Raises
+    ------
+    KnowledgeError
+        Some behaviour has a value that others ask for and that holds only while it lasts: actions without time don't show it.
     """
+    if names := sorted(only_during(problem)):
+        raise KnowledgeError(
+            f"{names[0]} gives a value only while it lasts, which classical PDDL can't say; such scenes are planned here only"
+        )
     level = problem.domain.levels[-1] if level is None else level
     found = replace(
         problem,

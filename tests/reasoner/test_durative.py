@@ -11,6 +11,8 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
 from confab.planner.timed.call import in_time
 from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import Imported, imported
 from confab.reasoner.pddl.syntax import PddlError, parse
 from confab.reasoner.pddl.turtle import turtle
@@ -102,6 +104,11 @@ def test_a_scene_file_says_everything_of_time_that_the_domain_says(domain: str, 
         assert set(again.timing.effects) == set(behavior.timing.effects)
         for span in (Span.START, Span.END):
             assert set(again.timing.asked(span)) == set(behavior.timing.asked(span))
+
+
+def test_an_export_without_time_is_refused_where_a_value_holds_only_during_a_step() -> None:
+    with pytest.raises(KnowledgeError, match="only while it lasts"):
+        to_pddl(imported(parse(CELLAR, FUSES)).problem)
 
 
 def test_a_scene_with_time_is_planned_with_its_schedule(tmp_path: Path) -> None:

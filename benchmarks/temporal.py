@@ -1,0 +1,205 @@
+"""Temporal problems of the field: coverage and makespan beside LPG and Tamer, and random timed worlds against an exhaustive search.
+
+    python -m benchmarks temporal                        with problems in ../shared/temporal
+    CONFAB_TEMPORAL=FOLDER python -m benchmarks temporal with problems elsewhere
+    CONFAB_PEERS=PYTHON …                                with a Python that has up-lpg and up-tamer
+    CONFAB_INSTANCES=1,5,12 …                            these instances of each domain only
+    CONFAB_PLANNERS=confab,lpg,tamer …                   these planners only
+    CONFAB_KINDS=worlds CONFAB_COUNT=1000 …              the random worlds only
+
+Each run is a process of its own with 30 s of CPU. Plans of ours are judged by unified-planning's TimeTriggeredPlanValidator, with
+conflicting events 1 ms apart.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from time import process_time
+
+SECONDS = 30
+ROOT = Path(__file__).resolve().parents[1]
+PROBLEMS = Path(os.environ.get("CONFAB_TEMPORAL", ROOT.parent / "shared" / "temporal"))
+EPSILON = Fraction(1, 1000)
+FIRST, COUNT = 20_000, 5_000
+PEER = """
+import json, sys
+from unified_planning.io import PDDLReader
+from unified_planning.shortcuts import OneshotPlanner, get_environment
+get_environment().credits_stream = None
+problem = PDDLReader().parse_problem(sys.argv[2], sys.argv[3])
+with OneshotPlanner(name=sys.argv[1]) as planner:
+    plan = planner.solve(problem).plan
+ends = [] if plan is None else [float(begin + (lasts or 0)) for begin, _, lasts in plan.timed_actions]
+print(json.dumps(max(ends) if ends else None))
+"""
+
+
+def main() -> None:
+    """Print the tables."""
+    kinds = os.environ.get("CONFAB_KINDS", "problems,worlds").split(",")
+    if "problems" in kinds:
+        _problems()
+    if "worlds" in kinds:
+        _worlds()
+
+
+def _problems() -> None:
+    planners = os.environ.get("CONFAB_PLANNERS", "confab,lpg,tamer").split(",")
+    chosen = os.environ.get("CONFAB_INSTANCES", "")
+    table: dict[str, dict[str, dict[str, float | None]]] = {}
+    accepted: Counter[bool] = Counter()
+    for folder in sorted(path for path in PROBLEMS.iterdir() if path.is_dir()):
+        for problem in sorted((folder / "instances").glob("*.pddl"), key=lambda p: int(p.stem.split("-")[-1])):
+            number = problem.stem.split("-")[-1]
+            if chosen and number not in chosen.split(","):
+                continue
+            domain = folder / "domain.pddl"
+            domain = domain if domain.exists() else folder / "domains" / f"domain-{number}.pddl"
+            for planner in planners:
+                found = _run(planner, domain, problem)
+                row = table.setdefault(folder.name, {}).setdefault(planner, {})
+                row[number] = found["makespan"] if found else None
+                if found and planner == "confab":
+                    accepted[bool(found["accepted"])] += 1
+    print(
+        "Solved, and makespan over the least of any planner here (geometric mean over the problems that this planner solved):\n"
+    )
+    print("| domain |" + "".join(f" {planner} |" for planner in planners))
+    print("|---" * (len(planners) + 1) + "|")
+    for name, rows in table.items():
+        cells = [f"{sum(v is not None for v in rows[p].values())}{_ratio(rows, p)}" for p in planners]
+        print(f"| {name}: {len(rows[planners[0]])} |" + "".join(f" {cell} |" for cell in cells))
+    print(f"\nPlans of ours: {accepted[True]} accepted by unified-planning's validator, {accepted[False]} rejected")
+
+
+def _ratio(rows: dict[str, dict[str, float | None]], planner: str) -> str:
+    product, many = 1.0, 0
+    for number, makespan in rows[planner].items():
+        known = [row[number] for row in rows.values() if row.get(number) is not None]
+        if makespan is not None:
+            product, many = product * makespan / min(value for value in known if value is not None), many + 1
+    return f" (× {product ** (1 / many):.2f})" if many else ""
+
+
+def _run(planner: str, domain: Path, problem: Path) -> dict[str, float | bool] | None:
+    """Return makespan and verdict of a planner's plan; None if it finds none in time."""
+    if planner == "confab":
+        command = [sys.executable, "-m", "benchmarks.temporal", "one", str(domain), str(problem)]
+    else:
+        command = [os.environ.get("CONFAB_PEERS", sys.executable), "-c", PEER, planner, str(domain), str(problem)]
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, preexec_fn=limited, timeout=SECONDS * 20, check=False
+    )
+    lines = done.stdout.splitlines()
+    if not lines or done.returncode < 0:
+        return None
+    try:
+        said = json.loads(lines[-1])
+    except ValueError:
+        return None
+    return said if isinstance(said, dict) else None if said is None else {"makespan": float(said), "accepted": True}
+
+
+def one(domain: Path, problem: Path) -> None:
+    """Print the makespan of our plan of one problem, and whether the validator accepts it."""
+    from confab.planner.plan import Limits
+    from confab.planner.solve import Request, solve
+    from confab.planner.timed import concurrent
+    from confab.planner.timed.call import in_time
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
+    from confab.reasoner.timing import only_during
+
+    found = imported(parse_files(domain, problem))
+    if only_during(found.problem):
+        timed = concurrent.plan(found.problem, Limits(), EPSILON)[1].plan
+    else:
+        plan = solve(Request(found.problem)).plan
+        timed = None if plan is None else in_time(found.problem, plan, 3.0, EPSILON).plan
+    if timed is None:
+        print("null")
+        return
+    lines = [
+        f"{float(slot.begin):.6f}: ({found.line(slot.step.behavior, slot.step.arguments)}) "
+        f"[{float(slot.end - slot.begin):.6f}]"
+        for slot in timed.slots
+    ]
+    print(json.dumps({"makespan": float(timed.makespan), "accepted": validated(domain, problem, lines)}), flush=True)
+
+
+def validated(domain: Path, problem: Path, lines: Sequence[str]) -> bool:
+    """Return whether unified-planning's validator accepts a plan in time."""
+    from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
+    from unified_planning.io import PDDLReader
+    from unified_planning.shortcuts import get_environment
+
+    get_environment().credits_stream = None
+    read = PDDLReader().parse_problem(str(domain), str(problem))
+    plan = PDDLReader().parse_plan_string(read, "\n".join(lines))
+    return bool(TimeTriggeredPlanValidator().validate(read, plan))
+
+
+def _worlds() -> None:
+    """Print how plans of random timed worlds compare with an exhaustive search over schedules."""
+    from confab.planner.plan import Limits, Status
+    from confab.planner.solve import Request, solve
+    from confab.planner.timed import concurrent
+    from confab.planner.timed.call import in_time
+    from confab.reasoner.timing import only_during
+    from worlds.timed import least_makespan, problem_of, rejected, timed_world
+
+    first, count = int(os.environ.get("CONFAB_SEED", FIRST)), int(os.environ.get("CONFAB_COUNT", COUNT))
+    found: Counter[str] = Counter()
+    ratios: list[float] = []
+    wrong: list[int] = []
+    began = process_time()
+    for seed in range(first, first + count):
+        world = timed_world(seed)
+        problem, plan, timed = problem_of(world), None, None
+        said = "none"
+        if not only_during(problem):
+            outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
+            plan, said = outcome.plan, outcome.status.value
+        if plan is not None:
+            timed = in_time(problem, plan, 1.0).plan
+        elif said in ("none", Status.UNSOLVABLE.value):
+            timed = concurrent.plan(problem, Limits(seconds=20.0))[1].plan
+        try:
+            least = least_makespan(world)
+        except MemoryError:
+            found["too large to be searched"] += 1
+            continue
+        if timed is None:
+            found["without a plan, and we found none" if least is None else "solvable, and we found no plan"] += 1
+        elif least is None or timed.makespan < least or rejected(world, timed) is not None:
+            wrong.append(seed)
+        else:
+            found["solved"] += 1
+            found["of these with the least makespan"] += timed.makespan == least
+            ratios.append(float(timed.makespan / least))
+    print(
+        f"\nRandom timed worlds {first} to {first + count - 1}, {process_time() - began:.0f} CPU s:\n\n| | |\n|---|---|"
+    )
+    for what, many in sorted(found.items()):
+        print(f"| {what} | {many} |")
+    print(f"| makespan ÷ least, mean | {sum(ratios) / max(len(ratios), 1):.3f} |")
+    print(f"| wrong: no plan, or shorter than the least | {len(wrong)} {wrong[:5] or ''} |")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["one"]:
+        one(Path(sys.argv[2]), Path(sys.argv[3]))
+    else:
+        main()
