@@ -75,10 +75,12 @@ class ConditionReader:
         (only,) = places
         return lambda values: (values[only],)
 
-    def conjunction(self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str]) -> list[Test]:
+    def conjunction(
+        self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], last: Sequence[Test] = ()
+    ) -> list[Test]:
         """Return conditions as tests, the last of which may choose and test the rest; `bound` grows by what is chosen.
 
-        What only nested conditions (`AnyOf`, `Witness`) mention is their own.
+        What only nested conditions (`AnyOf`, `Witness`) mention is their own. `last` are tests behind all others.
         """
         waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
         nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
@@ -97,9 +99,9 @@ class ConditionReader:
                 candidates = self.candidates(condition, unknown, kinds)
                 if self.rules.lookups is not None:
                     candidates = self.noted(candidates, unknown[0], kinds[unknown[0]], waiting, bound)
-                rest = self.conjunction([*waiting, *nested], bound, kinds)
+                rest = self.conjunction([*waiting, *nested], bound, kinds, last)
                 return [*tests, self.choice(candidates, unknown[0], kinds[unknown[0]], rest)]
-        return tests + [self.test(condition, bound, kinds) for condition in nested]
+        return [*tests, *(self.test(condition, bound, kinds) for condition in nested), *last]
 
     def given(self, condition: ValueCondition, kind: str) -> Test:
         """Return the choice of a value where the state leaves none."""

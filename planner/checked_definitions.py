@@ -1,12 +1,16 @@
-"""What follows from rules, as the checker works it out, without a line in common with any search."""
+"""What follows from rules and aggregates, as the checker works it out, without a line in common with any search."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import TypeAlias
 
+from confab.planner.checked_amounts import worth
+from confab.planner.checked_conditions import ConditionReader, Source, Stated, Values, all_hold
+from confab.reasoner.amounts import written
 from confab.reasoner.derivation import strata
-from confab.reasoner.symbols import Rule
+from confab.reasoner.symbols import Aggregate, ClassCondition, Rule
 
 Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
@@ -61,3 +65,40 @@ class Definitions:
             return asked[cell]
         finally:
             del self._asking[stratum]
+
+
+class Total:
+    """A sum or count, worked out from its definition whenever it is asked for.
+
+    Parameters
+    ----------
+    rules : Source
+        What conditions are read with.
+    aggregate : Aggregate
+    """
+
+    def __init__(self, rules: Source, aggregate: Aggregate) -> None:
+        reading = ConditionReader(rules, [p.name for p in aggregate.parameters])
+        self._members = [rules.problem.members(p.kind) for p in aggregate.parameters]
+        self._names = reading.key([v.name for v in aggregate.variables])
+        self._number = worth(aggregate.amount, reading.key, rules.problem.relations)
+        asked = [*aggregate.conditions, *(ClassCondition(v.name, v.kind) for v in aggregate.variables)]
+        bound = {p.name for p in aggregate.parameters}
+        self._found: dict[tuple[str, ...], Fraction] = {}
+        self._tests = reading.conjunction(asked, bound, aggregate.kinds, [self._added])
+        self._terms = tuple(reading.places)
+
+    def _added(self, facts: Stated, values: Values) -> bool:
+        """Note one solution, and ask for the next."""
+        number = self._number(facts.value, values)
+        if number is not None:
+            self._found[self._names(values)] = number
+        return False
+
+    def value(self, facts: Stated, arguments: tuple[str, ...]) -> str | None:
+        """Return the sum for some arguments as text, None if they aren't of its classes."""
+        if not all(a in members for a, members in zip(arguments, self._members, strict=True)):
+            return None
+        self._found = {}
+        all_hold(self._tests, facts, [*arguments, *self._terms[len(arguments) :]])
+        return written(sum(self._found.values(), Fraction(0)))

@@ -14,14 +14,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import product
 from operator import contains
 from typing import TypeAlias
 
 from confab.planner.checked_amounts import changed, worth
 from confab.planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
-from confab.planner.checked_definitions import Definitions, stratum_of
+from confab.planner.checked_definitions import Definitions, Total, stratum_of
 from confab.planner.plan import Plan, Step
-from confab.reasoner.amounts import meets
+from confab.reasoner.amounts import Quantity, meets
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -190,7 +191,7 @@ class _Check:
                 self.facts.put(situation, arguments, value)
             if behavior.level < self.depth and self.facts.since(mark):
                 self.fault(step.path, f"{step}: it isn't refined, and other steps are")
-            return True
+            return self.within_bounds(step)
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
         if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
             return False
@@ -199,6 +200,19 @@ class _Check:
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
             if cell in wanted or self.problem.sees(behavior.level, symbol, said[cell]):
                 self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
+        return True
+
+    def within_bounds(self, step: Step) -> bool:
+        """Note which totals a step leaves outside their bounds; whether there are none."""
+        for name in self.rules.bounded:
+            kind = self.problem.domain.situations[name]
+            for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
+                got = self.facts.value(name, arguments)
+                if got is not None and kind.quantity is not None and not kind.quantity.allows(Fraction(got)):
+                    self.fault(
+                        step.path, f"{step}: it leaves {Symbol(name, arguments)} = {got}, which is out of its bounds"
+                    )
+                    return False
         return True
 
 
@@ -229,6 +243,7 @@ class Facts:
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
+        self._totals: dict[Cell, str | None] = {}  # of the present state
         for symbol, value in state.items():
             self._values[symbol.situation][symbol.arguments] = value
 
@@ -238,6 +253,10 @@ class Facts:
             if not self.exists(situation, arguments):
                 return None
             return TRUE if self._definitions.follows((situation, arguments)) else FALSE
+        if situation in self.rules.totals:
+            if (situation, arguments) not in self._totals:
+                self._totals[situation, arguments] = self.rules.totals[situation].value(self, arguments)
+            return self._totals[situation, arguments]
         value = self._values[situation].get(arguments)
         return FALSE if value is None and self.exists(situation, arguments) else value
 
@@ -274,6 +293,7 @@ class Facts:
             return
         self.log.append((situation, arguments, old))
         self._values[situation][arguments] = value
+        self._totals.clear()
         if self.problem.domain.rules:
             self._definitions.forget()
         if situation in self._holders:
@@ -303,6 +323,10 @@ class Rules:
         self._read: dict[str, _Behavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
         self._defined: dict[str, list[_Behavior]] = {}
+        self.totals = {name: Total(self, one) for name, one in problem.domain.aggregates.items() if one.kept}
+        self.bounded = [
+            name for name in self.totals if problem.domain.situations[name].quantity not in (None, Quantity())
+        ]
 
     def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
         """Whether one of the rules of a situation type gives it of some arguments."""

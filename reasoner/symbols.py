@@ -13,6 +13,7 @@ situation type                the variable's property, and its domain    `Situat
 behaviour                     action schema                              `Behavior`
 quantified behaviour          ground action                              `GroundBehavior`
 (none)                        derived predicate, and its axioms          `Rule`
+(none)                        derived amount: sum, count, extremum       `Aggregate`
 ============================  =========================================  =====================
 """
 
@@ -383,6 +384,57 @@ class Rule:
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
 
 
+AGGREGATES = ("sum", "count", "max", "min")
+"""The functions of an aggregate."""
+
+
+@dataclass(frozen=True)
+class Aggregate:
+    """A rule of a derived amount: in every state the sum, count, maximum or minimum over all solutions of its conditions.
+
+    A solution assigns an individual to each of the `variables`. One for which `amount` is not defined is left out. A sum or
+    count without solutions is zero; a maximum or minimum without any doesn't exist. No behaviour that an author writes changes
+    a derived amount; `confab.reasoner.aggregates` adds the effects that keep it up to date.
+
+    Parameters
+    ----------
+    situation : str
+        The situation type of the amount.
+    function : str
+        One of `AGGREGATES`.
+    amount : Expression
+        What is added up or compared; 1 for a count.
+    parameters : tuple of Parameter
+        The names of its arguments in the conditions, and their classes.
+    variables : tuple of Parameter
+        What is aggregated over.
+    conditions : tuple of Condition
+    """
+
+    situation: str
+    function: str
+    amount: Expression
+    parameters: tuple[Parameter, ...]
+    variables: tuple[Parameter, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+
+    @cached_property
+    def kept(self) -> bool:
+        """Whether the amount is part of each state; a maximum or minimum is replaced by conditions instead."""
+        return self.function in ("sum", "count")
+
+    @cached_property
+    def kinds(self) -> Mapping[str, str]:
+        """The class of each parameter and variable."""
+        return {term.name: term.kind for term in (*self.parameters, *self.variables)}
+
+    @cached_property
+    def behavior(self) -> Behavior:
+        """The aggregate as a behaviour that changes its amount, for functions that look for what an amount depends on."""
+        head = AmountEffect(self.situation, tuple(p.name for p in self.parameters), "increase", self.amount)
+        return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, cost=0.0, amounts=(head,))
+
+
 @dataclass(frozen=True, order=True)
 class GroundBehavior:
     """A quantified behaviour with the ID that its level's numbering gives it."""
@@ -400,13 +452,14 @@ class GroundBehavior:
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
-    `rules` has the defined situation types, each with its rules.
+    `rules` has the defined situation types, each with its rules; `aggregates` the derived amounts.
     """
 
     situations: Mapping[str, SituationType]
     behaviors: Mapping[str, Behavior]
     first_ids: Mapping[int, int] = field(default_factory=dict)
     rules: Mapping[str, tuple[Rule, ...]] = field(default_factory=dict)
+    aggregates: Mapping[str, Aggregate] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[int, ...]:

@@ -19,12 +19,14 @@ from heapq import heappop, heappush
 from itertools import product
 from typing import Any
 
+from confab.reasoner.aggregates import in_order
 from confab.reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import situations_of, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     AnyOf,
     Behavior,
@@ -113,7 +115,7 @@ class Interpreter:
         self.constants: dict[Symbol, Any] = {}
         initial: list[Any] = []
         for name, kind in self.kinds.items():
-            if name in domain.rules:
+            if name in domain.rules or name in domain.aggregates:
                 continue
             for arguments in product(*(problem.classes.get(of, ()) for of in kind.arguments)):
                 symbol = Symbol(name, arguments)
@@ -132,6 +134,11 @@ class Interpreter:
                 self.slots[Symbol(name, arguments)] = len(initial)
                 initial.append(FALSE)
         self.symbols = list(self.slots)
+        for name in domain.aggregates:
+            for arguments in product(*(problem.classes.get(of, ()) for of in self.kinds[name].arguments)):
+                self.slots[Symbol(name, arguments)] = len(initial)
+                initial.append(0)
+        self.totals = [made for one in in_order(domain.aggregates) for made in self.aggregated(one)]
         self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
         self.initial = self.closed(initial)
         self.rests = self.unsettled()
@@ -244,9 +251,11 @@ class Interpreter:
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
     def closed(self, values: list[Any]) -> State:
-        """Return a state with all derived values, group by group, beginning with none."""
-        for slot in range(self.stated, len(values)):
+        """Return a state with all derived values: amounts, then rules, group by group, beginning with none."""
+        for slot in range(self.stated, len(self.symbols)):
             values[slot] = FALSE
+        for slot, total in self.totals:
+            values[slot] = total(values)
         for group, recursive in self.rules:
             more = True
             while more:
@@ -255,6 +264,23 @@ class Interpreter:
                     values[slot] = TRUE
                 more = recursive and bool(found)
         return tuple(values)
+
+    def aggregated(self, one: Aggregate) -> Iterator[tuple[int, Any]]:
+        """Yield the symbols of a derived amount, each with a function from a state to its number."""
+        kinds = {term.name: term.kind for term in (*one.parameters, *one.variables)}
+        for arguments in product(*(self.problem.classes.get(p.kind, ()) for p in one.parameters)):
+            symbol = Symbol(one.situation, arguments)
+            if symbol not in self.slots:
+                continue
+            terms = dict(zip((p.name for p in one.parameters), arguments, strict=True))
+            numbers = []
+            for values in product(*(self.problem.classes.get(v.kind, ()) for v in one.variables)):
+                solution = {**terms, **dict(zip((v.name for v in one.variables), values, strict=True))}
+                when = self.some(one.conditions, solution, kinds)
+                if when != "False":
+                    numbers.append(f"({self.worth(one.amount, solution)} if {when} else nan)")
+            said = f"aggregated({one.function!r}, [{', '.join(numbers)}])"
+            yield self.slots[symbol], eval(f"lambda s: {said}", {**NAMES, "aggregated": aggregated})
 
     def actions(self, level: int) -> list[Action]:
         """Return the quantified behaviours of a level that some state may allow."""
@@ -297,7 +323,9 @@ class Interpreter:
                     limits[slot] = self.limit(symbol, f"t[{slot}]")
         lines += [f" if not ({limit}): return None" for limit in limits.values()]
         price = repr(one.cost) if one.price is None else self.worth(one.price, terms)
-        lines.append(f" return {price}, closed(t)")
+        lines.append(" t = closed(t)")
+        lines += [f" if not ({limit}): return None" for limit in self.limits()]
+        lines.append(f" return {price}, t")
         names: dict[str, Any] = {**NAMES, "closed": self.closed}
         exec("\n".join(lines), names)
         return names["outcome"]
@@ -317,6 +345,14 @@ class Interpreter:
                     else:
                         said = self.worth(effect.amount, trial)
                     yield "" if when == "True" else f" if {when}:", symbol, said
+
+    def limits(self) -> Iterator[str]:
+        """Yield that each sum and count is within its bounds."""
+        for name, one in self.problem.domain.aggregates.items():
+            quantity = self.kinds[name].quantity
+            if one.kept and quantity is not None and (quantity.least, quantity.most) != (None, None):
+                for symbol in (s for s in self.slots if s.situation == name):
+                    yield self.limit(symbol, f"t[{self.slots[symbol]}]")
 
     def limit(self, symbol: Symbol, amount: str) -> str:
         """Return that an amount is within its bounds."""
@@ -428,6 +464,16 @@ def _negated(said: str, negated: bool) -> str:
     if not negated:
         return said
     return {"True": "False", "False": "True"}.get(said, f"not ({said})")
+
+
+def aggregated(function: str, numbers: Sequence[Any]) -> Any:
+    """Return a sum, a count, a maximum or a minimum of those numbers that are there."""
+    found = [one for one in numbers if one == one]
+    if function == "count":
+        return len(found)
+    if function == "sum":
+        return sum(found)
+    return {"max": max, "min": min}[function](found) if found else NOTHING
 
 
 NAMES: dict[str, Any] = {"nan": NOTHING, "divided": divided, "Fraction": Fraction}

@@ -17,10 +17,13 @@ from itertools import product
 from random import Random
 from typing import Any
 
+from confab.reasoner.aggregates import read_by
 from confab.reasoner.amounts import Quantity, written
+from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     Behavior,
     Condition,
@@ -48,6 +51,8 @@ EXCLUDED = 0.33
 TRIES = 8
 NEAR = 0.25
 """Share of one-step goals that are kept."""
+AGGREGATED = 0.4
+"""Share of worlds with derived sums, counts, maxima or minima."""
 UPDATES = 0.15
 """Share of worlds in which some behaviours are written as SPARQL updates, which take long to read."""
 
@@ -139,6 +144,7 @@ class _Wishes:
             changed = [s for s, i in self.of.slots.items() if source[i] != self.of.initial[i]]
             if kind == "random" or not changed or rng.random() < 0.15:
                 changed = self.of.symbols
+            changed = [symbol for symbol in changed if self.wished(symbol)]
             if not changed:
                 return {}
             symbol = rng.choice(changed)
@@ -149,6 +155,11 @@ class _Wishes:
             value = self.random(symbol) if kind == "random" else self.of.value(source, symbol)
             found.setdefault(symbol, self.said(symbol, value))
         return dict(sorted(found.items()))
+
+    def wished(self, symbol: Symbol) -> bool:
+        """Return whether a goal may name a symbol: no maximum or minimum."""
+        aggregate = self.of.problem.domain.aggregates.get(symbol.situation)
+        return aggregate is None or aggregate.kept
 
     def random(self, symbol: Symbol) -> object:
         kind = self.of.kinds[symbol.situation]
@@ -164,6 +175,17 @@ class _Wishes:
         number = number if number.denominator in (1, 2, 4) and abs(number) < 100 else Fraction(1)
         number += {"<": 1, ">": -1}.get(sign, 0)
         return written(number) if sign == "=" else f"{sign}{written(number)}"
+
+
+def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:
+    """Return whether an aggregate needs what is defined by itself."""
+    waiting, seen = list(read_by(aggregate)), set[str]()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen and name in rules:
+            seen.add(name)
+            waiting += [s for rule in rules[name] for s in named(rule.conditions)]
+    return bool(seen & circular(rules))
 
 
 class _Draft(Vocabulary):
@@ -187,13 +209,23 @@ class _Draft(Vocabulary):
         for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
             self.situation(number)
         self.static()
+        own = Random(f"aggregates {self.seed}")  # so that worlds without any are those of earlier versions
+        many = own.choice((1, 1, 2)) if own.random() < AGGREGATED else 0
+        first = own.random() < 0.5
+        for number in range(many if first else 0):
+            self.aggregated(number)
         for number in range(self.rng.choice((0, 0, 1, 1, 2))):
             self.defined(number)
+        for number in range(0 if first else many):
+            self.aggregated(number)
         behaviors = self.behaviors()
         used = {b.level for b in behaviors}
         self.levels = max(used)
-        domain = Domain(self.situations, {b.name: b for b in behaviors}, rules=self.rules)
+        aggregates = self.aggregates
+        domain = Domain(self.situations, {b.name: b for b in behaviors}, rules=self.rules, aggregates=aggregates)
         problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
+        if aggregates:
+            problem = self.bounded(problem)
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
         return World(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
 
@@ -328,6 +360,62 @@ class _Draft(Vocabulary):
         level = max((self.situations[s].level for rule in rules for s in named(rule.conditions)), default=1)
         self.situations[name] = SituationType(name, arguments, "Truth", level, boolean=True, default=FALSE)
         self.rules[name] = tuple(rules)
+
+    def aggregated(self, number: int) -> None:
+        """Draw a sum, a count, a maximum or a minimum over individuals."""
+        rng, name = self.rng, f"S{number}"
+        kind = rng.choice(("A", "B", "A1"))
+        arguments: tuple[str, ...] = (kind,) if self.chance(0.8) else (kind, rng.choice(("A", "B")))
+        for _ in range(TRIES):
+            writer = Phrases(self, HIGHEST)
+            parameters = [writer.fresh(of) for of in arguments]
+            over = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((1, 1, 1, 2)))]
+            bound = [*parameters, *over]
+            conditions = [self.joining(writer, over[0], parameters[0])] if self.chance(0.6) else []
+            conditions += writer.conditions(bound, rng.choice((0, 1, 1, 2)) + (not conditions), 1)
+            function = rng.choice(("sum", "sum", "count", "count", "max", "min"))
+            by = None if function == "count" else writer.number(bound, 1, extrema=False)
+            amount = Fraction(1) if function == "count" else by or Fraction(rng.choice((1, 2)))
+            terms = writer.terms()
+            made = Aggregate(
+                name, function, amount, terms[: len(arguments)], terms[len(arguments) :], tuple(conditions)
+            )
+            if not _recursive(made, self.rules):
+                break
+        else:
+            return
+        self.owners[name] = (kind,) if len(arguments) == 1 else ()
+        level = max((self.situations[s].level for s in read_by(made)), default=1)
+        self.situations[name] = SituationType(name, arguments, name, level, quantity=Quantity())
+        self.aggregates[name] = made
+
+    def joining(self, writer: Phrases, one: str, other: str) -> Condition:
+        """Return a condition by which one individual leads to another, if there is one."""
+        of = set(writer.kinds_of(one))
+        found = [
+            s
+            for s in self.situations.values()
+            if len(s.arguments) == 1
+            and of & set(self.classes[s.arguments[0]])
+            and set(writer.kinds_of(other)) & set(self.classes.get(s.range, ()))
+        ]
+        if not found:
+            return writer.value([one, other], one)
+        return ValueCondition(self.rng.choice(found).name, (one,), other)
+
+    def bounded(self, problem: Problem) -> Problem:
+        """Return the problem with bounds of some sums and counts that hold at first."""
+        meant, situations = Interpreter(problem), dict(problem.domain.situations)
+        for name, one in self.aggregates.items():
+            first = [meant.initial[i] for symbol, i in meant.slots.items() if symbol.situation == name]
+            if not one.kept or not first or not self.chance(0.3):
+                continue
+            most = Fraction(max(first)) + self.rng.choice((0, 1, 2))
+            least = Fraction(min(first)) - self.rng.choice((0, 1)) if self.chance(0.2) else None
+            if most.denominator in (1, 2, 4) and (least is None or least.denominator in (1, 2, 4)):
+                situations[name] = replace(situations[name], quantity=Quantity("", False, least, most))
+        self.situations = situations
+        return replace(problem, domain=replace(problem.domain, situations=situations))
 
     def along(self, name: str, base: str) -> None:
         """Draw a situation type defined by its property: a transitive superproperty, or a chain with a relation."""

@@ -11,6 +11,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, si
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     AnyOf,
     ClassCondition,
@@ -50,6 +51,7 @@ class Vocabulary:
         self.relations: dict[str, frozenset[tuple[str, ...]]] = {}
         self.ends: dict[str, tuple[str, ...]] = {}
         self.rules: dict[str, tuple[Rule, ...]] = {}
+        self.aggregates: dict[str, Aggregate] = {}
         self.objects: tuple[str, ...] = ()
 
 
@@ -82,7 +84,7 @@ class Phrases:
             one
             for one in self.draft.situations.values()
             if one.level <= self.level and (one.quantity is not None) is quantity
-            and not (changeable and one.name in self.draft.rules)
+            and not (changeable and (one.name in self.draft.rules or one.name in self.draft.aggregates))
         ]  # fmt: skip
 
     def term(self, bound: Sequence[str], kind: str) -> str | None:
@@ -211,16 +213,17 @@ class Phrases:
             left, self.rng.choice(("<", "<=", "=", ">=", ">")), right, negated and self.rng.random() < 0.5
         )
 
-    def number(self, bound: Sequence[str], depth: int) -> Expression | None:
-        """Return a calculation; None if there are no numbers."""
-        rng, seen = self.rng, self.seen(quantity=True)
+    def number(self, bound: Sequence[str], depth: int, extrema: bool = True) -> Expression | None:
+        """Return a calculation; None if there are no numbers. Only conditions read maxima and minima."""
+        rng, aggregates = self.rng, self.draft.aggregates
+        seen = [s for s in self.seen(quantity=True) if extrema or s.name not in aggregates or aggregates[s.name].kept]
         if not seen:
             return None
         if depth and rng.random() < 0.2:
-            left, sign = self.number(bound, 0), rng.choice("+-*//")
+            left, sign = self.number(bound, 0, extrema), rng.choice("+-*//")
             right: Expression | None = Fraction(rng.choice((0, 1, 2, 2)))
             if rng.random() < 0.4:
-                right = self.number(bound, 0)
+                right = self.number(bound, 0, extrema)
             if (
                 sign in "*/" and isinstance(right, Amount) and rng.random() < 0.98
             ):  # nothing multiplies what both change
@@ -251,7 +254,7 @@ class Phrases:
     def effect(self, bound: list[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
         """Draw an effect, unless it would contradict an existing one."""
         rng, draft = self.rng, self.draft
-        of_numbers = self.seen(quantity=True)
+        of_numbers = self.seen(quantity=True, changeable=True)
         one = rng.choice([*self.seen(changeable=True), *of_numbers] or [None])
         if one is None:
             return
@@ -285,7 +288,7 @@ class Phrases:
             if operation == "scale":
                 by = rng.choice((Fraction(2), Fraction(0), Fraction(1, 2)))
             elif rng.random() < 0.2:
-                by = self.number(bound, 1) or by
+                by = self.number(bound, 1, extrema=False) or by
             numbers.append(AmountEffect(one.name, arguments, operation, by, when, each))
             return
         if one.boolean:

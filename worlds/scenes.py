@@ -9,6 +9,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bo
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -75,6 +76,8 @@ class _Scene:
             yield from self.world.axioms.get(name, ())
             for number, rule in enumerate(() if name in self.world.axioms else rules):
                 yield from self.rule(f"{name}.r{number}", rule)
+        for aggregate in self.problem.domain.aggregates.values():
+            yield from self.aggregate(aggregate)
         for index, behavior in enumerate(self.problem.domain.behaviors.values(), start=1):
             yield from self.behavior(index, behavior)
         yield from self.individuals()
@@ -105,7 +108,8 @@ class _Scene:
 
     def situation(self, one: SituationType) -> Iterator[str]:
         name, owners = one.name, self.world.owners[one.name]
-        said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in self.problem.domain.rules else []
+        derived = {*self.problem.domain.rules, *self.problem.domain.aggregates}
+        said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in derived else []
         said += [f"c:restValue {_iri(one.rest)}"] if one.rest is not None else []
         quantity = one.quantity
         if quantity is None and one.default not in (None, FALSE, one.rest):
@@ -150,6 +154,18 @@ class _Scene:
         said = [f"c:condition {', '.join(conditions)}"] if conditions else []
         yield self.node(name, "owl:NamedIndividual, c:Rule", *head, *said)
         yield from self.declared(rule.behavior)
+        yield from self.nodes
+
+    def aggregate(self, one: Aggregate) -> Iterator[str]:
+        name = f"{one.situation}.total"
+        self.begin(name, [p.name for p in (*one.parameters, *one.variables)])
+        conditions = [self.condition(condition) for condition in one.conditions]
+        said = [f"c:situationType :{one.situation}", *self.arguments([p.name for p in one.parameters])]
+        said += [f'c:aggregate "{one.function}"', f"c:over {', '.join(self.terms[v.name] for v in one.variables)}"]
+        said += [self.side("right", one.amount)] if one.function != "count" else []
+        said += [f"c:condition {', '.join(conditions)}"] if conditions else []
+        yield self.node(name, "owl:NamedIndividual, c:Rule", *said)
+        yield from self.declared(one.behavior)
         yield from self.nodes
 
     def begin(self, name: str, terms: Sequence[str]) -> None:

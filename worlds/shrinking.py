@@ -71,6 +71,10 @@ def smaller_worlds(world: World) -> Iterator[World]:
             yield replace(
                 world, problem=replace(problem, domain=replace(domain, rules={**domain.rules, name: smaller_rules}))
             )
+    for name, aggregate in domain.aggregates.items():
+        for conditions in _smaller(aggregate.conditions):
+            aggregates = {**domain.aggregates, name: replace(aggregate, conditions=conditions)}
+            yield replace(world, problem=replace(problem, domain=replace(domain, aggregates=aggregates)))
     for name in world.updates:
         yield replace(world, updates=world.updates - {name})
     for symbol, value in problem.initial.items():
@@ -159,6 +163,7 @@ def _without_situation(world: World, name: str) -> World:
     domain = Domain(
         {n: s for n, s in problem.domain.situations.items() if n != name}, problem.domain.behaviors,
         rules={n: r for n, r in problem.domain.rules.items() if n != name},
+        aggregates={n: a for n, a in problem.domain.aggregates.items() if n != name},
     )  # fmt: skip
     values = [v for v in problem.classes.get(name, ()) if v.startswith(name)]
     parents = {kind: tuple(p for p in above if p != name) for kind, above in world.parents.items()}
@@ -194,7 +199,8 @@ def _mentioned(name: str, world: World) -> bool:
     """Return whether a situation type is used."""
     problem = world.problem
     domain = problem.domain
-    rules = [rule.conditions for other, its in domain.rules.items() if other != name for rule in its]
+    rules: list[Any] = [rule.conditions for other, its in domain.rules.items() if other != name for rule in its]
+    rules += [aggregate for other, aggregate in domain.aggregates.items() if other != name]
     lines = [line for other, its in world.axioms.items() if other != name for line in its]
     return (
         any(symbol.situation == name for symbol in problem.goal)

@@ -15,6 +15,7 @@ from confab.page.data import PageData, ReadyQuery, Turnable, TurnableRow, page_d
 from confab.planner.plan import Limits
 from confab.planner.solve import DEFAULT_MODE, Request, solve
 from confab.planning import Result
+from confab.reasoner.aggregates import following
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.names import nearest
@@ -119,6 +120,7 @@ class Sheet:
         initial, goal = dict(self.problem.initial), dict(self.problem.goal)
         for key, value in by.get("facts", {}).items():
             initial[symbols[key]] = self._checked(key, value)
+        initial = following(self.problem, initial)
         for key, wanted in by.get("goals", {}).items():
             goal.pop(symbols[key], None)
             if wanted is not None:

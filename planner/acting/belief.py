@@ -11,6 +11,7 @@ from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.validation import successor
+from confab.reasoner.aggregates import following
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import (
     FALSE,
@@ -77,6 +78,7 @@ class Belief:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
         now.update(seen)
+        now = following(self.problem, now)
         surprises = []
         for symbol in sorted(expected.keys() | now.keys()):
             default = FALSE if self.boolean(symbol) else None

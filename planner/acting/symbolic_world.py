@@ -10,6 +10,7 @@ from confab.planner.acting.episode import Change, Intervention
 from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.planner.validation import successor
+from confab.reasoner.aggregates import following
 from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol
 
@@ -90,7 +91,7 @@ class SymbolicWorld:
         if intervention.change is Change.PUSH:
             self._add_spot(intervention.individual)
             return
-        after = disturbed(self.problem, self.state, intervention)
+        after = following(self.problem, disturbed(self.problem, self.state, intervention))
         refuse_impossible(self.problem, self.state, after, f"'{intervention.text}' can't happen")
         self.state = after
 

@@ -247,8 +247,8 @@ def load(
 
 
 def write_out(graph: KnowledgeGraph) -> list[Fault]:
-    """Add the individuals of behaviours that are written as SPARQL updates; return the updates that can't be read."""
-    texts = [ox.NamedNode(CORE + name) for name in ("update", "extends")]
+    """Add the individuals of behaviours and rules that are written in SPARQL; return the texts that can't be read."""
+    texts = [ox.NamedNode(CORE + name) for name in ("update", "extends", "construct")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []
     from confab.reasoner.updates.compiling import compiled
@@ -261,14 +261,15 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
 
 
 def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
-    """Return for each behaviour that is written as an update the prefixes of its file."""
+    """Return for each behaviour or rule that is written in SPARQL the prefixes of its file."""
     prefixes: dict[str, dict[str, str]] = {}
     for file in graph.files.values():
         with readable(file) as (content, form):
-            if b"update" not in content:
+            if b"update" not in content and b"construct" not in content:
                 continue
             parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
-            behaviors = [str(quad.subject)[1:-1] for quad in parser if quad.predicate.value == CORE + "update"]
+            texts = (CORE + "update", CORE + "construct")
+            behaviors = [str(quad.subject)[1:-1] for quad in parser if quad.predicate.value in texts]
             own = dict(parser.prefixes)
             prefixes |= dict.fromkeys(behaviors, own)
     return prefixes

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
+from confab.reasoner.aggregates import following
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.names import Names
@@ -76,7 +77,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
                 "give the file that 'confab run' or 'confab execute' wrote"
             )
     problem = reading.problem
-    now = {**problem.initial, **seen}
+    now = following(problem, {**problem.initial, **seen})
     try:
         refuse_impossible(problem, problem.initial, now, str(path))
     except ImpossibleStateError as error:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import (
     COMPARING,
     OPERATIONS,
@@ -14,8 +15,10 @@ from confab.reasoner.amounts import (
     Calculation,
     Expression,
     Measure,
+    terms_of,
 )
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import groups, mentions
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import (
@@ -28,8 +31,10 @@ from confab.reasoner.reading.rows import (
     whole_number,
 )
 from confab.reasoner.symbols import (
+    AGGREGATES,
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     AnyOf,
     Behavior,
@@ -423,6 +428,35 @@ class Parts:
         situation, arguments, value = self.situation_and_value(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
+        parameters, variables, conditions = self.head_and_body(iri, situation, arguments, kinds)
+        return Rule(situation, parameters, variables, conditions)
+
+    def aggregate(self, iri: str, kinds: Sequence[str]) -> Aggregate:
+        """Return the rule of a derived amount with arguments of some classes."""
+        function, derived = self.word(iri, "aggregate", AGGREGATES), self.measured(iri)
+        if not isinstance(derived, Amount):
+            raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it an :Amount")
+        if function == "count" and (self.values(iri, "right") or self.values(iri, "amount")):
+            raise KnowledgeError(
+                f"<{iri}> counts, and names a number besides; drop it, or aggregate by sum, max or min"
+            )
+        number = Fraction(1) if function == "count" else self.right(iri)
+        parameters, variables, conditions = self.head_and_body(iri, derived.situation, derived.arguments, kinds)
+        over = {self.term(term) for term in self.values(iri, "over")}.union(*map(mentions, filter(_plain, conditions)))
+        over |= {*terms_of(number)}
+        counted = tuple(one for one in variables if one.name in over)
+        if not counted:
+            raise KnowledgeError(
+                f"<{iri}> aggregates over nothing; let :over name the variable that it counts or adds up"
+            )
+        bound = frozenset(one.name for one in (*parameters, *counted))
+        asked = closed(conditions, bound, {one.name: one.kind for one in (*parameters, *variables)})
+        return Aggregate(derived.situation, function, number, parameters, counted, asked)
+
+    def head_and_body(
+        self, iri: str, situation: str, arguments: Sequence[str], kinds: Sequence[str]
+    ) -> tuple[tuple[Parameter, ...], tuple[Parameter, ...], tuple[Condition, ...]]:
+        """Return the parameters, the other variables and the conditions of a rule."""
         if len(arguments) != len(kinds):
             raise KnowledgeError(f"<{iri}> speaks of {situation} with {len(arguments)} arguments; it has {len(kinds)}")
         parameters: list[Parameter] = []
@@ -438,7 +472,7 @@ class Parts:
         membership = (c for t in sorted(own.values()) for c in self.membership(t))
         variables = tuple(self.parameter(t) for name, t in sorted(own.items()) if name not in names)
         conditions = (*compared, *self.conditions(iri, "condition"), *membership)
-        return Rule(situation, tuple(parameters), variables, conditions)
+        return tuple(parameters), variables, conditions
 
     def terms_below(self, iri: str) -> set[str]:
         """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
@@ -456,6 +490,10 @@ class Parts:
                         seen.add(value)
                         waiting.append(value)
         return found - bound
+
+
+def _plain(condition: Condition) -> bool:
+    return not groups(condition)
 
 
 def _is_part(node: Node) -> bool:

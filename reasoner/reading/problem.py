@@ -21,6 +21,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 
+from confab.reasoner.aggregates import compiled, in_order, read_by, unfolded, with_totals
 from confab.reasoner.amounts import (
     Amount,
     Quantity,
@@ -29,7 +30,7 @@ from confab.reasoner.amounts import (
 )
 from confab.reasoner.derivation import circles, needed
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.language import walk
+from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import check
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.possible import values_at_fault
@@ -58,6 +59,7 @@ from confab.reasoner.reading.times import with_times
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     Behavior,
     Comparison,
@@ -72,10 +74,11 @@ from confab.reasoner.symbols import (
     Symbol,
     ValueCondition,
     ValueEffect,
-    spread,
 )
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
+TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
+"""What is said as text, which a store elsewhere doesn't write out."""
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 KINDS = (
     "SituationType",
@@ -192,7 +195,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         if not count % 4096:
             check("reading the scene")
         parts[text(part)].append(core_triple(row))
-    written = [triple for triple in parts["node"] if graph.remote and triple[1] in (CORE + "update", CORE + "extends")]
+    written = [triple for triple in parts["node"] if graph.remote and triple[1] in TEXTS]
     if written:  # a store elsewhere has the text alone
         from confab.reasoner.updates.compiling import compiled
 
@@ -285,19 +288,26 @@ def frame(
         in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
     rules = _rules(parts, schema, {s.name: s for s in situations})
+    aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules)
     domain = Domain(
-        situations={s.name: s for s in _on_their_levels(situations, rules)},
-        behaviors={name: spread(behavior, classes) for name, behavior in lifted.items()},
+        situations={s.name: s for s in _on_their_levels(situations, rules, aggregates)},
+        behaviors=lifted,
         first_ids={
             parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
         },
         rules=rules,
+        aggregates=aggregates,
     )
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
-    for rule in chain.from_iterable(rules.values()):
-        _check_behavior(replace(rule.behavior, level=domain.situations[rule.situation].level), domain)
+    following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]
+    for one in following:
+        _check_behavior(replace(one.behavior, level=domain.situations[one.situation].level), domain)
     _asked(domain)
+    try:
+        domain = compiled(domain, classes)
+    except DomainError as error:
+        raise KnowledgeError(str(error)) from None
     return Frame(schema, parts, domain, classes, parents, properties, lifted)
 
 
@@ -334,6 +344,8 @@ def reading_of(
     schema, names = known.schema, known.names
     relations, stated = _facts(facts, {**tuples, **schema.facts}, known.properties, known.domain, names, schema.numbers)
     initial = _initial(known.domain, known.classes, stated, names)
+    initial = with_totals(known.domain, known.classes, relations, initial)
+    check_values(initial, known.domain, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
     wanted = with_task(problem, known.parts, schema.of_kind("Task"))
@@ -353,7 +365,8 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     }
     written: dict[str, list[str]] = defaultdict(list)
     for iri in schema.of_kind("Rule"):
-        written[parts.one(iri, "situationType")].append(iri)
+        if not parts.values(iri, "aggregate"):
+            written[parts.one(iri, "situationType")].append(iri)
     arguments = {iri: situations[parts.names.short(iri)].arguments for iri in schema.of_kind("SituationType")}
     by_swrl = swrl.compiled(parts.definitions, arguments) if schema.swrl else {}
     found: dict[str, tuple[Rule, ...]] = {}
@@ -367,9 +380,14 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
                     who,
                 )
             if not situations[name].boolean:
+                mend = (
+                    "state the :aggregate of the rule"
+                    if situations[name].quantity
+                    else "make its value property not functional"
+                )
                 raise KnowledgeError(
-                    f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false: "
-                    "make its value property not functional"
+                    f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false, or an amount that is "
+                    f"aggregated: {mend}"
                 )
         rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
         if said and len(kinds) != 1:
@@ -396,16 +414,57 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     return found
 
 
+def _aggregates(
+    parts: Parts,
+    schema: Schema,
+    situations: Mapping[str, SituationType],
+    rules: Mapping[str, Sequence[Rule]],
+) -> dict[str, Aggregate]:
+    """Return the derived amounts, each behind those that it reads.
+
+    Raises
+    ------
+    KnowledgeError
+        A behaviour changes one, one has two rules, isn't an amount, or depends on itself.
+    """
+    found: dict[str, Aggregate] = {}
+    for iri in schema.of_kind("Rule"):
+        if not parts.values(iri, "aggregate"):
+            continue
+        situation = parts.one(iri, "situationType")
+        name = parts.names.short(situation)
+        if name in found:
+            raise KnowledgeError(f"<{iri}>: {name} has two rules; a derived amount has one", iri)
+        for effect in schema.of_kind("AmountEffect"):
+            if list(parts.values(effect, "situationType")) == [situation]:
+                raise KnowledgeError(
+                    f"<{effect}> changes {name}, which is defined by <{iri}>; take the effect out, or drop the rule",
+                    effect,
+                )
+        try:
+            found[name] = unfolded(parts.aggregate(iri, situations[name].arguments), rules)
+        except DomainError as error:
+            raise KnowledgeError(f"<{iri}>: {error}", iri) from None
+    try:
+        return {one.situation: one for one in in_order(found)}
+    except DomainError as error:
+        raise KnowledgeError(str(error), parts.names.iri(str(error).split()[0])) from None
+
+
 def _on_their_levels(
-    situations: Iterable[SituationType], rules: Mapping[str, Sequence[Rule]]
+    situations: Iterable[SituationType],
+    rules: Mapping[str, Sequence[Rule]],
+    aggregates: Mapping[str, Aggregate],
 ) -> Iterator[SituationType]:
     """Yield situation types; what is defined exists from the level on that has all that it is defined by."""
     known = {s.name: s for s in situations}
     before = None
+    reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
+    reads |= {name: {*read_by(one)} for name, one in aggregates.items()}
     while before != known:
         before = dict(known)
-        for name, its in rules.items():
-            read = {s for rule in its for s, _ in needed(rule.conditions)} | {name}
+        for name, its in reads.items():
+            read = its | {name}
             known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))
     yield from known.values()
 
@@ -589,6 +648,11 @@ def _facts(
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+        if symbol.situation in domain.aggregates:
+            raise KnowledgeError(
+                f"{symbol} is stated, but a rule defines it; drop the fact, or the rule of {symbol.situation}",
+                names.iri(symbol.arguments[0]) if symbol.arguments[0] in names else "",
+            )
         check_arguments(symbol, domain, "a fact")
     for relation, pairs in numbered.items():
         _check_numbers(relation, pairs, relations.get(relation, ()))
@@ -610,6 +674,7 @@ def _asked(domain: Domain) -> dict[str, int]:
     """Return how many individuals conditions name for each relation without a number; raise `KnowledgeError` if they differ."""
     found: dict[str, int] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
+    rules += [aggregate.behavior for aggregate in domain.aggregates.values()]
     for behavior in (*domain.behaviors.values(), *rules):
         for one in (inner for condition in behavior.conditions for inner in walk(condition)):
             if not isinstance(one, RelationCondition):
@@ -637,7 +702,7 @@ def _initial(
 ) -> dict[Symbol, str]:
     initial = {}
     for situation in domain.situations.values():
-        if situation.boolean:
+        if situation.boolean or situation.name in domain.aggregates:
             continue
         for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
             symbol = Symbol(situation.name, arguments)
@@ -655,7 +720,6 @@ def _initial(
         kinds = domain.situations[symbol.situation].arguments
         if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
             initial[symbol] = TRUE  # of others it isn't asked
-    check_values(initial, domain, names)
     return initial
 
 

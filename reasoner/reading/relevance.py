@@ -129,7 +129,8 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: LookedUp = {}
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
-    doing = [_Doing(behavior) for behavior in (*known.lifted.values(), *rules)]
+    aggregates = (aggregate.behavior for aggregate in known.domain.aggregates.values())
+    doing = [_Doing(behavior) for behavior in (*known.lifted.values(), *rules, *aggregates)]
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
         for one in doing:

@@ -21,8 +21,10 @@ from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
 FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
-DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update"))
-DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
+DATA = frozenset(
+    CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct")
+)
+DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
 """What the core says of its nodes in numbers, signs, durations, truth values and text; all else leads to other nodes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pyoxigraph as ox
 
@@ -14,8 +14,9 @@ from confab.reasoner.updates.words import UpdateError
 from confab.reasoner.vocabulary import CORE, PREFIXES
 
 UPDATES = """SELECT ?behavior ?property ?value WHERE {
-  VALUES ?property { :update :extends } ?behavior ?property ?value
+  VALUES ?property { :update :extends :construct } ?behavior ?property ?value
   FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
+  FILTER(?property != :construct || NOT EXISTS { ?behavior :situationType ?situation })
 } ORDER BY ?behavior ?property ?value"""
 """Of behaviours that aren't written out already, as they are in a store that took them from files."""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
@@ -64,9 +65,11 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
     """
     texts: dict[str, str] = {}
     extends: dict[str, list[str]] = {}
+    rules = set[str]()
     for behavior, prop, value in ask(UPDATES):
-        if prop.value == CORE + "update":
+        if prop.value in (CORE + "update", CORE + "construct"):
             texts[behavior.value] = value.value
+            rules |= {behavior.value} if prop.value == CORE + "construct" else set()
         else:
             extends.setdefault(behavior.value, []).append(value.value)
     done = Compiled()
@@ -83,7 +86,17 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
         name = "?" + local_name(node.value).rsplit(".", 1)[-1]
         number = int(index.value) if index is not None and index.value.isdigit() else 0
         declared.setdefault(behavior.value, {})[name] = node.value, kind.value, number
-    for behavior in sorted({*texts, *extends}):
+    for rule in sorted(rules):
+        writer = Writer(rule, vocabulary, {})
+        try:
+            writer.write_rule(updates.pop(rule))
+        except UpdateError as error:
+            place = replace(Update(rule, texts[rule], {}).place(error.at), form="rule")
+            done.faults.append(Fault(place, error.what, error.remedy))
+            continue
+        done.triples += writer.triples()
+        done.places |= {node: replace(place, form="rule") for node, place in writer.places.items()}
+    for behavior in sorted({*updates, *extends}):
         _compile(behavior, updates, extends, declared, vocabulary, done)
     return done
 

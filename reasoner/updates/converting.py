@@ -328,7 +328,19 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
         nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
     schema = read_schema(graph)
     nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
-    others = {node: said for node, said in schema.nodes.items() if not node.startswith(f"{iri}.") and node != iri}
+    priced = {
+        *schema.nodes[iri].get(CORE + "price", ())
+    }  # an update doesn't say a price, so that its calculation stays
+    while (
+        more := {v for node in priced for values in schema.nodes[node].values() for v in values}
+        & schema.nodes.keys() - priced
+    ):
+        priced |= more
+    others = {
+        node: said
+        for node, said in schema.nodes.items()
+        if node in priced - {iri} or (not node.startswith(f"{iri}.") and node != iri)
+    }
     return as_written(replace(schema, nodes={**others, **nodes}), [iri])[iri]
 
 

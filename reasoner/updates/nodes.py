@@ -1,4 +1,4 @@
-"""A behaviour written as a SPARQL update, compiled into the individuals that say the same.
+"""A behaviour written as a SPARQL update, or a rule as a CONSTRUCT query, compiled into the individuals that say the same.
 
 ==========================================  =====================================================================
 in the update                               as individuals
@@ -14,6 +14,8 @@ in the update                               as individuals
 ``FILTER NOT EXISTS { … }``                 what is inside, negated
 ``{ … } UNION { … }``, ``||``               an `:AnyOf`
 ``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation `:when` its WHERE held
+``CONSTRUCT { ?a :p ?b } WHERE { … }``      a `:Rule` with these conditions; a variable that isn't in the head, in a `:Witness`
+``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of that rule, `:over` the variables that begin with their type
 ==========================================  =====================================================================
 
 All that is asked is asked of the situation before the behaviour, also by further operations; a variable means the same in all.
@@ -23,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -33,7 +35,9 @@ from confab.reasoner.amounts import written
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.updates.texts import Place, Update, Vocabulary
 from confab.reasoner.updates.words import (
+    SELECT,
     A,
+    Construction,
     Number,
     Operation,
     Said,
@@ -41,6 +45,7 @@ from confab.reasoner.updates.words import (
     Truth,
     UpdateError,
     Word,
+    constructed,
     parsed,
     parts,
     place,
@@ -108,6 +113,52 @@ class Writer:
                 )
             when = self.sought(inner, within, operation.at)
             self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
+
+    def write_rule(self, query: Update) -> None:
+        """Add what a CONSTRUCT query says: its head is what follows, its WHERE when it does, or what is aggregated."""
+        own, rule = constructed(query.text)
+        self.now, self.prefixes = query, {**query.prefixes, **own}
+        self.links = {}
+        head, prop = rule.head, self.iri(rule.head.predicate)
+        group = self.group(rule.where, set())
+        named = [word for word in _variables(head) if word != rule.name]
+        if rule.function and {*named} != rule.grouped:
+            (lost, *_) = sorted({*named} ^ rule.grouped)
+            raise UpdateError(f"{lost} stands in the head or in GROUP BY, and not in both", SELECT, head.subject.at)
+        for name in named:
+            if name in group.chosen:
+                kind = group.chosen.pop(name)
+                self.bind(name, self.iri(kind), "Variable", "", query.place(kind.at))
+        self.determine(group)
+        within = {*self.terms, *group.names}
+        if rule.function:
+            self.total(rule, group, within)
+        else:
+            asked = self.witness(group, {*self.terms}, head.subject.at) if group.chosen else None
+            self.links["condition"] = [asked] if asked else self.conditions(group, within)
+            if self.vocabulary.numeric(prop):
+                raise UpdateError(f"{head.predicate} is an amount, which a rule aggregates", SELECT, head.predicate.at)
+            self.changes(head)
+            self.links |= {key: [value] for key, value in self.situation(head, within).items()}
+        self.links = {key: values for key, values in self.links.items() if values}
+
+    def total(self, rule: Construction, group: _Group, within: set[str]) -> None:
+        """Add what an aggregate says: its amount, what it is aggregated over, and the number of each."""
+        at = rule.head.subject.at
+        if _last(rule.head) != rule.name or not self.vocabulary.numeric(self.iri(rule.head.predicate)):
+            raise UpdateError(
+                f"the head of a rule that aggregates gives an amount the number {rule.name}",
+                f"end it by {rule.name}",
+                at,
+            )
+        for name, kind in group.chosen.items():
+            self.bind(name, self.iri(kind), "Variable", "", self.now.place(kind.at))
+        self.links["over"] = [self.terms[name] for name in group.chosen]
+        self.links["condition"] = self.conditions(group, within)
+        own = self.measured(replace(rule.head, object=(*_middle(rule.head), Number(Fraction(0)))), within)
+        self.nodes[self.behavior] = {**own.said(), CORE + "aggregate": [rule.function]}
+        if rule.argument is not None:
+            self.side(self.behavior, "right", self.expression(rule.argument, within, at), at)
 
     # ---------------------------------------------------------------------------------------------------------- terms
 
@@ -603,8 +654,8 @@ class Writer:
 
     def triples(self) -> Iterator[ox.Triple]:
         """Yield what the behaviour and its nodes say."""
-        whole = {self.behavior: {CORE + link: found for link, found in self.links.items()}, **self.nodes}
-        for node, said in whole.items():
+        links = {CORE + link: found for link, found in self.links.items()}
+        for node, said in [(self.behavior, links), *self.nodes.items()]:
             for prop, found in said.items():
                 for value in found:
                     yield ox.Triple(ox.NamedNode(node), ox.NamedNode(prop), _object(prop, value))
@@ -660,7 +711,7 @@ def _object(prop: str, value: str) -> ox.NamedNode | ox.Literal:
         return ox.Literal(True)
     if prop == CORE + "amount":
         return ox.Literal(value, datatype=ox.NamedNode(XSD + "decimal"))
-    if prop in (CORE + "sign", CORE + "change"):
+    if prop in (CORE + "sign", CORE + "change", CORE + "aggregate"):
         return ox.Literal(value)
     return ox.Literal(int(value)) if prop == CORE + "index" else ox.NamedNode(value)
 

@@ -23,15 +23,21 @@ VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
 
 @dataclass(frozen=True)
 class Place:
-    """Where something stands in the update of a behaviour; line and column count from 1."""
+    """Where something stands in the update of a behaviour, or in the query of a rule; line and column count from 1."""
 
     behavior: str
     line: int
     column: int
+    form: str = "update"
 
     def __str__(self) -> str:
         """Return it as messages have it."""
-        return f"line {self.line}, column {self.column} of the update of {local_name(self.behavior)}"
+        of = (
+            f"the update of {local_name(self.behavior)}"
+            if self.form == "update"
+            else f"the rule {local_name(self.behavior)}"
+        )
+        return f"line {self.line}, column {self.column} of {of}"
 
 
 @dataclass(frozen=True)

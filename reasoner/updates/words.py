@@ -1,4 +1,4 @@
-"""The text of a SPARQL update, parsed by rdflib, as a tree whose words know where they stand.
+"""The text of a SPARQL update or CONSTRUCT, parsed by rdflib, as a tree whose words know where they stand.
 
 rdflib's grammar forgets places. Of a copy of it, what parses a variable or a name yields a `Word` instead: the text as it was
 written, and its place. What else there is in the tree (groups, filters, unions) is rdflib's.
@@ -6,6 +6,7 @@ written, and its place. What else there is in the tree (groups, filters, unions)
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
@@ -72,6 +73,18 @@ class Operation:
     at: int
 
 
+@dataclass(frozen=True)
+class Construction:
+    """``CONSTRUCT { head } WHERE { … }``; the aggregate of a SELECT inside has a function, its argument and what it groups by."""
+
+    head: Triple
+    where: Sequence[Any]
+    function: str = ""
+    argument: Any = None
+    name: str = ""
+    grouped: frozenset[str] = frozenset()
+
+
 class UpdateError(ValueError):
     """An update can't be read: what is wrong, what to do, and at which character."""
 
@@ -93,33 +106,110 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
     UpdateError
         It is no SPARQL update, or one that does something else than delete and insert.
     """
+    write = "write DELETE { … } INSERT { … } WHERE { … }"
+    tree = _tree("UpdateUnit", text, "update", write)[0]
+    if not tree.request:
+        raise UpdateError("the update says nothing", write, 0)
+    return _prefixes(tree.prologue or ()), [_operation(request, text) for request in tree.request or ()]
+
+
+CONSTRUCT = "write CONSTRUCT { ?x :property ?y } WHERE { … }"
+SELECT = "write SELECT ?x (SUM(?n) AS ?total) WHERE { … } GROUP BY ?x"
+AGGREGATE = re.compile("Aggregate_(Sum|Count|Max|Min)")
+
+
+@silent_about_numbers()
+def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
+    """Return the prefixes that a CONSTRUCT query declares, and what it says.
+
+    >>> total = "SELECT ?a (COUNT(?b) AS ?n) WHERE { ?b <urn:q> ?a } GROUP BY ?a"
+    >>> _, one = constructed(f"CONSTRUCT {{ ?a <urn:p> ?n }} WHERE {{ {total} }}")
+    >>> one.function, one.name, sorted(one.grouped)
+    ('count', '?n', ['?a'])
+
+    Raises
+    ------
+    UpdateError
+        It is none, or one with more than one pattern in its head.
+    """
+    prologue, tree = _tree("QueryUnit", text, "CONSTRUCT query", CONSTRUCT)
+    if tree.name != "ConstructQuery" or tree.datasetClause or not tree.template:
+        raise UpdateError("a rule is a CONSTRUCT query with a head", CONSTRUCT, 0)
+    heads = [triple for block in tree.template for triple in triples(block)]
+    if len(heads) != 1:
+        raise UpdateError(
+            f"the head of the rule has {len(heads)} patterns", "write one; write a rule for each", heads[-1].subject.at
+        )
+    if tree.where.name != "SubSelect":
+        return _prefixes([prologue]), Construction(heads[0], parts(tree.where))
+    return _prefixes([prologue]), _aggregated(heads[0], tree.where)
+
+
+def _aggregated(head: Triple, select: Any) -> Construction:
+    """Return a rule whose WHERE is a SELECT with an aggregate."""
+    at = head.subject.at
+    computed = [one for one in select.projection or () if one.evar]
+    if len(computed) != 1 or select.having or select.orderby or select.limitoffset or select.valuesClause:
+        raise UpdateError(
+            "the SELECT of a rule has one aggregate, without HAVING, ORDER BY, LIMIT and VALUES", SELECT, at
+        )
+    grouped = list(select.groupby.condition) if select.groupby else []
+    shown = [one.var for one in select.projection if not one.evar]
+    if not all(isinstance(one, Word) for one in grouped) or {*shown} != {*grouped}:
+        raise UpdateError("SELECT and GROUP BY don't name the same variables", SELECT, place(select.projection) or at)
+    inner = computed[0].expr
+    while getattr(inner, "name", "").endswith("Expression") and not inner.other:
+        inner = inner.expr
+    found = AGGREGATE.fullmatch(getattr(inner, "name", ""))
+    if not found:
+        raise UpdateError(
+            "the SELECT of a rule computes something else than SUM, COUNT, MAX or MIN", SELECT, computed[0].evar.at
+        )
+    if inner.distinct:
+        raise UpdateError(
+            "DISTINCT isn't read here", "seek what shall not be counted by FILTER EXISTS { … }", computed[0].evar.at
+        )
+    argument = None if found[1] == "Count" else inner.vars
+    return Construction(
+        head, parts(select.where), found[1].lower(), argument, str(computed[0].evar), frozenset(map(str, grouped))
+    )
+
+
+def _tree(unit: str, text: str, what: str, write: str) -> Any:
+    """Return the parsed text.
+
+    Raises
+    ------
+    UpdateError
+        It isn't of that language; the place is where reading it ends.
+    """
     try:
-        tree = _grammar().parse_string(text, parse_all=True)[0]
+        return _grammar(unit).parse_string(text, parse_all=True)
     except pyparsing.ParseBaseException:
-        at = _stuck(text)
+        at = _stuck(unit, text)
         near = text[at:].split()
         found = f"'{near[0][:30]}' isn't expected here" if near else "something is missing at the end"
-        raise UpdateError(
-            f"this is no SPARQL update: {found}", "write DELETE { … } INSERT { … } WHERE { … }", at
-        ) from None
-    if not tree.request:
-        raise UpdateError("the update says nothing", "write DELETE { … } INSERT { … } WHERE { … }", 0)
+        raise UpdateError(f"this is no SPARQL {what}: {found}", write, at) from None
+
+
+def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
+    """Return the prefixes that are declared at the beginning."""
     prefixes = {}
-    for prologue in tree.prologue or ():
+    for prologue in prologues:
         for declared in prologue:
             if declared.name == "Base":
                 raise UpdateError("BASE isn't read here", "write whole IRIs, or PREFIX lines", 0)
             prefixes[str(declared.prefix or "")] = str(declared.iri).strip("<>")
-    return prefixes, [_operation(request, text) for request in tree.request or ()]
+    return prefixes
 
 
 @cache
-def _grammar() -> pyparsing.ParserElement:
+def _grammar(unit_name: str) -> pyparsing.ParserElement:
     from rdflib import Literal
     from rdflib.plugins.sparql import parser
 
     unit, variable, name, iri, a, negative = deepcopy(
-        (parser.UpdateUnit, parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE)
+        (getattr(parser, unit_name), parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE)
     )
     negative.set_parse_action(lambda tokens: Literal(-tokens[0].value))  # rdflib's own fails with a decimal number
 
@@ -140,17 +230,17 @@ def _grammar() -> pyparsing.ParserElement:
     return unit
 
 
-def _stuck(text: str) -> int:
+def _stuck(unit_name: str, text: str) -> int:
     """Return how far any part of the grammar gets in a text that isn't of its language."""
     from rdflib.plugins.sparql import parser
 
-    unit, farthest = deepcopy(parser.UpdateUnit).parse_with_tabs(), 0
+    unit, farthest = deepcopy(getattr(parser, unit_name)).parse_with_tabs(), 0
 
     def failed(_: str, at: int, *__: object) -> None:
         nonlocal farthest
         farthest = max(farthest, at)
 
-    for element in unit.visit_all():  # type: ignore[no-untyped-call]
+    for element in unit.visit_all():
         element.set_fail_action(failed)
     with suppress(pyparsing.ParseBaseException, TypeError):  # of -0.5, which is no fault
         unit.parse_string(text, parse_all=True)

@@ -21,7 +21,7 @@ CAUSES = ("unreadable", "undeclared-term")
 """Rules whose findings are listed first, since others may follow from them."""
 
 LABEL = ox.NamedNode(RDFS + "label")
-UPDATE = ox.NamedNode(CORE + "update")
+TEXTS = tuple(ox.NamedNode(CORE + name) for name in ("update", "construct"))
 
 
 @dataclass(frozen=True, order=True)
@@ -111,7 +111,9 @@ class Places:
         node = place.behavior
         file = self._files.get(node) or self.graph.path
         line = _line(file, node)
-        said = self.graph.store.quads_for_pattern(ox.NamedNode(node), UPDATE, None, None)
+        said = [
+            quad for text in TEXTS for quad in self.graph.store.quads_for_pattern(ox.NamedNode(node), text, None, None)
+        ]
         texts = [quad.object.value for quad in said if isinstance(quad.object, ox.Literal)]
         if file and line and texts and (begin := file.read_text(encoding="utf-8").find(texts[0])) >= 0:
             line = file.read_text(encoding="utf-8").count("\n", 0, begin) + place.line

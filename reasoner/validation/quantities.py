@@ -53,7 +53,8 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     causes: dict[tuple[str, str], dict[str, str]] = defaultdict(
         dict
     )  # by what doesn't go together: behaviours, what they do
-    for name, behavior in reading.problem.domain.behaviors.items():
+    totals = {name: one.behavior for name, one in reading.problem.domain.aggregates.items()}
+    for name, behavior in (*totals.items(), *reading.problem.domain.behaviors.items()):
         for left, right, does in _together(behavior):
             (one, wrong), (other, also) = unit(left), unit(right)
             if both := wrong or also or (f"{one} and {other}" if one and other and one != other else ""):
@@ -67,7 +68,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
         more = f"; so {'do' if len(others) > 1 else 'does'} {some(others)}" if others else ""
         yield (
             reading.names.iri(first),
-            f"{first} {done[first]} ({named}){more}",
+            f"{first} {done[first]} ({named}){more}".replace(f"{first} increases", f"{first} adds up", first in totals),
             "a number of one unit says nothing of an amount of another",
             "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
         )

@@ -69,8 +69,8 @@ WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
 """Checks that report facts or bounds, as `impossible-situation` does."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
 """Rules that depend on the initial situation: they wait until its facts are correct."""
-NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
-"""Rules that are silent as long as the update of some behaviour can't be read."""
+NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach", "no-value"}
+"""Rules that are silent as long as the text of some behaviour or rule can't be read."""
 
 MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_checks.RULES
 """Rules on an embodiment."""

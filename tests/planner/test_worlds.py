@@ -19,6 +19,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "canteen-small": {1: 4, 2: 16},
     "couriers-small": {1: 8, 2: 16},
     "gallery-small": {1: 5},
+    "carts-small": {1: 5, 2: 9},
     "packing-small": {1: 4},
     "drawers-small": {1: 2, 2: 20},
     "house-small": {1: 2, 2: 19, 3: 39},
@@ -32,6 +33,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "canteen-large": {1: 22, 2: 88},  # tea is fetched six times
     "couriers-large": {1: 48, 2: 182},
     "gallery-large": {1: 19},
+    "carts-large": {1: 17, 2: 34},
     "packing-large": {1: 18},
     "drawers-large": {1: 9, 2: 130},
     "house-large": {1: 10, 2: 144, 3: 288},

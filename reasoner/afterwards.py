@@ -1,0 +1,354 @@
+"""Regression: a condition after a behaviour, written as a condition before it.
+
+``IN(parcel) = van`` holds after LOAD(?item, ?into) if the parcel is ?item and the van is ?into, or if the parcel is another one
+and is in the van before. Conditions inside alternatives and witnesses are rewritten in place. The result may be just true or
+false: terms that are equal by name, or of classes without a common individual, are compared here.
+
+Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; here over functional situation types and numeric effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import count, product
+from typing import TypeAlias
+
+from confab.reasoner.amounts import Amount, Calculation, Expression, put_in, terms_of
+from confab.reasoner.language import groups, is_variable, mentions, situations_of, walk
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    Effect,
+    EqualityCondition,
+    Parameter,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    made_of,
+    substituted,
+)
+
+Formula: TypeAlias = "Condition | bool"
+Conjunction: TypeAlias = "tuple[Condition, ...] | None"
+"""Conditions that all hold; None for a contradiction."""
+MOST_CASES = 64
+"""Maximum number of combinations of effects that may change one expression."""
+
+
+class TooManyCasesError(ValueError):
+    """More effects change one expression at once than are told apart."""
+
+
+def both(formulas: Iterable[Formula]) -> Conjunction:
+    """Return a conjunction without what is true anyway; None if it contradicts itself."""
+    found: dict[Condition, None] = {}
+    for formula in formulas:
+        if formula is False:
+            return None
+        if formula is not True:
+            found[formula] = None
+    if any(opposite(condition) in found for condition in found):
+        return None
+    return tuple(found)
+
+
+def either(alternatives: Iterable[Conjunction]) -> Formula:
+    """Return a disjunction of conjunctions."""
+    left = [group for group in dict.fromkeys(alternatives) if group is not None]
+    if not left:
+        return False
+    if () in left:
+        return True
+    return left[0][0] if len(left) == 1 and len(left[0]) == 1 else AnyOf(tuple(left))
+
+
+def opposite(formula: Condition) -> Condition:
+    """Return the negation of a condition."""
+    return replace(formula, negated=not formula.negated)
+
+
+def negation(formula: Formula | Conjunction) -> Formula:
+    """Return the negation of a formula or conjunction."""
+    if formula is None or isinstance(formula, bool):
+        return not formula
+    if not isinstance(formula, tuple):
+        return opposite(formula)
+    if not formula:
+        return False
+    if len(formula) == 1 and not _binding(formula[0]):
+        return opposite(formula[0])
+    return AnyOf((formula,), negated=True)
+
+
+def _binding(condition: Condition) -> bool:
+    """Whether a condition may determine a variable, which its plain negation would leave undetermined."""
+    return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
+
+
+@dataclass
+class Afterwards:
+    """Conditions and amounts after one behaviour, in terms of the state before it.
+
+    Parameters
+    ----------
+    behavior : Behavior
+        As it is written, with its effects on all of a class.
+    situations : mapping of name to SituationType
+    classes : mapping of class to individuals
+    kinds : dict of term to class
+        Of all terms of the behaviour and of the conditions; variables made here are added.
+    """
+
+    behavior: Behavior
+    situations: Mapping[str, SituationType]
+    classes: Mapping[str, Sequence[str]]
+    kinds: dict[str, str]
+    _number: Iterator[int] = field(default_factory=lambda: count(1))
+
+    def __post_init__(self) -> None:
+        """Note which values the preconditions determine."""
+        preconditions = self.behavior.preconditions
+        bound = {p.name for p in self.behavior.parameters}.union(*map(mentions, preconditions))
+        self._fixed = frozenset(bound)
+        self._known = {
+            (c.situation, c.arguments): FALSE if c.negated else c.value
+            for c in preconditions
+            if isinstance(c, ValueCondition) and (not c.negated or (self.boolean(c.situation) and c.value == TRUE))
+        }
+        self._different = {
+            pair
+            for c in preconditions
+            if isinstance(c, EqualityCondition) and c.negated
+            for pair in ((c.left, c.right), (c.right, c.left))
+        }
+
+    def fixed(self, term: str) -> bool:
+        """Whether a term is an individual, or is bound wherever the behaviour can be done."""
+        return not is_variable(term) or term in self._fixed
+
+    def boolean(self, situation: str) -> bool:
+        """Whether the values of a situation type are true and false."""
+        return self.situations[situation].boolean
+
+    @cached_property
+    def amounts(self) -> tuple[AmountEffect, ...]:
+        """The effects on amounts; one that adds to an amount for each of a class is an effect for each individual."""
+        found: list[AmountEffect] = []
+        for effect in self.behavior.amounts:
+            if effect.each is None or effect.each.name in effect.arguments:
+                found.append(effect)
+            else:
+                every = (made_of(effect, one) for one in self.classes.get(effect.each.kind, ()))
+                found += [one for one in every if isinstance(one, AmountEffect)]
+        return tuple(found)
+
+    def fresh(self, kind: str) -> str:
+        """Return a variable of a class that has no other use."""
+        name = next(name for n in self._number if (name := f"?kept{n}") not in self.kinds)
+        self.kinds[name] = kind
+        return name
+
+    def renamed(self, condition: Condition) -> Condition:
+        """Return a condition with each of its witnesses' variables renamed, so that no term of the behaviour has its name."""
+        match condition:
+            case Witness(variable, kind, inner):
+                terms = {variable: self.fresh(kind)}
+                within = tuple(self.renamed(substituted(one, terms)) for one in inner)
+                return replace(condition, variable=terms[variable], conditions=within)
+            case AnyOf(alternatives):
+                return replace(condition, alternatives=tuple(tuple(map(self.renamed, group)) for group in alternatives))
+            case _:
+                return condition
+
+    def apart(self, effect: Effect) -> Effect:
+        """Return an effect with the variables that its own conditions determine renamed."""
+        given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
+        own = {*effect.arguments, *given}.union(*map(mentions, effect.when))
+        own = {term for term in own if is_variable(term)} - self._fixed - ({effect.each.name} if effect.each else set())
+        terms = {term: self.fresh(self.kinds[term]) for term in sorted(own)}
+        if effect.each is not None:
+            terms[effect.each.name] = self.fresh(effect.each.kind)
+            effect = replace(effect, each=Parameter(terms[effect.each.name], effect.each.kind))
+        when = tuple(substituted(condition, terms) for condition in effect.when)
+        arguments = tuple(terms.get(a, a) for a in effect.arguments)
+        if isinstance(effect, ValueEffect):
+            return replace(effect, arguments=arguments, value=terms.get(effect.value, effect.value), when=when)
+        return replace(effect, arguments=arguments, amount=put_in(effect.amount, terms), when=when)
+
+    # ---------------------------------------------------------------------------------------------------------- leaves
+
+    def members(self, kind: str) -> set[str]:
+        """Return the individuals of a class."""
+        return {*self.classes.get(kind, ())}
+
+    def among(self, term: str, kind: str) -> Formula:
+        """Return that a term is of a class."""
+        members = self.members(kind)
+        if not is_variable(term):
+            return term in members
+        own = self.members(self.kinds[term])
+        if own <= members:
+            return True
+        return ClassCondition(term, kind) if own & members else False
+
+    def equal(self, one: str, other: str) -> Formula:
+        """Return that two terms stand for the same individual."""
+        if one == other:
+            return True
+        possible = [self.members(self.kinds[term]) if is_variable(term) else {term} for term in (one, other)]
+        if possible[0].isdisjoint(possible[1]) or (one, other) in self._different:
+            return False
+        return EqualityCondition(one, other)
+
+    def before(self, condition: Condition) -> Formula:
+        """Return a condition before the behaviour, given its preconditions."""
+        if isinstance(condition, ValueCondition):
+            found = self.value(condition.situation, condition.arguments, condition.value)
+            return negation(found) if condition.negated else found
+        return condition
+
+    def value(self, situation: str, arguments: tuple[str, ...], value: str) -> Formula:
+        """Return that a symbol has a value before the behaviour."""
+        known = self._known.get((situation, arguments))
+        return ValueCondition(situation, arguments, value) if known is None else self.equal(known, value)
+
+    def old(self, situation: str, arguments: tuple[str, ...], kind: str) -> tuple[str, Conjunction]:
+        """Return a term for the value of a symbol before the behaviour, and the conditions that determine it."""
+        known = self._known.get((situation, arguments))
+        if known is not None:
+            return known, both([self.among(known, kind)])
+        term = self.fresh(kind)
+        return term, (ValueCondition(situation, arguments, term),)
+
+    def fires(self, effect: Effect, arguments: Sequence[str]) -> Conjunction:
+        """Return the conditions under which an effect, with its variables renamed apart, changes a symbol."""
+        if effect.each is not None:
+            at = effect.arguments.index(effect.each.name)
+            member = self.among(arguments[at], effect.each.kind)
+            effect = made_of(effect, arguments[at])
+        else:
+            member = True
+        there = zip(arguments, self.situations[effect.situation].arguments, strict=True)
+        equal = [self.equal(own, other) for own, other in zip(effect.arguments, arguments, strict=True)]
+        return both([member, *equal, *effect.when, *(self.among(term, kind) for term, kind in there)])
+
+    # ------------------------------------------------------------------------------------------------------ conditions
+
+    def changed(self, condition: Condition) -> bool:
+        """Whether the behaviour changes a situation type in a condition."""
+        return any(situations_of(inner) & self.behavior.changes for inner in walk(condition))
+
+    def condition(self, condition: Condition) -> Formula:
+        """Return a condition after the behaviour; its variables are bound by others, or by it as a witness."""
+        if not self.changed(condition):
+            return condition
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                found: Formula = self.value(situation, arguments, value)
+                for effect in (e for e in self.behavior.effects if e.situation == situation):
+                    found = self._overwritten(effect, arguments, value, found)
+            case Comparison(left, sign, right, negated):
+                found = either(
+                    both([*one, *other, Comparison(first, sign, second)])
+                    for one, first in self.cases(left)
+                    for other, second in self.cases(right)
+                )
+            case Witness(variable, kind, inner, negated):
+                self.kinds[variable] = kind
+                within = both(map(self.condition, inner))
+                found = False if within is None else Witness(variable, kind, within)
+            case AnyOf(alternatives, negated):
+                found = either(both(map(self.condition, group)) for group in alternatives)
+            case _:
+                return condition
+        return negation(found) if negated else found
+
+    def _overwritten(self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Formula) -> Formula:
+        """Return that a symbol has a value after one more effect, given that it has it without."""
+        apart = self.apart(effect)
+        assert isinstance(apart, ValueEffect)
+        fires = self.fires(apart, arguments)
+        if fires is None:
+            return before
+        given = apart.value
+        if apart.each is not None:
+            given = {apart.each.name: arguments[apart.arguments.index(apart.each.name)]}.get(given, given)
+        return either([both([*fires, self.equal(given, value)]), both([negation(fires), before])])
+
+    # ---------------------------------------------------------------------------------------------------------- amounts
+
+    def cases(self, expression: Expression) -> list[tuple[tuple[Condition, ...], Expression]]:
+        """Return the values of an expression after the behaviour, each with the conditions under which it has it."""
+        match expression:
+            case Amount(situation, arguments):
+                found: list[tuple[Conjunction, Expression]] = [((), expression)]
+                for effect in (e for e in self.amounts if e.situation == situation):
+                    apart = self.apart(effect)
+                    assert isinstance(apart, AmountEffect)
+                    fires = self.fires(apart, arguments)
+                    if fires is None:
+                        continue
+                    by = apart.amount
+                    if apart.each is not None:
+                        by = put_in(by, {apart.each.name: arguments[apart.arguments.index(apart.each.name)]})
+                    done = [
+                        (both([*when, *fires]), _changed(now, apart.operation, by))
+                        for when, now in found
+                        if when is not None
+                    ]
+                    found = [*done, *((both([*when, negation(fires)]), now) for when, now in found if when is not None)]
+                    _bounded(found)
+                return [(when, now) for when, now in found if when is not None]
+            case Calculation(sign, left, right):
+                pairs = product(self.cases(left), self.cases(right))
+                combined = [(both([*one, *other]), Calculation(sign, a, b)) for (one, a), (other, b) in pairs]
+                _bounded(combined)
+                return [(when, now) for when, now in combined if when is not None]
+            case _:
+                return [((), expression)]
+
+
+def _bounded(cases: Sequence[object]) -> None:
+    if len(cases) > MOST_CASES:
+        raise TooManyCasesError
+
+
+def _changed(now: Expression, operation: str, by: Expression) -> Expression:
+    sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
+    return by if sign is None else Calculation(sign, now, by)
+
+
+def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
+    """Return conditions in which a variable that only an alternative or a witness determines is sought by a witness.
+
+    >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
+    >>> found.alternatives[0][0].variable
+    '?b'
+    """
+
+    def group(conditions: Sequence[Condition], bound: frozenset[str]) -> tuple[Condition, ...]:
+        own = sorted({t for c in conditions if not groups(c) for t in mentions(c)} - bound)
+        found = tuple(one(condition, bound | {*own}) for condition in conditions)
+        for variable in own:
+            found = (Witness(variable, kinds[variable], found),)
+        return found
+
+    def one(condition: Condition, bound: frozenset[str]) -> Condition:
+        match condition:
+            case AnyOf(alternatives):
+                return replace(condition, alternatives=tuple(group(inner, bound) for inner in alternatives))
+            case Witness(variable, _, inner):
+                return replace(condition, conditions=group(inner, bound | {variable}))
+            case _:
+                return condition
+
+    return tuple(one(condition, bound) for condition in conditions)
