@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @QUERY_ROWS
 @QUIET
 def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
-    """Serve a scene as a page and a SPARQL endpoint, until Ctrl-C."""
+    """Serve a scene as a page and a SPARQL endpoint."""
     from threading import Event
 
     from confab.reasoner.graph.query_process import QueryLimits

@@ -197,7 +197,10 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 )
 @TIME_LIMIT
 def import_(source: str, problem: Path | None, out: Path, level: int, time_limit: float | None) -> None:
-    """Turn a PDDL problem, or the world of a robot (INTERFACE:ADDRESS or a world file), into a scene."""
+    """Turn a PDDL problem, or a robot's world, into a scene.
+
+    A robot's world is given as INTERFACE:ADDRESS, or as a world file.
+    """
     from confab.authoring import turtle_path
     from confab.reasoner.graph.knowledge import KnowledgeError
 
@@ -242,7 +245,7 @@ def export(
     seed: int,
     time_limit: float | None,
 ) -> None:
-    """Write one level of a scene as PDDL, or the trajectories of a plan."""
+    """Write a level as PDDL, or the trajectories of a plan."""
     from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load
 

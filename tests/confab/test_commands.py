@@ -22,6 +22,7 @@ from confab.examples import EXAMPLES
 
 SLOW = (
     "confab serve",
+    "--episode",
     "--serve",
     "picture",
     "validate",
