@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.show import PlanTree
     from confab.sim.live import LiveWorld
+    from confab.sim.world import World as Physics
 
 WORLDS = ("symbolic", "pybullet")
 
@@ -384,7 +385,7 @@ class Execution:
 class Options(TypedDict, total=False):
     """What else `execute` takes."""
 
-    prepare: Callable[[Any], None] | None
+    prepare: Callable[[Physics], None] | None
     patience: Patience
     caution: Caution | None
     perturb: bool
@@ -466,7 +467,7 @@ def execute(
     planner: Planner | None = None,
     seed: int = 0,
     tell: Callable[[Moment], None] | None = None,
-    prepare: Callable[[Any], None] | None = None,
+    prepare: Callable[[Physics], None] | None = None,
     patience: Patience = Patience(),  # noqa: B008 - frozen
     caution: Caution | None = None,
     perturb: bool = False,

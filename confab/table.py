@@ -7,14 +7,17 @@ import html
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from confab.reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     import pandas
+    from pyoxigraph import BlankNode, Literal, NamedNode, Triple
     from rich.table import Table as RichTable
 
+Term: TypeAlias = "NamedNode | BlankNode | Literal | Triple"
+"""An RDF term as the store answers it."""
 STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
 """Forms of the SPARQL 1.1 recommendations, with pyoxigraph's names for them."""
 
@@ -38,7 +41,7 @@ class Table(Sequence[tuple[str | None, ...]]):
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str | None, ...], ...]
-    terms: tuple[tuple[Any, ...], ...] = ()
+    terms: tuple[tuple[Term | None, ...], ...] = ()
     truth: bool | None = None
 
     def __getitem__(self, index: int) -> tuple[str | None, ...]:  # type: ignore[override]
@@ -57,7 +60,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         """Yield the rows."""
         return iter(self.rows)
 
-    def values(self) -> list[tuple[Any, ...]]:
+    def values(self) -> list[tuple[object, ...]]:
         """Return the rows with numbers, truth values and dates as Python values."""
         return [tuple(map(_value, row, terms)) for row, terms in zip(self.rows, self.terms or self.rows, strict=True)]
 
@@ -122,7 +125,7 @@ class Table(Sequence[tuple[str | None, ...]]):
 
         if self.columns != ("subject", "predicate", "object") or not all(len(row) == 3 for row in self.terms):
             raise KnowledgeError("Turtle holds triples; wanted a CONSTRUCT query")
-        triples = sorted({ox.Triple(*row) for row in self.terms}, key=str)
+        triples = sorted({ox.Triple(*row) for row in self.terms}, key=str)  # type: ignore[arg-type]
         return (ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"").decode("utf-8")
 
     def __rich__(self) -> RichTable:
@@ -152,14 +155,15 @@ class Table(Sequence[tuple[str | None, ...]]):
         )
 
 
-def _value(cell: str | None, term: Any) -> Any:
+def _value(cell: str | None, term: object) -> object:
     """Return a literal as a Python value if its datatype has one, otherwise as its text."""
-    datatype = getattr(term, "datatype", None)
-    if datatype is None or term.language is not None:
+    from pyoxigraph import Literal as Stored
+
+    if not isinstance(term, Stored) or term.language is not None:
         return cell
     from decimal import Decimal
 
     from rdflib import Literal, URIRef
 
-    value = Literal(term.value, datatype=URIRef(datatype.value)).value
+    value = Literal(term.value, datatype=URIRef(term.datatype.value)).value
     return cell if value is None else float(value) if isinstance(value, Decimal) else value

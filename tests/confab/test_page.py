@@ -20,6 +20,7 @@ from confab.memory import Memory
 from confab.page.data import PageData, page_data
 from confab.page.frozen import page_html, write_page
 from confab.page.ground import ground_of
+from confab.page.markup import script
 from confab.page.notebook import SHOWN
 from confab.page.sheet import Sheet, Turned, turned_from
 from confab.page.timeline import of_episode, of_plan, of_rollout
@@ -352,6 +353,38 @@ def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
         assert scene.execute(tell=look).reached
         browser.wait("document.querySelector('.tile')?.textContent.includes('✓ reached')")
     assert [words.split(":")[0] for words in said] == ["3 steps", "20 steps"]
+    assert browser.faults == []
+
+
+NOTEBOOK = """<!doctype html><meta charset="utf-8"><div id="el"></div><script type="module">
+%s
+const told = {}, model = { data: %s, rows: {}, get: (name) => model[name], set: (name, value) => { model[name] = value; },
+  on: (what, f) => { (told[what] = told[what] || new Set()).add(f); }, off: (what, f) => { told[what]?.delete(f); },
+  save_changes: () => { model.saved = (model.saved || 0) + 1; },
+  give: (name, value) => { model[name] = value; for (const f of [...(told[`change:${name}`] || [])]) f(); } };
+window.model = model;
+window.leave = board.render({ model, el: document.getElementById("el") });
+</script>"""
+
+
+@needs_browser
+def test_in_a_notebook_the_page_asks_the_kernel(browser: Browser, scene: confab.Scene, tmp_path: Path) -> None:
+    sheet = Sheet(scene)
+    data = json.dumps({**sheet.scene_data, **sheet.answer({})}).replace("<", "\\u003c")
+    (tmp_path / "cell.html").write_text(NOTEBOOK % (script().replace("export default", "const board ="), data))
+    browser.open((tmp_path / "cell.html").as_uri())
+    browser.wait("window.leave !== undefined")
+    browser.choose("cup 1 is at: is", "location7")
+    assert browser.run("model.turned.facts") == FACTS["facts"]
+    answer = json.dumps({**sheet.scene_data, **sheet.answer(FACTS)})
+    browser.run(f"model.give('data', {answer})")
+    browser.wait("document.querySelector('.changes del')?.textContent === 'move cup 1 to location 7'")
+    browser.type(".asking textarea", "ASK {}")
+    browser.click(".asking button")
+    assert browser.run("model.asked") == {"of": 1, "query": "ASK {}"}
+    browser.run("model.give('rows', { of: 1, columns: ['answer'], rows: [['true']] })")
+    browser.wait("document.querySelector('.answer td')?.textContent === 'true'")
+    browser.run("leave()")
     assert browser.faults == []
 
 

@@ -93,9 +93,9 @@ class Lanes {
   bar(bar, row) {
     const width = ((bar.end - bar.begin) * this.width) / this.page.data.end;
     const lines = row.group === "levels" || row.group === "actors" ? 2 : 1;
-    const room = width - 4, first = bar.label.split(" ")[0], doing = row.group === "levels" || row.group === "actors";
+    const room = width - 3, first = bar.label.split(" ")[0], doing = row.group === "levels" || row.group === "actors";
     // Of what is done at least the whole verb is shown, or nothing; a value ends in dots. The title has all of it.
-    const fits = room > (doing ? 60 : 20) ? bar.label : doing && room > first.length * 5.3 ? first : "";
+    const fits = room > (doing ? 60 : 20) ? bar.label : doing && room > first.length * 5.1 ? first : "";
     const words = (bar.tone === "failed" ? "✗ " : "") + fits;
     const title = `${bar.label}${bar.note ? `: ${bar.note}` : ""} (${figure(bar.begin)} to ${figure(bar.end)} ${this.page.data.unit})`;
     const element = made("div", { class: `bar ${bar.tone} lines${lines}`, title, "data-step": bar.step, "data-begin": bar.begin,
