@@ -26,10 +26,10 @@ FALLING = 1.3
 
 def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Put an object with its contents at a place."""
-    _carry(world, symbol.arguments[0], world.place(value), UPRIGHT)
+    put(world, symbol.arguments[0], world.place(value), UPRIGHT)
 
 
-def _carry(world: World, name: str, base: Array, orientation: Sequence[float]) -> None:
+def put(world: World, name: str, base: Array, orientation: Sequence[float]) -> None:
     """Put an object with its contents somewhere, at an orientation (a quaternion); a hand that holds it opens."""
     for hand in world.hands:
         if world.held(hand) == name:
@@ -48,7 +48,7 @@ def push(world: World, name: str, by: Sequence[float]) -> None:
     """Push a standing object with its contents by metres along x and y; one that a hand holds stays where it is."""
     if name in world.bodies and not any(world.held(hand) == name for hand in world.hands):
         orientation = pybullet.getBasePositionAndOrientation(world.bodies[name].body, physicsClientId=world.client)[1]
-        _carry(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)
+        put(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)
 
 
 def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
@@ -62,7 +62,7 @@ def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
     room = [min((float(np.hypot(*(other - 0.1 * way)[:2])) for other in others), default=1.0) for way in ahead]
     axis = np.cross([0.0, 0.0, 1.0], ahead[int(np.argmax(room))])
     orientation = pybullet.getQuaternionFromAxisAngle(axis.tolist(), FALLING)
-    _carry(world, name, base + np.array([0.0, 0.0, radius * np.sin(FALLING)]), orientation)
+    put(world, name, base + np.array([0.0, 0.0, radius * np.sin(FALLING)]), orientation)
 
 
 def put_box(world: World, name: str, place: str, size: Sequence[float]) -> None:

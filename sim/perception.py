@@ -20,6 +20,8 @@ from confab.reasoner.embodiment.values import PerceiverUse
 from confab.reasoner.symbols import FALSE, TRUE
 from confab.sim.base import offset_from_stand
 from confab.sim.engine import Engine
+from confab.sim.measured import measure as measure_measured
+from confab.sim.measured import observe_measured
 from confab.sim.urdf import Array
 from confab.sim.whereabouts import level_place, point_of
 
@@ -46,7 +48,7 @@ class Perceiver:
     arrange: Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]
     code: str
     spatial: bool = False
-    measure: Callable[[Engine, tuple[str, ...]], Mapping[str, float]] | None = None
+    measure: Callable[[Engine, PerceiverUse, tuple[str, ...]], Mapping[str, float]] | None = None
 
 
 def tilt_of(rotation: Array) -> float:
@@ -71,7 +73,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     return None
 
 
-def measure_place(world: Engine, arguments: tuple[str, ...]) -> Mapping[str, float]:
+def measure_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> Mapping[str, float]:
     """Return the distances of an object from the nearest place, sideways and upwards, and its tilt."""
     if not world.knows(arguments[0]) or not world.embodiment.places:
         return {}
@@ -174,7 +176,7 @@ def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     return use.values.get("shut", "false") if value <= link.shut else None
 
 
-def measure_joint(world: Engine, arguments: tuple[str, ...]) -> Mapping[str, float]:
+def measure_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> Mapping[str, float]:
     """Return a joint's present value and the thresholds from which on it is open and up to which it is shut."""
     if arguments[0] not in world.links:
         return {}
@@ -246,6 +248,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
     "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True, measure_joint),
+    "perceive_measured": Perceiver(observe_measured, arrange_nothing, "unexpected", measure=measure_measured),
     "perceive_covered": Perceiver(observe_covered, arrange_nothing, "unexpected"),
     "perceive_stand": Perceiver(observe_stand, arrange_stand, "misplaced", True),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from confab.reasoner.embodiment.skills import TERM
+from confab.reasoner.embodiment.skills import evaluate
 from confab.reasoner.embodiment.values import Phase
 from confab.sim.attempt import Attempt
 from confab.sim.engine import Engine
@@ -100,15 +100,3 @@ class Run:
             elif word in self.roles:
                 found.append(self.roles[word])
         return tuple(found)
-
-
-def evaluate(expression: str, known: Mapping[str, float]) -> float:
-    """Return the value of a sum of numbers and names.
-
-    >>> round(evaluate("raised-0.03", {"raised": 0.19}), 2)
-    0.16
-    """
-    total = 0.0
-    for sign, term in TERM.findall(expression):
-        total += (-1.0 if sign == "-" else 1.0) * (known[term] if term in known else float(term))
-    return total

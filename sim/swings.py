@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from confab.reasoner.embodiment.skills import evaluate
 from confab.reasoner.embodiment.values import PerceiverUse, SkillUse
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact, Symbol
@@ -18,7 +19,6 @@ from confab.sim.bodies import height_of, outline
 from confab.sim.collision import column
 from confab.sim.engine import Engine
 from confab.sim.linkage import wide
-from confab.sim.running import evaluate
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 

@@ -173,8 +173,9 @@ def _compared(world: World, expected: State, verdict: Verdict) -> Verdict:
         got = seen.get(symbol)
         wanted = expected.get(symbol, FALSE if got in (TRUE, FALSE) else None)
         if wanted is not None and got != wanted:
-            how = perceiver(world.embodiment.perceivers[symbol.situation].perceiver)
-            measured = {**verdict.measured, **(how.measure(world, symbol.arguments) if how.measure else {})}
+            use = world.embodiment.perceivers[symbol.situation]
+            how = perceiver(use.perceiver)
+            measured = {**verdict.measured, **(how.measure(world, use, symbol.arguments) if how.measure else {})}
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
             name = f"{symbol.situation} of {' '.join(symbol.arguments)}"
             message = f"{name}: expected {wanted}, seen {got or 'no value'}"

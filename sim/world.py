@@ -82,7 +82,9 @@ class World(Engine):
         super().__init__(embodiment, seed, noise, gui)
         self.symbols = [symbol for symbol in initial if symbol.situation in embodiment.perceivers]
         joints = [Symbol(use.situation, (link,)) for use in embodiment.perceivers.values() for link in use.links]
+        measured = [Symbol(use.situation, one) for use in embodiment.perceivers.values() for one in use.asked]
         self.symbols += [symbol for symbol in joints if symbol not in initial]  # joints without a fact are shut
+        self.symbols += [symbol for symbol in measured if symbol not in self.symbols]  # and what is measured is false
         self.perturb = perturb
         furnish(self, perturb)
         draft = self._draft(initial)

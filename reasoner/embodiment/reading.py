@@ -9,6 +9,7 @@ import pyoxigraph as ox
 
 from confab import ontology
 from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
+from confab.reasoner.embodiment.measured import MEASURED, asked, bounds, one_valued, valued
 from confab.reasoner.embodiment.mechanisms import mechanisms
 from confab.reasoner.embodiment.skills import skill_uses
 from confab.reasoner.embodiment.values import (
@@ -64,7 +65,7 @@ def read_embodiment(
         bodies={names(node): _body(facts, node, shape, names) for node, shape in _shaped(facts)},
         fillings=_fillings(facts, names),
         skills=skill_uses(facts, names, store),
-        perceivers=_perceivers(facts, names),
+        perceivers=_perceivers(facts, names, one_valued(store), valued(store)),
         mechanisms=mechanisms(facts, names, folders),
         stands={names(node): _stand(facts, node, names) for node in facts.members("Stand")},
         cameras=tuple(facts.position(node) for node in facts.members("Camera")),
@@ -207,7 +208,9 @@ def _hand(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Seq
 # ----------------------------------------------------------------------------------------------- perceivers
 
 
-def _perceivers(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, PerceiverUse]:
+def _perceivers(
+    facts: BodyFacts, names: Callable[[str], str], with_one_value: frozenset[str], with_values: frozenset[str]
+) -> dict[str, PerceiverUse]:
     found = {}
     for situation in facts.ordered(node for node, links in facts.links.items() if "perceiver" in links):
         perceiver = facts.linked(situation, "perceiver")[0]
@@ -219,12 +222,19 @@ def _perceivers(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Perc
         kinds = {kind for kind, links in facts.links.items() if situation in links.get("has_situation_type", ())}
         links = facts.ordered(node for node, linked in facts.links.items() if "part_of" in linked)
         choices = [node for node in facts.ordered(facts.classes) if situation in facts.nearest_first(node)[1:]]
+        settings, values = facts.settings(perceiver, situation), tuple(map(names, choices))
+        measured = local_name(perceiver) == MEASURED
+        alone = situation not in with_values
         found[names(situation)] = PerceiverUse(
             names(situation),
             local_name(perceiver),
-            facts.settings(perceiver, situation),
+            settings,
             special,
-            tuple(map(names, choices)),
+            values,
             tuple(names(link) for link in links if kinds & set(facts.nearest_first(link))),
+            bounds(facts, situation, settings, alone) if measured else (),
+            asked(facts, situation, () if alone else values, names)
+            if measured and situation not in with_one_value
+            else (),
         )
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import pyoxigraph as ox
 
@@ -108,8 +108,8 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
         words("touches"),
         words("when"),
         text("foreseen", "false") == "true",
-        _guards(node, text("until")),
-        _guards(node, text("check")),
+        guards(node, text("until")),
+        guards(node, text("check")),
         node,
     )
     for what, said, known in (
@@ -133,7 +133,7 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
     return found
 
 
-def _guards(node: str, text: str) -> tuple[Guard, ...]:
+def guards(node: str, text: str) -> tuple[Guard, ...]:
     """Return the guards of a text such as ``force >= 30; slip <= slip else slip or drop``."""
     guards = []
     for piece in (piece.strip() for piece in text.split(";")):
@@ -146,3 +146,15 @@ def _guards(node: str, text: str) -> tuple[Guard, ...]:
         if match is not None:
             guards.append(Guard(match[1], 1 if match[2] == ">=" else -1, snake(match[3]), match[4] or ""))
     return tuple(guards)
+
+
+def evaluate(expression: str, known: Mapping[str, float]) -> float:
+    """Return the value of a sum of numbers and names.
+
+    >>> round(evaluate("raised-0.03", {"raised": 0.19}), 2)
+    0.16
+    """
+    total = 0.0
+    for sign, term in TERM.findall(expression):
+        total += (-1.0 if sign == "-" else 1.0) * (known[term] if term in known else float(term))
+    return total

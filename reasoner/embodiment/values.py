@@ -279,7 +279,8 @@ class SkillUse:
 class PerceiverUse:
     """The perceiver that reads a situation type off the world, its thresholds, and the individuals that stand for special values.
 
-    `choices` are the situation type's values in declared order; `links` are the links that have this situation type.
+    `choices` are the situation type's values in declared order; `links` are the links that have this situation type. A measured
+    type holds within the bounds `holds`; `asked` has the arguments of its symbols if these are true or false.
     """
 
     situation: str
@@ -288,6 +289,8 @@ class PerceiverUse:
     values: Mapping[str, str] = field(default_factory=dict)
     choices: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
+    holds: tuple[Guard, ...] = ()
+    asked: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,80 @@
+"""Read the bounds of measured situation types: `e:holdsIf` of the situation type, for the perceiver `e:perceive_measured`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import pyoxigraph as ox
+
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError, rows
+from confab.reasoner.embodiment.skills import TERM, guards
+from confab.reasoner.embodiment.values import Guard
+
+MEASURED = "perceive_measured"
+"""The perceiver of measured situation types."""
+
+PAIRED = ("beside", "apart", "above", "over", "inside", "contact", "turned")
+"""Quantities between two individuals, in metres, newtons and radians; `inside` is 1 or 0."""
+
+SINGLE = ("tilt", "joint")
+"""Quantities of one individual."""
+
+OF_JOINTS = ("opened", "shut", "lower", "upper")
+"""Numbers of a link that a bound may name."""
+
+ONE_VALUED = (
+    "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property . ?property a owl:FunctionalProperty }"
+)
+VALUED = "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property }"
+
+
+def one_valued(store: ox.Store) -> frozenset[str]:
+    """Return the situation types whose symbols have one value."""
+    return frozenset(row[0] for row in rows(store, ONE_VALUED))
+
+
+def valued(store: ox.Store) -> frozenset[str]:
+    """Return the situation types that have values at all, not only true and false."""
+    return frozenset(row[0] for row in rows(store, VALUED))
+
+
+def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alone: bool) -> tuple[Guard, ...]:
+    """Return the bounds under which a measured situation type holds; if `alone`, it is about one individual.
+
+    Raises
+    ------
+    EmbodimentError
+        There are none, or one names an unknown quantity or number.
+    """
+    found = guards(situation, facts.text(situation, "holds_if"))
+    known = SINGLE if alone else (*PAIRED, *SINGLE)
+    if not found:
+        raise EmbodimentError(f"{situation} has an empty :holdsIf; wanted bounds like beside <= 0.02", situation)
+    for guard in found:
+        if guard.quantity not in known:
+            whose = "one individual" if alone else "an individual and a value"
+            raise EmbodimentError(
+                f"{situation} has a bound on '{guard.quantity}'; wanted a quantity of {whose}: {', '.join(known)}",
+                situation,
+            )
+        for _, term in TERM.findall(guard.bound):
+            if term[0].isalpha() and term not in settings and not (guard.quantity == "joint" and term in OF_JOINTS):
+                raise EmbodimentError(
+                    f"{situation} has the bound '{guard}', but no number '{term}'; state it, or write a number",
+                    situation,
+                )
+    return found
+
+
+def asked(
+    facts: BodyFacts, situation: str, values: tuple[str, ...], names: Callable[[str], str]
+) -> tuple[tuple[str, ...], ...]:
+    """Return the arguments of all symbols of a type that is true or false: individuals, or pairs of individual and value."""
+    kinds = {kind for kind, links in facts.links.items() if situation in links.get("has_situation_type", ())}
+    those = (
+        node for node in facts.ordered(facts.classes) if node not in kinds and kinds & {*facts.nearest_first(node)[1:]}
+    )
+    individuals = [names(node) for node in those if node not in facts.supers]
+    if not values:
+        return tuple((one,) for one in individuals)
+    return tuple((one, value) for one in individuals for value in values if value != one)
