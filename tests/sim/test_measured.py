@@ -15,8 +15,8 @@ from confab.sim.world import World
 
 STACK = Path(__file__).parent / "right" / "stack.ttl"
 ON = """
-:ON a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :on ; e:perceiver e:perceive_measured ; e:holdsIf "{bounds}" .
-:ON rdfs:label "on"@en ; skos:definition "A block on another one."@en .
+:ON a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :on .
+:ON e:perceiver e:perceive_measured ; e:holdsIf "{bounds}" ; rdfs:label "on"@en ; skos:definition "A block on another one."@en .
 :on a owl:ObjectProperty, owl:NamedIndividual ; rdfs:domain :Block ; rdfs:range :ON ; rdfs:label "is on"@en .
 :on skos:definition "Relates a block to those below it."@en .
 :Block c:hasSituationType :ON ; rdfs:subClassOf :ON .
