@@ -86,6 +86,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "export": (
         "confab export towers-small -o towers",
         "confab export beverage-serving --trajectory -o serving.yaml",
+        "confab export rooms-waste --bt -o trees",
     ),
 }
 

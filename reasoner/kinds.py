@@ -33,8 +33,9 @@ GENERATED, IMPORTED, CONVERTED, CONSTRUCTED = (
     "a constructed ontology",
 )
 RUN = "the record of a run"
+TREE = "an exported behaviour tree"
 DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
-STAMP = re.compile(rb"[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})\n?\Z")
+STAMP = re.compile(rb"(<!-- )?[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})( -->)?\n?\Z")
 STAMP_BYTES = 200
 """Bytes at the end of a file that contain any stamp."""
 HEAD_BYTES = 4096
@@ -83,7 +84,8 @@ def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[s
     if not piece.endswith("\n"):
         digest.update(b"\n")
         yield "\n"
-    yield f"{comment} Written by Confab: {kind}; SHA-256 {digest.hexdigest()}\n"
+    end = " -->" if comment.startswith("<!--") else ""
+    yield f"{comment} Written by Confab: {kind}; SHA-256 {digest.hexdigest()}{end}\n"
 
 
 def kind_of(file: Path, suffix: str | None = None) -> Kind | None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.exceptions import Exit
 
 from confab.commands.options import (
     AS_JSON,
+    GOALS,
     PATH,
     QUIET,
     SCENE,
@@ -22,7 +24,10 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, TRAJECTORIES
-from confab.terminal import NO, YES, limited, remark, show_result, told
+from confab.terminal import EXIT, NO, YES, limited, remark, show_result, told
+
+if TYPE_CHECKING:
+    from confab.scene import Scene
 
 
 @command(epilog=examples("new"))
@@ -231,8 +236,10 @@ def import_(source: str, problem: Path | None, out: Path, level: int, time_limit
     is_flag=True,
     help="Instead the joint paths of a plan, verified in physics, into a .json or .yaml file.",
 )
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="The plan whose trajectories are written.")
+@click.option("--bt", "trees", is_flag=True, help="Instead a plan as a behaviour tree: BehaviorTree.CPP 4, py_trees.")
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="The plan whose trajectories or tree are written.")
 @click.option("--both-hands", is_flag=True, help="Trajectories with all hands at once.")
+@GOALS
 @SEED
 @TIME_LIMIT
 def export(
@@ -240,15 +247,23 @@ def export(
     out: Path,
     level: int | None,
     trajectory: bool,
+    trees: bool,
     plan: Path | None,
     both_hands: bool,
+    goal: tuple[str, ...],
     seed: int,
     time_limit: float | None,
 ) -> None:
-    """Write a level as PDDL, or the trajectories of a plan."""
+    """Write a level as PDDL, or a plan as trajectories or a behaviour tree."""
     from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load
 
+    if trajectory and trees:
+        raise KnowledgeError("--trajectory and --bt are two outputs; give one of them")
+    if goal and not trees:
+        raise KnowledgeError("--goal is of behaviour trees; add --bt")
+    if level is not None and (trajectory or trees):
+        raise KnowledgeError("--level is of PDDL; trajectories and trees are those of primitives")
     if trajectory:
         from confab.commands.given import load_scene, plan_in
         from confab.reasoner.files import check_replaceable
@@ -256,8 +271,6 @@ def export(
 
         if out.suffix not in FORMATS:
             raise KnowledgeError(f"{out}: wanted a name that ends in {', '.join(FORMATS)}")
-        if level is not None:
-            raise KnowledgeError("--level is of PDDL; trajectories are those of primitives")
         check_replaceable(out, TRAJECTORIES)
         with limited(time_limit):
             loaded = load_scene(scene)
@@ -265,11 +278,31 @@ def export(
         write_trajectories(out, data)
         print(f"{out}: trajectories of {len(data['primitives'])} primitives, verified with seed {seed}")
         return
-    if plan is not None or both_hands:
+    if both_hands or (plan is not None and not trees):
         raise KnowledgeError("--plan and --both-hands are of trajectories; add --trajectory")
-    from confab.pddl_commands import export_pddl
-
     with limited(time_limit):
-        paths = export_pddl(load(scene).problem, level, out)
+        if trees:
+            paths = _exported_trees(load(scene), plan, goal, out)
+        else:
+            from confab.pddl_commands import export_pddl
+
+            paths = export_pddl(load(scene).problem, level, out)
     for path in paths:
         print(path)
+
+
+def _exported_trees(loaded: Scene, plan: Path | None, goal: tuple[str, ...], out: Path) -> tuple[Path, Path]:
+    """Write the behaviour tree of a plan, made here if none is given; exit where there is none."""
+    from confab.commands.given import plan_in
+    from confab.trees import export_trees
+
+    if goal:
+        loaded = loaded.with_goal(*goal)
+    if plan is not None:
+        return export_trees(loaded.problem, plan_in(plan, loaded), out)
+    with progress("planning"):
+        result = loaded.plan()
+    if result.plan is None:
+        show_result(str(result))
+        raise Exit(EXIT[result.outcome.status.value])
+    return export_trees(result.problem, result.plan, out)

@@ -1,0 +1,322 @@
+"""Behaviour trees in files: BehaviorTree.CPP 4, with the model of its nodes for Groot2, and py_trees; and ticked in a world."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from confab.planner.acting.world import World
+from confab.planner.behavior_tree import All, Do, First, Holds, Mark, Marked, Node, Situation, Subtree, Together
+from confab.planner.behavior_tree import behavior_tree as tree_of
+from confab.planner.plan import Plan, Step
+from confab.reasoner.files import check_replaceable, write_whole
+from confab.reasoner.kinds import TREE, stamped
+from confab.reasoner.limits import check
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import Condition, Fact, Problem
+
+RETRIES = 5
+"""Number of failures after which an exported tree fails; until then it is ticked from the beginning."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """A node as both engines have it.
+
+    `kind` is Fallback, Sequence (both ask their first children again in each tick), Once (a sequence that goes on where it was),
+    Parallel, SubTree, Check, Set, Again, Condition or Action. `name` is that of a subtree, a mark or a leaf; `key` tells leaves
+    apart.
+    """
+
+    kind: str
+    name: str = ""
+    children: tuple[Element, ...] = ()
+    ports: Mapping[str, str] = field(default_factory=dict)
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Tree:
+    """The behaviour tree of a plan: subtrees by name, the first one the whole; what each leaf asks or does, by its key."""
+
+    subtrees: Mapping[str, Element]
+    leaves: Mapping[str, Fact | Condition | Step]
+    possible: frozenset[str]
+
+    def asks(self, key: str, situation: Situation) -> bool:
+        """Return whether the condition of a leaf holds in a situation."""
+        leaf = self.leaves[key]
+        if isinstance(leaf, Step):
+            return situation.can(leaf)
+        return situation.holds(Holds((leaf,)) if isinstance(leaf, Fact) else Holds(conditions=(leaf,)))
+
+
+def behavior_tree(problem: Problem, plan: Plan) -> Tree:
+    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`), as engines have it."""
+    lowering = _Lowering(problem)
+    lowering.lowered(tree_of(problem, plan))
+    return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
+
+
+def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path]:
+    """Write the behaviour tree of a plan as ``tree.xml`` and ``tree.py`` into a folder, and return both paths."""
+    tree = behavior_tree(problem, plan)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = folder / "tree.xml", folder / "tree.py"
+    for path in paths:
+        check_replaceable(path, TREE)
+    write_whole(paths[0], stamped(TREE, [to_btcpp(tree)], "<!-- #"))
+    write_whole(paths[1], stamped(TREE, [to_py_trees(tree)]))
+    return paths
+
+
+class _Lowering:
+    """Turns nodes into elements, and numbers the leaves."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.subtrees: dict[str, Element] = {}
+        self.leaves: dict[str, Fact | Condition | Step] = {}
+        self.possible: set[str] = set()
+
+    def lowered(self, node: Node) -> Element:
+        """Return the element of a node."""
+        check("exporting the behaviour tree")
+        match node:
+            case Holds(facts, conditions):
+                leaves = [self.leaf("Condition", *self.words(one), one) for one in (*facts, *conditions)]
+                return leaves[0] if len(leaves) == 1 else Element("Sequence", children=tuple(leaves))
+            case Do(step):
+                name, ports = self.primitive(step)
+                self.possible.add(f"{name}_possible")
+                possible = self.leaf("Condition", f"{name}_possible", ports, step)
+                once = Element("Once", children=(possible, self.leaf("Action", name, ports, step)))
+                return Element("Sequence", children=(once, Element("Again")))
+            case Marked(path):
+                return Element("Check", _mark(path))
+            case Mark(path, child):
+                yes, no = (Element("Set", _mark(path), ports={"value": value}) for value in ("true", "false"))
+                return Element("Fallback", children=(Element("Sequence", children=(self.lowered(child), yes)), no))
+            case All(nodes):
+                return Element("Sequence", children=tuple(map(self.lowered, nodes)))
+            case First(nodes):
+                return Element("Fallback", children=tuple(map(self.lowered, nodes)))
+            case Together(nodes):
+                return Element("Parallel", children=tuple(map(self.lowered, nodes)))
+            case Subtree(name, child):
+                self.subtrees[name] = Element("")  # its place is before those of the subtrees in it
+                self.subtrees[name] = self.lowered(child)
+                return Element("SubTree", name)
+
+    def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
+        """Return a leaf with a key of its own."""
+        key = f"{kind[0].lower()}{len(self.leaves)}"
+        self.leaves[key] = what
+        return Element(kind, name, ports=ports, key=key)
+
+    def primitive(self, step: Step) -> tuple[str, dict[str, str]]:
+        """Return name and ports of a primitive: those of its behaviour's parameters."""
+        parameters = self.problem.domain.behaviors[step.behavior].parameters
+        names = [_identifier(parameter.name.rpartition(".")[2]) for parameter in parameters]
+        return _identifier(step.behavior), dict(zip(names, step.arguments, strict=True))
+
+    def words(self, one: Fact | Condition) -> tuple[str, dict[str, str]]:
+        """Return name and ports of a condition: those of a situation type, or its text."""
+        if not isinstance(one, Fact):
+            return "Condition", {"condition": said(one)}
+        arguments = {f"argument{number}": each for number, each in enumerate(one.symbol.arguments, 1)}
+        return _identifier(one.symbol.situation), {**arguments, "value": one.value}
+
+
+def _mark(path: tuple[int, ...]) -> str:
+    return "done_" + "_".join(map(str, path))
+
+
+def _identifier(name: str) -> str:
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+# ------------------------------------------------------------------------------------------------------------- BehaviorTree.CPP
+
+TAGS = {"Fallback": "ReactiveFallback", "Sequence": "ReactiveSequence", "Once": "Sequence", "Parallel": "Parallel"}
+
+
+def to_btcpp(tree: Tree) -> str:
+    """Return a tree as XML of BehaviorTree.CPP 4, with the model of its nodes."""
+    first = next(iter(tree.subtrees))
+    root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": first})
+    for name, element in tree.subtrees.items():
+        node = ElementTree.SubElement(root, "BehaviorTree", {"ID": name})
+        if name == first:
+            node = ElementTree.SubElement(node, "RetryUntilSuccessful", {"num_attempts": str(RETRIES)})
+        node.append(_xml(element))
+    model = ElementTree.SubElement(root, "TreeNodesModel")
+    for (kind, name), ports in sorted(_models(tree).items()):
+        node = ElementTree.SubElement(model, kind, {"ID": name})
+        for port in ports:
+            ElementTree.SubElement(node, "input_port", {"name": port, "type": "std::string"})
+    ElementTree.indent(root, " ")
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _xml(element: Element) -> ElementTree.Element:
+    match element.kind:
+        case "SubTree":
+            return ElementTree.Element("SubTree", {"ID": element.name, "_autoremap": "true"})
+        case "Check":
+            return ElementTree.Element("ScriptCondition", {"code": f"{element.name} == true"})
+        case "Set":
+            return ElementTree.Element("Script", {"code": f"{element.name} := {element.ports['value']}"})
+        case "Again":
+            return ElementTree.Element("Sleep", {"msec": "1", "name": "tick anew"})
+        case "Condition" | "Action":
+            return ElementTree.Element(element.name, {"name": element.key, **element.ports})
+        case kind:
+            attributes = {"success_count": "-1", "failure_count": "1"} if kind == "Parallel" else {}
+            found = ElementTree.Element(TAGS[kind], attributes)
+            found.extend(map(_xml, element.children))
+            return found
+
+
+def _models(tree: Tree) -> dict[tuple[str, str], list[str]]:
+    """Return kinds and names of leaves with their ports."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for element in tree.subtrees.values():
+        for leaf in _leaves(element):
+            found.setdefault((leaf.kind, leaf.name), list(leaf.ports))
+    return found
+
+
+def _leaves(element: Element) -> Iterator[Element]:
+    if element.key:
+        yield element
+    for child in element.children:
+        yield from _leaves(child)
+
+
+# ------------------------------------------------------------------------------------------------------------- py_trees
+
+HEAD = '''"""A behaviour tree for py_trees: tree(leaf) returns its root.
+
+leaf(kind, name, key, **ports) returns a py_trees behaviour: of kind "Condition", which succeeds or fails at once,
+or "Action", which runs until a primitive has ended. These are the leaves:
+
+{leaves}
+"""
+
+from operator import eq
+
+from py_trees.behaviours import CheckBlackboardVariableValue, Running, SetBlackboardVariable
+from py_trees.common import ComparisonExpression, ParallelPolicy
+from py_trees.composites import Parallel, Selector, Sequence
+from py_trees.decorators import Retry
+
+
+def check(name):
+    return CheckBlackboardVariableValue(name, ComparisonExpression(name, True, eq))
+
+
+def mark(name, value):
+    return SetBlackboardVariable(name, name, value, overwrite=True)
+
+
+def parallel(*children):
+    return Parallel("Parallel", ParallelPolicy.SuccessOnAll(synchronise=False), list(children))
+
+
+'''
+
+
+def to_py_trees(tree: Tree) -> str:
+    """Return a tree as a module of Python for py_trees."""
+    names = {name: f"subtree{number}" for number, name in enumerate(tree.subtrees)}
+    leaves = [f"{kind} {name}({', '.join(ports)})" for (kind, name), ports in sorted(_models(tree).items())]
+    text = HEAD.format(leaves="\n".join(leaves))
+    for name, element in tree.subtrees.items():
+        text += f"def {names[name]}(leaf):  # {name}\n    return {_python(element, names, 1)}\n\n\n"
+    first = names[next(iter(tree.subtrees))]
+    return text + f'def tree(leaf):\n    return Retry("retry", {first}(leaf), {RETRIES})\n'
+
+
+def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
+    """Return an element as an expression."""
+    pad = "\n" + "    " * (depth + 1)
+    below = "".join(f"{pad}{_python(child, names, depth + 1)}," for child in element.children)
+    end = "\n" + "    " * depth
+    match element.kind:
+        case "SubTree":
+            return f"{names[element.name]}(leaf)"
+        case "Check":
+            return f"check({element.name!r})"
+        case "Set":
+            return f"mark({element.name!r}, {element.ports['value'] == 'true'})"
+        case "Again":
+            return 'Running("tick anew")'
+        case "Condition" | "Action":
+            ports = "".join(f", {port}={value!r}" for port, value in element.ports.items())
+            return f"leaf({element.kind!r}, {element.name!r}, {element.key!r}{ports})"
+        case "Parallel":
+            return f"parallel({below}{end})"
+        case "Fallback":
+            return f'Selector("Fallback", memory=False, children=[{below}{end}])'
+        case kind:
+            return f'Sequence("Sequence", memory={kind == "Once"}, children=[{below}{end}])'
+
+
+def filled(tree: Tree, path: Path, problem: Problem, world: World, told: Callable[[Step], None] | None = None) -> Any:
+    """Return the root of an exported ``tree.py``, its leaves filled by a world: conditions by observation, actions by execution.
+
+    Parameters
+    ----------
+    tree : Tree
+        The one that was exported.
+    path : Path
+        Its ``tree.py``.
+    problem : Problem
+    world : World
+    told : callable, optional
+        Is told each primitive before it is executed.
+    """
+    from py_trees.behaviour import Behaviour
+    from py_trees.common import Status
+
+    class Leaf(Behaviour):
+        def __init__(self, kind: str, name: str, key: str) -> None:
+            super().__init__(f"{name} {key}")
+            self.kind, self.key = kind, key
+
+        def update(self) -> Status:
+            if self.kind == "Condition":
+                seen = Situation(problem, {**unseen, **world.observe()})
+                return Status.SUCCESS if tree.asks(self.key, seen) else Status.FAILURE
+            step = tree.leaves[self.key]
+            assert isinstance(step, Step)
+            if told is not None:
+                told(step)
+            return Status.SUCCESS if world.execute(step).ok else Status.FAILURE
+
+    seen_first = world.observe()
+    unseen = {
+        symbol: value
+        for symbol, value in problem.initial.items()
+        if symbol not in seen_first and not problem.domain.situations[symbol.situation].boolean
+    }
+    made = runpy.run_path(str(path))["tree"]
+    return made(lambda kind, name, key, **ports: Leaf(kind, name, key))
+
+
+def ticked(root: Any, most: int = 10_000) -> bool:
+    """Tick the root of a tree until it succeeds or fails, or that many times; return whether it succeeded."""
+    from py_trees.common import Status
+
+    for _ in range(most):
+        check("ticking the behaviour tree")
+        root.tick_once()
+        if root.status != Status.RUNNING:
+            return bool(root.status == Status.SUCCESS)
+    return False

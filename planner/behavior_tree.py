@@ -1,0 +1,266 @@
+"""A plan as a reactive behaviour tree, which goes on by itself after a disturbance that undoes a step.
+
+Each step becomes a fallback: *what it brings about already holds*, else *its conditions hold, do it*. What has to hold are the
+causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that needs a fact of it. A
+link is kept as long as the fact holds, or once the later primitive is done itself. So a primitive is done again exactly if one
+that is still to come needs it. Whether primitives are done is marked at the beginning of each tick, the last one first; after
+each primitive the tree is ticked anew. Steps are ticked in the order of the plan; steps beside each other whose primitives
+neither need nor disturb one another, and have different workers, are parallel. The steps below an abstract step are a subtree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import TypeAlias
+
+import networkx
+
+from confab.planner.acting.schedule import Order, partial_order, worker_of, workers_of
+from confab.planner.causal_links import Change, Kind, Need, Purpose, purposes
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import Facts, Rules, successor
+from confab.reasoner.amounts import meets
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
+
+
+@dataclass(frozen=True)
+class Holds:
+    """A condition leaf: some facts, or else some conditions with individuals put in, hold."""
+
+    facts: tuple[Fact, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True)
+class Do:
+    """Conditions and an action: if its preconditions hold, a primitive is executed to its end; then the tree is ticked anew."""
+
+    step: Step
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A condition leaf: the step of a path was marked as done in this tick."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Marks the step of a path as done if the child succeeds, as not done otherwise; succeeds."""
+
+    path: Path
+    child: Node
+
+
+@dataclass(frozen=True)
+class All:
+    """Children that are ticked one after the other, as long as they succeed."""
+
+    children: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class First:
+    """Children that are ticked one after the other, until one succeeds."""
+
+    children: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Together:
+    """Children that are ticked at the same time, and have to succeed all."""
+
+    children: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Subtree:
+    """A tree with a name of its own: the whole, the marking, or the steps below a step."""
+
+    name: str
+    child: Node
+
+
+Path: TypeAlias = "tuple[int, ...]"
+Node: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Subtree"
+
+
+def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
+    """Return the tree of a plan.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its initial state is the one that the plan begins in.
+    plan : Plan
+        A valid one (`confab.planner.validation.validate`).
+    """
+    tree = _Tree(problem, plan)
+    goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
+    marking = Subtree("what is done", All(tree.marks()))
+    return Subtree("plan", First((goal, All((marking, *tree.in_order(plan.steps), goal)))))
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """Return the children of a node."""
+    if isinstance(node, All | First | Together):
+        return node.children
+    return (node.child,) if isinstance(node, Subtree | Mark) else ()
+
+
+class _Tree:
+    """The nodes of a plan's steps."""
+
+    def __init__(self, problem: Problem, plan: Plan) -> None:
+        self.problem = problem
+        primitives = plan.primitives
+        self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
+        asked_above = _asked_above(self.purposes, purposes(problem, plan), plan)
+        self.needs: dict[Path, list[Need]] = {}
+        for step in reversed(primitives):  # what only a step asks for that nothing needs isn't needed either
+            needs = dict.fromkeys(self.purposes[step.path].needs)
+            for change, consumers in asked_above.get(step.path, ()):
+                needs |= {
+                    Need(Kind.LATER, (change,), by): None for by in [b for b in consumers if self.needs.get(b)][:1]
+                }
+            self.needs[step.path] = [need for need in needs if not need.by or self.needs.get(need.by)]
+        self.position = {step.path: number for number, step in enumerate(primitives)}
+        self.order: Order = partial_order(problem, primitives)
+        self.workers = workers_of(problem)
+
+    # --------------------------------------------------------------------------------------------------- steps
+
+    def at_rest(self) -> list[Fact]:
+        """Return the rest values of all symbols that the plan changes."""
+        changed = {change.fact.symbol for purpose in self.purposes.values() for change in purpose.gives}
+        rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
+        return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
+
+    def marks(self) -> tuple[Node, ...]:
+        """Return the marks of all primitives that something needs, the last first."""
+        needed = [path for path in self.position if self.needs[path]]
+        return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
+
+    def in_order(self, steps: Iterable[Step]) -> tuple[Node, ...]:
+        """Return the nodes of steps beside each other; consecutive ones that are independent are parallel."""
+        groups: list[list[Step]] = []
+        for step in steps:
+            check("building the behaviour tree")
+            if not self.needed(step):
+                continue
+            if groups and all(self.independent(step, other) for other in groups[-1]):
+                groups[-1].append(step)
+            else:
+                groups.append([step])
+        return tuple(
+            self.node(group[0]) if len(group) == 1 else Together(tuple(map(self.node, group))) for group in groups
+        )
+
+    def needed(self, step: Step) -> list[Step]:
+        """Return the primitives of a step that something needs."""
+        return [below for below in Plan((step,)).primitives if self.needs[below.path]]
+
+    def node(self, step: Step) -> Node:
+        """Return the fallback of a step."""
+        if not step.steps:
+            return First((self.kept(step.path), Do(step)))
+        guard = All(tuple(self.kept(below.path) for below in self.needed(step)))
+        return First((guard, Subtree(f"{step} at {_dotted(step.path)}", All(self.in_order(step.steps)))))
+
+    def independent(self, one: Step, other: Step) -> bool:
+        """Return whether no primitive of one step waits for one of the other, and their workers differ."""
+        ours, theirs = Plan((one,)).primitives, Plan((other,)).primitives
+        busy = {worker_of(step, self.workers) for step in ours} & {worker_of(step, self.workers) for step in theirs}
+        if busy or not self.workers:
+            return False
+        pairs = [(self.position[a.path], self.position[b.path]) for a, b in product(ours, theirs)]
+        return not any(networkx.has_path(self.order, *sorted(pair)) for pair in pairs)
+
+    # --------------------------------------------------------------------------------------------------- what steps are for
+
+    def kept(self, path: Path) -> Node:
+        """Return the condition that all links from a primitive are kept."""
+        links = tuple(dict.fromkeys(map(self.link, self.needs[path])))
+        return links[0] if len(links) == 1 else All(links)
+
+    def link(self, need: Need) -> Node:
+        """Return the condition that a link is kept: the later step is done, its facts hold, or what is asked of them holds."""
+        kept: list[Node] = [Marked(need.by)] if need.by else []
+        kept.append(Holds(tuple(self.wanted(change, need.kind) for change in need.gives)))
+        if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
+            kept.append(Holds(conditions=need.conditions))
+        return kept[0] if len(kept) == 1 else First(tuple(kept))
+
+    def is_amount(self, symbol: Symbol) -> bool:
+        """Return whether the values of a symbol are numbers."""
+        return self.problem.domain.situations[symbol.situation].quantity is not None
+
+    def wanted(self, change: Change, kind: Kind) -> Fact:
+        """Return the fact of a change; of an amount that it is at least, or at most, what the plan has where it is needed."""
+        symbol, value = change.fact.symbol, change.fact.value
+        if kind is Kind.GOAL and symbol in self.problem.goal:
+            return Fact(symbol, self.problem.goal[symbol])
+        if not self.is_amount(symbol):
+            return change.fact
+        return Fact(symbol, f">={value}" if Fraction(value) > Fraction(change.before) else f"<={value}")
+
+
+def _asked_above(
+    below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
+) -> dict[Path, list[tuple[Change, list[Path]]]]:
+    """Return the links between abstract steps by primitives: the fact, and the primitives with which the link may end.
+
+    Such a link begins with the primitive that gives the fact. It ends with the first primitive of the later step that changes
+    it, or else with the last one that something needs.
+    """
+    under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
+    found: dict[Path, list[tuple[Change, list[Path]]]] = {}
+    for path, purpose in whole.items():
+        for need in purpose.needs if under[path] != [path] else ():
+            for change in need.gives if need.kind is Kind.LATER else ():
+                writers = [one for one in under[path] if _changes(below[one], change.fact.symbol)]
+                consumers = [one for one in under[need.by] if _changes(below[one], change.fact.symbol)]
+                if writers:
+                    found.setdefault(writers[-1], []).append((change, [*consumers[:1], *reversed(under[need.by])]))
+    return found
+
+
+def _changes(purpose: Purpose, symbol: Symbol) -> bool:
+    return any(change.fact.symbol == symbol for change in purpose.gives)
+
+
+def _dotted(path: Path) -> str:
+    return ".".join(map(str, path))
+
+
+# ------------------------------------------------------------------------------------------------------------- evaluation
+
+
+class Situation:
+    """What the leaves of a tree ask of a state."""
+
+    def __init__(self, problem: Problem, state: State) -> None:
+        self.problem, self.state = problem, state
+        self.rules = Rules(problem)
+        self.facts = Facts(problem, state, self.rules)
+
+    def holds(self, leaf: Holds) -> bool:
+        """Return whether the facts or conditions of a leaf hold."""
+        if leaf.conditions:
+            return self.rules.satisfied(leaf.conditions, {}, {}, self.facts) is not None
+        return all(self.is_so(fact) for fact in leaf.facts)
+
+    def is_so(self, fact: Fact) -> bool:
+        """Return whether a fact holds; the value of an amount may be a comparison."""
+        value = self.facts.value(fact.symbol.situation, fact.symbol.arguments)
+        return value is not None and meets(value, fact.value)
+
+    def can(self, step: Step) -> bool:
+        """Return whether the preconditions of a primitive hold."""
+        behavior = self.problem.domain.behaviors[step.behavior]
+        return successor(self.problem, behavior, step.arguments, self.state) is not None

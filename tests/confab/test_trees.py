@@ -1,0 +1,163 @@
+"""Behaviour trees: ticked by a small interpreter, they carry plans out, and go on after disturbances; their files are whole."""
+
+import ast
+import random
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import confab
+from confab.cli import app
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.acting.world import Report
+from confab.planner.behavior_tree import Situation
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import open_goals
+from confab.reasoner.symbols import Problem
+from confab.trees import Element, Tree, behavior_tree, export_trees
+
+
+class Ticking:
+    """What both engines do, in one function; a primitive is done at once, and the tree is ticked anew behind it."""
+
+    def __init__(self, problem: Problem, tree: Tree, world: SymbolicWorld) -> None:
+        self.problem, self.tree, self.world = problem, tree, world
+        self.marks: dict[str, bool] = {}
+        self.done: list[str] = []
+
+    def tick(self) -> bool | None:
+        """Return whether the tree succeeds or fails; None while it runs."""
+        self.situation = Situation(self.problem, self.world.observe())
+        return self.element(next(iter(self.tree.subtrees.values())))
+
+    def element(self, one: Element) -> bool | None:
+        match one.kind:
+            case "SubTree":
+                return self.element(self.tree.subtrees[one.name])
+            case "Check":
+                return self.marks[one.name]
+            case "Set":
+                self.marks[one.name] = one.ports["value"] == "true"
+                return True
+            case "Again":
+                return None
+            case "Condition":
+                return self.tree.asks(one.key, self.situation)
+            case "Action":
+                step = self.tree.leaves[one.key]
+                assert isinstance(step, Step)
+                self.done.append(str(step))
+                return self.world.execute(step).ok
+            case "Parallel":
+                said = [self.element(child) for child in one.children]
+                return False if False in said else None if None in said else True
+            case kind:
+                for child in one.children:
+                    told = self.element(child)
+                    if told is not (kind != "Fallback"):
+                        return told
+                return kind != "Fallback"
+
+
+def run(problem: Problem, plan: Plan, world: SymbolicWorld, most: int = 300) -> tuple[bool, Ticking]:
+    """Tick until the tree succeeds, or fails five times, as its retry does."""
+    ticking, failures = Ticking(problem, behavior_tree(problem, plan), world), 0
+    for _ in range(most):
+        said = ticking.tick()
+        failures += said is False
+        if said or failures == 5:
+            return bool(said), ticking
+    return False, ticking
+
+
+def planned(name: str) -> tuple[Problem, Plan]:
+    scene = confab.load(name)
+    plan = scene.plan().plan
+    assert plan is not None
+    return scene.problem, plan
+
+
+@pytest.mark.parametrize("name", ["rooms-waste", "two-cups", "drawers-small", "packing-small", "gallery-small"])
+def test_a_tree_carries_its_plan_out_in_the_order_of_the_plan(name: str) -> None:
+    problem, plan = planned(name)
+    world = SymbolicWorld(problem)
+    reached, ticking = run(problem, plan, world)
+    assert reached
+    assert not open_goals(replace(problem, initial=world.state))
+    assert ticking.done == [str(step) for step in plan.primitives]
+
+
+class Undone(SymbolicWorld):
+    """A world in which a goal is undone once: a thing is back at its first place, or furniture as at first."""
+
+    def __init__(self, problem: Problem, after: int, draw: random.Random) -> None:
+        super().__init__(problem)
+        self.left, self.draw, self.undone = after, draw, ""
+
+    def execute(self, step: Step) -> Report:
+        said = super().execute(step)
+        self.left -= 1
+        free = all(
+            value not in self.problem.members("MobileRobot")
+            for s, value in self.state.items()
+            if s.situation == "THING_AT"
+        )
+        first = {s: self.problem.initial.get(s, "false") for s in self.state}
+        changed = [s for s in self.problem.goal if self.state.get(s, "false") != first.get(s, "false") and free]
+        if self.left <= 0 and not self.undone and changed:
+            symbol = self.draw.choice(sorted(changed))
+            self.undone = f"{step}: {symbol}"
+            self.state[symbol] = first[symbol]
+        return said
+
+
+@pytest.mark.parametrize("name", ["rooms-waste", "rooms-breakfast"])
+def test_a_tree_goes_on_by_itself_after_a_disturbance_that_undoes_a_step(name: str) -> None:
+    problem, plan = planned(name)
+    for after in range(1, len(plan.primitives), 4):
+        world = Undone(problem, after, random.Random(after))
+        reached, ticking = run(problem, plan, world)
+        assert reached, (world.undone, ticking.done)
+        assert not open_goals(replace(problem, initial=world.state))
+
+
+def test_steps_of_different_workers_that_do_not_disturb_one_another_are_parallel() -> None:
+    problem, plan = planned("drawers-small")
+    text = "".join(kind for one in behavior_tree(problem, plan).subtrees.values() for kind in kinds(one))
+    assert "Parallel" in text
+
+
+def kinds(element: Element) -> list[str]:
+    return [element.kind, *(kind for child in element.children for kind in kinds(child))]
+
+
+def test_the_files_are_whole_and_say_what_their_leaves_are(tmp_path: Path) -> None:
+    problem, plan = planned("rooms-waste")
+    xml, python = export_trees(problem, plan, tmp_path)
+    root = ElementTree.parse(xml).getroot()
+    trees = {tree.get("ID") for tree in root.iter("BehaviorTree")}
+    assert root.get("main_tree_to_execute") in trees
+    assert {tree.get("ID") for tree in root.iter("SubTree")} <= trees
+    model = root.find("TreeNodesModel")
+    assert model is not None
+    ports = {node.get("ID"): {port.get("name") for port in node} for node in model}
+    own = {"ReactiveFallback", "ReactiveSequence", "Sequence", "Parallel", "Script", "ScriptCondition", "Sleep"}
+    for tree in root.iter("BehaviorTree"):
+        for node in tree.iter():
+            if node.tag not in own | {"BehaviorTree", "SubTree", "RetryUntilSuccessful"}:
+                assert {*node.attrib} - {"name"} == ports[node.tag]
+    assert {"B2_PICK", "B2_PICK_possible", "THING_AT"} <= ports.keys()
+    ast.parse(python.read_text(encoding="utf-8"))
+    export_trees(problem, plan, tmp_path)  # replaces its own files
+    xml.write_text(xml.read_text(encoding="utf-8").replace("plan", "my plan"), encoding="utf-8")
+    with pytest.raises(OSError, match=r"tree\.xml"):
+        export_trees(problem, plan, tmp_path)
+
+
+def test_the_command_line_exports_trees(tmp_path: Path) -> None:
+    said = CliRunner().invoke(app, ["export", "rooms-snacks", "--bt", "-o", str(tmp_path / "out")])
+    assert said.exit_code == 0, said.output
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["tree.py", "tree.xml"]
