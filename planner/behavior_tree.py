@@ -19,7 +19,7 @@ from typing import TypeAlias
 import networkx
 
 from confab.planner.acting.schedule import Order, partial_order, worker_of, workers_of
-from confab.planner.causal_links import Change, Kind, Need, Purpose, purposes
+from confab.planner.causal_links import FactChange, Kind, Need, Purpose, purposes
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import Facts, Rules, successor
 from confab.reasoner.amounts import meets
@@ -200,7 +200,7 @@ class _Tree:
         """Return whether the values of a symbol are numbers."""
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
-    def wanted(self, change: Change, kind: Kind) -> Fact:
+    def wanted(self, change: FactChange, kind: Kind) -> Fact:
         """Return the fact of a change; of an amount that it is at least, or at most, what the plan has where it is needed."""
         symbol, value = change.fact.symbol, change.fact.value
         if kind is Kind.GOAL and symbol in self.problem.goal:
@@ -212,14 +212,14 @@ class _Tree:
 
 def _asked_above(
     below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
-) -> dict[Path, list[tuple[Change, list[Path]]]]:
+) -> dict[Path, list[tuple[FactChange, list[Path]]]]:
     """Return the links between abstract steps by primitives: the fact, and the primitives with which the link may end.
 
     Such a link begins with the primitive that gives the fact. It ends with the first primitive of the later step that changes
     it, or else with the last one that something needs.
     """
     under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
-    found: dict[Path, list[tuple[Change, list[Path]]]] = {}
+    found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}
     for path, purpose in whole.items():
         for need in purpose.needs if under[path] != [path] else ():
             for change in need.gives if need.kind is Kind.LATER else ():
