@@ -1,1 +1,1 @@
-"""One level grounded to bits: reachability, operators, heuristic search, all of its states."""
+"""One level as a grounded task: reachability, operators on bits, heuristic search, exhaustive search."""

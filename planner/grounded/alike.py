@@ -1,4 +1,4 @@
-"""Conditional effects of one shape as one, so that they are grounded by one join."""
+"""Conditional effects of the same shape merged into one effect, so that one join grounds them."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ def _parts(effect: ValueEffect) -> list[ValueEffect | ValueCondition]:
 
 
 def _shape(effect: ValueEffect) -> object:
-    """Return what effects have in common that differ in individuals alone; whatever else is asked than values is a difference."""
+    """Return the common shape of effects that differ only in individuals.
+
+    Other conditions than on values count as a difference.
+    """
     values = tuple(
         (type(p), p.situation, tuple(t if is_variable(t) else "" for t in p.arguments), p.value) for p in _parts(effect)
     )
@@ -67,7 +70,7 @@ def _constants(effect: ValueEffect) -> tuple[str, ...]:
 
 
 def _kinds(effect: ValueEffect, situations: Mapping[str, SituationType]) -> list[str]:
-    """Return the class of each of the constants."""
+    """Return the class of each constant."""
     return [
         kind
         for part in _parts(effect)
@@ -77,7 +80,7 @@ def _kinds(effect: ValueEffect, situations: Mapping[str, SituationType]) -> list
 
 
 def _with_constants(effect: ValueEffect, terms_: Iterator[str]) -> ValueEffect:
-    """Return an effect with other terms in the places of its constants."""
+    """Return an effect with its constants replaced by other terms."""
 
     def put(arguments: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(term if is_variable(term) else next(terms_) for term in arguments)

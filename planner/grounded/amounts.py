@@ -33,29 +33,29 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 Exact: TypeAlias = "int | Fraction"
 Vector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
-"""How far an operator moves the amount of a comparison; None where that depends on the state."""
+"""How far an operator moves the amount of a comparison; None if that depends on the state."""
 
 
 @dataclass(frozen=True)
 class Linear:
-    """Amounts (by their places in the tuple) times numbers, added up with a constant."""
+    """A linear expression: amounts (by their positions in the tuple) times factors, plus a constant."""
 
     terms: tuple[tuple[int, Exact], ...]
     constant: Exact
 
     def of(self, vector: Vector) -> Exact:
-        """Return what it comes to."""
+        """Return the value of the expression."""
         total = self.constant
         for place, factor in self.terms:
             total += vector[place] * factor
         return total
 
     def worth(self, vector: Vector) -> float:
-        """Return what it comes to, as a cost."""
+        """Return the value of the expression as a cost."""
         return float(self.of(vector))
 
     def bounds(self, quantities: Sequence[Quantity]) -> tuple[float | Exact, float | Exact]:
-        """Return what it comes to at least and at most, where each amount keeps to its bounds."""
+        """Return the minimum and maximum of the expression within the bounds of its amounts."""
         least: float | Exact = self.constant
         most = least
         for place, factor in self.terms:
@@ -66,7 +66,7 @@ class Linear:
         return least, most
 
     def plus(self, other: Linear, times: Exact = 1) -> Linear:
-        """Return the sum with another, that one multiplied."""
+        """Return the sum of this expression and a multiple of another one."""
         found = defaultdict[int, Exact](int, self.terms)
         for place, factor in other.terms:
             found[place] += factor * times
@@ -74,7 +74,7 @@ class Linear:
         return Linear(terms, _exact(self.constant + other.constant * times))
 
     def times(self, factor: Exact) -> Linear:
-        """Return it multiplied."""
+        """Return a multiple of the expression."""
         return Linear((), 0).plus(self, factor)
 
 
@@ -93,7 +93,7 @@ class Move:
 
 
 class AmountTable:
-    """The amounts of a level while it is being grounded: those that change have places, comparisons of them get bits.
+    """The amounts of a level during grounding: changing amounts get positions, comparisons of them get bits.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class AmountTable:
         return written(Fraction(self.now[symbol]))
 
     def linear(self, expression: Expression, terms: Mapping[str, str]) -> Linear | None:
-        """Return an expression with individuals put in; None if it comes to nothing.
+        """Return an expression with individuals for its terms; None if it has no value.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return whether a difference is always, or never, so whatever its amounts can be; None if that depends on them."""
+        """Return whether a comparison is always true, or never, for all values of its amounts; None if that depends on them."""
         least, most = difference.bounds(self.quantities)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
@@ -197,7 +197,7 @@ class AmountTable:
         return None
 
     def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
-        """Return the alternatives of which one must hold for a comparison's bit not to be set; None if it is no comparison's."""
+        """Return the alternatives for a comparison's bit not to be set; None if the bit is no comparison's."""
         for (difference, sign), its in self.bits.items():
             if its == bit:
                 return list(self.comparison(difference, sign, Linear((), 0), True, fresh))
@@ -236,14 +236,14 @@ class Amounts:
     _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Begin with the first tuple."""
+        """Begin with the initial tuple."""
         self.compared = sum(1 << bit for bit in self.bits.values())
         self.keep = ~self.compared & (1 << self.size) - 1
         self.numbered(self.first, 0, range(len(self.symbols)))
 
     @cached_property
     def at(self) -> Mapping[int, Sequence[tuple[int, Linear, str]]]:
-        """The comparisons in which each place is."""
+        """For each position the comparisons in which it occurs."""
         found = defaultdict[int, list[tuple[int, Linear, str]]](list)
         for (difference, sign), bit in self.bits.items():
             for place, _ in difference.terms:
@@ -251,7 +251,7 @@ class Amounts:
         return found
 
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
-        """Return the number of a tuple; where it is new, its bits are those of another but for what changed."""
+        """Return the number of a tuple; for a new tuple, its bits are derived from another one by the differences."""
         number = self._number.get(vector)
         if number is None:
             for place in changed:
@@ -269,18 +269,18 @@ class Amounts:
         return self.vectors[state >> self.size]
 
     def begun(self, state: int) -> int:
-        """Return a state's bits with the first amounts."""
+        """Return a state's bits with the initial amounts."""
         return state & self.keep | self._masks[0]
 
     def made(self, operator: int) -> tuple[Move, ...]:
-        """Return the changes that an operator makes, worked out once."""
+        """Return the changes of an operator, computed once."""
         moves = self._moves.get(operator)
         if moves is None:
             moves = self._moves[operator] = self.moves(operator)
         return moves
 
     def applied(self, before: int, after: int, operator: int) -> int | None:
-        """Return a state with its amounts changed by an operator as they were before; None if one can't be what it would be."""
+        """Return a state with its amounts changed by an operator; None if an amount can't have its new value."""
         moves = self.made(operator)
         if not moves:
             return after
@@ -320,7 +320,7 @@ class Amounts:
 
 
 def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
-    """Return what a difference comes to after some changes that assign a number to each of its amounts; None unless they do."""
+    """Return the value of a difference after changes that assign a number to each of its amounts; None unless they do."""
     given = {
         move.place: move.by.constant
         for move in moves

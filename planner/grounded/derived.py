@@ -20,23 +20,23 @@ from functools import cached_property, partial
 from confab.planner.grounded.derived_arrays import Bit, by_arrays
 
 AT_ONCE, CALLS = 50, 60
-"""In the time in which Python looks at one alternative, arrays look at so many; the calls of one layer, in alternatives."""
+"""Number of alternatives that arrays process while Python processes one; and the cost of the calls for a layer, in alternatives."""
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The bits of a task that follow from others, in parts; each comes behind those that it needs."""
+    """The derived bits of a task, in parts; each part follows those on which it depends."""
 
     parts: tuple[tuple[Bit, ...], ...] = ()
 
     @cached_property
     def mask(self) -> int:
-        """All bits that follow from others."""
+        """All derived bits."""
         return sum(bit.mask for part in self.parts for bit in part)
 
     @cached_property
     def ways(self) -> Sequence[tuple[Sequence[int], int]]:
-        """What each alternative asks for and the bit that it sets, by number; the opposite of a bit is had for nothing."""
+        """The required bits and the resulting bit of each alternative, by number; opposites of bits cost nothing."""
         return [
             ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
             for part in self.parts
@@ -46,16 +46,16 @@ class Derived:
 
     @cached_property
     def needed(self) -> int:
-        """All bits that some alternative asks for."""
+        """All bits that some alternative requires."""
         return _union(way for part in self.parts for bit in part for way in bit.alternatives)
 
     @cached_property
     def effort(self) -> int:
-        """The alternatives gone through after a change, at most, but for those of parts of one bit where these are few."""
+        """Maximum number of alternatives examined after a change, except those of small parts of one bit."""
         return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 
     def completed(self, state: int) -> int:
-        """Return a state with all these bits as they have to be."""
+        """Return a state with all derived bits computed."""
         if self._few < self._all:
             return self._by_arrays(state)
         for number in range(len(self.parts)):
@@ -63,7 +63,7 @@ class Derived:
         return state
 
     def after(self, state: int, before: int) -> int:
-        """Return a state, made by changes from another one that was complete, with these bits as they have to be."""
+        """Return a state with derived bits updated after changes of a complete state."""
         users, woken = self._users, self._woken
         waiting: list[int] = []
         seen: set[int] = set()
@@ -89,7 +89,7 @@ class Derived:
             changed, state = new ^ state, new
 
     def fresh(self, state: int, bits: int) -> int:
-        """Return a state with some of these bits as they have to be; the others may be those of another state."""
+        """Return a state with some derived bits computed; the other ones may be those of another state."""
         support = self._support(bits & self.mask)
         if len(support) > self._few:
             return self._by_arrays(state)
@@ -104,12 +104,12 @@ class Derived:
 
     @cached_property
     def _few(self) -> int:
-        """The alternatives that are as much work one by one as all are by arrays."""
+        """Number of alternatives whose work one by one equals that of all by arrays."""
         return self._all // AT_ONCE + CALLS * len(self._layers)
 
     @cached_property
     def _layers(self) -> Sequence[Sequence[Bit]]:
-        """The bits by how many parts are below theirs."""
+        """The bits, by the number of parts below theirs."""
         height: dict[int, int] = {}  # by bit
         found: list[list[Bit]] = []
         for part in self.parts:
@@ -126,7 +126,7 @@ class Derived:
         return by_arrays(self._layers)
 
     def _worked_out(self, number: int, state: int) -> int:
-        """Return a state with the bits of one part as they have to be."""
+        """Return a state with the derived bits of one part computed."""
         work = self._works.get(number)
         if work is None:
             work = self._works[number] = _work(self.parts[number])
@@ -137,7 +137,7 @@ class Derived:
         return {}
 
     def _support(self, bits: int) -> Sequence[int]:
-        """Return the parts on which bits depend, in order."""
+        """Return the parts on which some bits depend, in order."""
         known = self._supports.get(bits)
         if known is None:
             found: set[int] = set()
@@ -160,7 +160,7 @@ class Derived:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
     def within(self, state: int, changing: int, wanted: int) -> Derived:
-        """Return what it takes for some bits where, of all that don't follow, only some ever differ from a state."""
+        """Return the minimal condition for some bits if, of the other bits, only some ever differ from a state."""
         parts = []
         for number in self._support(wanted & self.mask):
             part = self.parts[number]
@@ -177,7 +177,7 @@ class Derived:
         return Derived(tuple(tuple(map(left, part)) for part in parts))
 
     def renamed(self, small: Callable[[int], int]) -> Derived:
-        """Return the same over other bits."""
+        """Return the same condition over other bits."""
         return Derived(
             tuple(
                 tuple(Bit(small(bit.mask), tuple(map(small, bit.alternatives)), bit.opposite) for bit in part)
@@ -187,7 +187,7 @@ class Derived:
 
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
-        """For each bit that is needed, the parts that need it and aren't its own: of a part of one bit, that bit and its sense."""
+        """For each required bit, the parts that require it, except its own: for a part of one bit, that bit and its sign."""
         found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)
@@ -202,7 +202,7 @@ class Derived:
 
     @cached_property
     def _woken(self) -> Mapping[int, int]:
-        """For each bit that is needed, the alternatives of the parts that need it."""
+        """For each required bit, the alternatives of the parts that require it."""
         ways = [_ways(part) for part in self.parts]
         return {low: sum(ways[number] for number, _, _ in users) for low, users in self._users.items()}
 
@@ -219,7 +219,7 @@ def _single(mask: int) -> Iterable[int]:
 
 
 def _work(part: tuple[Bit, ...]) -> Callable[[int], int]:
-    """Return what gives a state the bits of one part as they have to be."""
+    """Return a function that computes the bits of one part in a state."""
     if len(part) == 1:
         return partial(_alone, part[0])
     return _by_counting(part)

@@ -1,4 +1,4 @@
-"""Bits that follow from other bits, all of a task at once: in layers, each by arrays of all its alternatives."""
+"""All derived bits of a task at once: in layers, each by arrays of all its alternatives."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Bit:
 
 
 def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
-    """Return what gives a state all bits of some layers as they have to be; a layer needs none behind it."""
+    """Return a function that computes all bits of some layers; a layer depends on earlier ones only."""
     bits = list(chain(*layers))
     own = reduce(or_, (bit.mask for bit in bits))
     size = reduce(or_, (way for bit in bits for way in bit.alternatives), own).bit_length()
@@ -69,7 +69,7 @@ class _Layer:
         )
 
     def work(self, flags: Flags) -> None:
-        """Set the flags of the layer's bits, none of which is set before, in rounds until nothing is new."""
+        """Set the flags of the layer's bits, initially unset, in rounds until nothing changes."""
         active = np.flatnonzero(_all_set(flags, self.before))
         lacking, goal = [column[active] for column in self.inside], self.heads[active]
         while lacking and len(goal):

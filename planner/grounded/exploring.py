@@ -16,12 +16,12 @@ from confab.planner.grounded.task import Task
 from confab.reasoner.limits import check
 
 MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
-"""What the states kept by one search may take, about, and what one of them takes besides its bits."""
+"""Maximum bytes of the states kept by one search, approximately, and bytes of a state besides its bits."""
 Entry = TypeVar("Entry")
 
 
 class Candidate(NamedTuple):
-    """A state, the operators that lead to it from one that was reached, and what the way to it costs from the beginning."""
+    """A state, the operators that lead to it from a reached state, and the cost of its path from the initial state."""
 
     before: int
     operators: tuple[int, ...]
@@ -43,10 +43,10 @@ class Order(Protocol):
     best: int | None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield candidates until there are none left, or a plan was found that is good enough."""
+        """Yield candidates until there are none left, or a good enough plan was found."""
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state that was just reached, or leave it where the goal is out of its reach."""
+        """Rank a state that was just reached; discard it if the goal is out of its reach."""
 
 
 def explore(task: Task, order: Order) -> Iterator[int]:
@@ -84,7 +84,7 @@ def path_to(reached: dict[int, Candidate], state: int) -> list[int]:
 
 
 class OpenList(Generic[Entry]):
-    """Entries in some queues that take turns; in each the least rank comes first, and of equal ranks the one that came first."""
+    """Entries in some queues that take turns; each queue yields the least rank first, and among equal ranks the oldest entry."""
 
     def __init__(self, queues: int = 1) -> None:
         self.queues: list[list[tuple[object, int, Entry]]] = [[] for _ in range(queues)]

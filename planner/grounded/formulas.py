@@ -37,14 +37,14 @@ from confab.reasoner.symbols import (
 )
 
 CONDITIONS_PER_ROW = 20
-"""Conditions that may be worked out with individuals put in, for each row that a join may have: nested groups multiply."""
+"""Maximum number of groundings of a condition per row of a join: nested groups multiply them."""
 
 Literals = tuple[int, ...] | None
 """A conjunction of bits; the empty one is true, None is false."""
 
 
 class Known(Protocol):
-    """What is reached, as far as conditions ask for it (`confab.planner.grounded.reachability.Reached`)."""
+    """The reachable facts, as far as conditions read them (`confab.planner.grounded.reachability.Reached`)."""
 
     problem: Problem
     most: int
@@ -63,7 +63,7 @@ class Known(Protocol):
 
 @dataclass(frozen=True)
 class _Part:
-    """Conditions that share variables which nothing outside binds, those that are bound there, and the kinds of all."""
+    """Conditions connected by shared free variables, the variables bound outside, and the classes of all."""
 
     conditions: tuple[Condition, ...]
     unbound: tuple[str, ...]
@@ -95,7 +95,7 @@ class Formulas:
     def condition(
         self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
     ) -> Literals:
-        """Return what must hold for a condition (negated: its contrary) to hold."""
+        """Return the formula of a condition (negated: of its contrary)."""
         self.asked += 1
         if self.asked > CONDITIONS_PER_ROW * self.reached.most:
             raise UngroundableError(
@@ -127,14 +127,14 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return what must hold for some group to hold with some individuals for its own variables (negated: for none to)."""
+        """Return the formula for some group to hold with some individuals for its own variables (negated: for none)."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
     def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
-        """Return what must hold for some individuals to fulfil all conditions of a part (negated: for none to)."""
+        """Return the formula for some individuals to satisfy all conditions of a part (negated: for none to)."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
         if key not in self._known:
@@ -148,7 +148,7 @@ class Formulas:
     def _groups_of(
         self, condition: Witness | AnyOf, bound: frozenset[str], kinds: Mapping[str, str]
     ) -> list[list[_Part]]:
-        """Return the groups of a condition, each in parts that share no variable but those that are bound."""
+        """Return the groups of a condition, each split into parts that share no free variable."""
         key = id(condition), bound
         if key not in self._parts_of:
             groups: Iterable[Sequence[Condition]] = (
@@ -158,7 +158,7 @@ class Formulas:
         return self._parts_of[key][1]
 
     def _parts(self, group: Sequence[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> Iterator[_Part]:
-        """Yield a group in parts: "a cup is clean and a hand is empty" asks for a cup and, apart from it, for a hand."""
+        """Yield the parts of a group: "a cup is clean and a hand is empty" has one part for the cup and one for the hand."""
         kinds = dict(kinds)
         conditions = list(self._opened(group, bound | plain_variables(group), kinds))
         unbound = plain_variables(conditions) - bound
@@ -177,7 +177,7 @@ class Formulas:
     def _opened(
         self, group: Sequence[Condition], shared: set[str] | frozenset[str], kinds: dict[str, str]
     ) -> Iterator[Condition]:
-        """Yield the conditions of a group, those of witnesses among them with variables that are nobody else's."""
+        """Yield the conditions of a group, including those of witnesses, with unique names for their variables."""
         for c in group:
             if not isinstance(c, Witness) or c.negated:
                 yield c
@@ -192,7 +192,7 @@ class Formulas:
             yield from self._opened(inner, shared | set(names.values()), kinds)
 
     def _solutions(self, part: _Part, unbound: Sequence[str], terms: Mapping[str, str]) -> Iterator[Mapping[str, str]]:
-        """Yield every way to put individuals in for a part's unbound variables that static knowledge doesn't rule out."""
+        """Yield the bindings of a part's free variables that static knowledge doesn't exclude."""
         if not unbound:
             yield terms
             return
@@ -204,7 +204,7 @@ class Formulas:
             yield from self._solutions(part, rest, {**terms, name: value})
 
     def _candidates(self, name: str, part: _Part, terms: Mapping[str, str]) -> Sequence[str]:
-        """Return individuals for a variable: those that a positive condition of the part leaves, else its whole class."""
+        """Return individuals for a variable: those that a positive condition of the part allows, otherwise its whole class."""
         members = self.members(part.kinds[name])
         for c in part.conditions:
             if isinstance(c, ValueCondition) and not c.negated and c.value == name:
@@ -220,7 +220,7 @@ class Formulas:
     def _related(
         self, relation: str, arity: int, place: int, fixed: tuple[int, ...]
     ) -> Mapping[tuple[str, ...], Mapping[str, None]]:
-        """Return the individuals in one place of a relation's tuples, by those in other places."""
+        """Return the individuals at one position of a relation's tuples, by those at other positions."""
         key = relation, arity, place, fixed
         if key not in self._relations:
             found = self._relations[key] = {}
@@ -246,7 +246,7 @@ class Formulas:
         return self._members[kind]
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return what must hold for a symbol to have a value (negated: not to have it)."""
+        """Return the formula for a symbol to have a value (negated: not to have it)."""
         kind = self.reached.situations.get(situation)
         if kind is None:  # it doesn't exist on this level
             return () if negated else None
@@ -264,7 +264,7 @@ class Formulas:
         return (self.complement(bit) if negated else bit,)
 
     def complement(self, bit: int) -> int:
-        """Return the bit that says that a fact doesn't hold, or the fact's bit if that is a complement."""
+        """Return the bit for a fact's negation, or the fact's bit if that is a complement."""
         if bit in self.facts_of:
             return self.facts_of[bit]
         if bit not in self.complements:
@@ -273,7 +273,7 @@ class Formulas:
         return self.complements[bit]
 
     def opposite(self, bit: int) -> Literals:
-        """Return what must hold for a bit not to be set."""
+        """Return the formula for a bit not to be set."""
         groups = self._groups.get(bit)
         if groups is not None:
             return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)
@@ -281,12 +281,12 @@ class Formulas:
         return (self.complement(bit),) if contrary is None else self.any_of(contrary)
 
     def fresh(self) -> int:
-        """Return a bit that nothing has yet."""
+        """Return an unused bit."""
         self.size += 1
         return self.size - 1
 
     def wanted(self, symbol: Symbol, value: str) -> Literals:
-        """Return what must hold for a symbol to be as a goal wants it."""
+        """Return the formula for a goal about a symbol."""
         if self.reached.problem.domain.situations[symbol.situation].quantity is None:
             return self.value(symbol.situation, symbol.arguments, value, False)
         amount = Amount(symbol.situation, symbol.arguments)
@@ -302,7 +302,7 @@ class Formulas:
         return tuple(sorted(found))
 
     def named(self, literals: Literals) -> Literals:
-        """Return one derived bit for a conjunction of several: that nobody stands somewhere is asked by many operators."""
+        """Return one derived bit for a conjunction that many operators share, such as "no object stands there"."""
         if literals is None or len(literals) < 2:
             return literals
         if (literals,) not in self.derived:
@@ -311,7 +311,7 @@ class Formulas:
         return (self.derived[literals,],)
 
     def any_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the disjunction: one derived bit unless it is simpler than that."""
+        """Return the disjunction: one derived bit, unless it has a simpler form."""
         found: set[tuple[int, ...]] = set()
         for part in parts:
             if part == ():

@@ -19,11 +19,11 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 BOOST = 1000
-"""Turns that the preferred operators get on a new least h."""
+"""Turns of the preferred operators after a new least h."""
 ALL, PREFERRED = 0, 1
 
 Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
-"""From a state and its relaxed plan to a state that lies ahead, and the operators that lead there."""
+"""From a state and its relaxed plan to a later state, and the operators that lead there."""
 
 
 class Greedy:
@@ -39,7 +39,7 @@ class Greedy:
         self.best: int | None = None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield what lookaheads lead to, and what operators lead to from the states with the least h."""
+        """Yield the results of lookaheads, and of operators in the states with the least h."""
         while self.best is None:
             if self.ahead is not None:
                 candidate, self.ahead = self.ahead, None
@@ -59,7 +59,7 @@ class Greedy:
                 yield Candidate(state, (operator,), after, 0.0)
 
     def put(self, candidate: Candidate) -> None:
-        """Evaluate a state; where the goal is within reach, its operators are to be tried."""
+        """Evaluate a state; if the goal is within reach, its operators become candidates."""
         state = candidate.state
         if state & self.task.goal == self.task.goal:
             self.best = state

@@ -47,10 +47,10 @@ from confab.reasoner.symbols import (
 )
 
 MOST_ROWS = 20_000_000
-"""Of one join: about 1 GB."""
+"""Maximum size of one join: about 1 GB."""
 SAID_ONCE = 20_000
-"""So many conditions less, of all operators, are worth working out in each state what is asked often: going through them for one
-relaxed plan takes a millisecond."""
+"""Minimum number of conditions saved, over all operators, before a shared condition is evaluated once per state: going through as
+many for one relaxed plan takes a millisecond."""
 
 
 def ground(
@@ -104,7 +104,7 @@ def ground(
 
 
 class _Assembly:
-    """Operators and bits, made from what was reached."""
+    """Operators and bits, made from the reachable facts."""
 
     def __init__(self, reached: Reached) -> None:
         self.reached = reached
@@ -299,7 +299,7 @@ class _Assembly:
         return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
-        """Add what it takes for what is defined not to hold, where that is asked for and it doesn't follow from itself."""
+        """Add the conditions for a defined fact not to hold, where they are needed and the definition isn't recursive."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
         for bit in waiting:  # which grows
@@ -312,7 +312,7 @@ class _Assembly:
             waiting += [other for other in list(formulas.complements)[known:] if other in ways]
 
     def _circular(self) -> set[int]:
-        """Return the bits of situation types that are defined by themselves, or by others that are defined by them."""
+        """Return the bits of recursively defined situation types, and of those that depend on them."""
         rules: dict[str, list[Rule]] = {name: [] for name in self.reached.defined}
         for schema in self.reached.schemas:
             if schema.rule:
@@ -324,7 +324,7 @@ class _Assembly:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
     def _excluded(self, goal: State) -> Reason:
-        """Return which goal can't be in any state; if each can, they exclude one another."""
+        """Return the goal that no state satisfies; if each is satisfiable, they exclude one another."""
         for symbol, value in sorted(goal.items()):
             if self.formulas.wanted(symbol, value) is None:
                 quantity = self.reached.problem.domain.situations[symbol.situation].quantity
@@ -471,7 +471,7 @@ class _Assembly:
     def _costs(
         self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int]
     ) -> tuple[list[float], dict[int, Linear]]:
-        """Return what each operator costs, at least, and what those do whose cost depends on amounts."""
+        """Return the least cost of each operator, and those whose cost depends on amounts."""
         costs: list[float] = []
         prices: dict[int, Linear] = {}
         for i in bases:
@@ -540,7 +540,7 @@ class _Assembly:
         return found
 
     def _pushed(self, moves: Mapping[int, Sequence[Move]], owner: Ints) -> tuple[Ints, Ints]:
-        """Return pairs of a relaxed operator and the bit of a comparison that it may bring about."""
+        """Return pairs of a relaxed operator and the bit of a comparison that it may make true."""
         by_place = defaultdict[int, list[tuple[Linear, str]]](list)
         for difference, sign in self.reached.amounts.bits:
             for place, _ in difference.terms:

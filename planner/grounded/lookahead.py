@@ -1,4 +1,4 @@
-"""Lookahead: a relaxed plan is carried out as far as it goes, with what is stuck replaced.
+"""Lookahead: execute a relaxed plan as far as possible, and replace operators where it gets stuck.
 
 Vidal, "A lookahead strategy for heuristic search planning", ICAPS 2004.
 """
@@ -15,7 +15,7 @@ from typing import TypeAlias
 from confab.planner.grounded.task import Task, bits_of
 
 ENABLING = 8
-"""Bits, at most, that are tried to have set where a relaxed plan is stuck."""
+"""Maximum number of bits for which a replacement is tried where a relaxed plan is stuck."""
 Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""
 

@@ -24,7 +24,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 CHILD, VISIT = 20, 2
-"""Bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited."""
+"""Number of bits that h_FF reads in the time of making one successor, and of visiting a tree node."""
 
 
 class Place(NamedTuple):
@@ -53,7 +53,7 @@ class Novelty:
         self.begin = Place(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield what operators lead to from the most novel states."""
+        """Yield the successors of the most novel states."""
         task, plain = self.task, dict[int, "tuple[int, int] | None"]()
         child = CHILD + task.size // 50 + task.derived.effort
         while (drawn := self.open.first()) is not None:
@@ -76,7 +76,7 @@ class Novelty:
                         return
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by what is new in it."""
+        """Rank a state by its novel facts."""
         state, begin = candidate.state, self.begin
         missing, unmet = self.task.goal & ~state, begin.unmet & ~state
         if not missing:
@@ -92,7 +92,7 @@ class Novelty:
         self.open.push((not state & ~old, open_, -len(self.reached)), place)
 
     def relaxed(self, place: Place) -> Place | None:
-        """Return where a state is with the facts of its relaxed plan; None where the goal is out of its reach."""
+        """Return the position of a state with the facts of its relaxed plan; None if the goal is out of reach."""
         if place.wanted >= 0:
             return place
         evaluation = self.evaluate(place.state)
@@ -108,7 +108,7 @@ class Novelty:
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
-    """Return what an operator leaves of a state, and what it sets; None if that depends on the state."""
+    """Return the bits of a state that an operator keeps, and those that it sets; None if that depends on the state."""
     changes = task.known(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None

@@ -32,23 +32,23 @@ from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
-"""States looked at for a cheapest plan, where the plan has no more steps."""
+"""Maximum number of states for a cheapest plan, instead of windows."""
 WAYS = 20
-"""Alternatives of what follows from others, gone through in the time in which an operator is looked at."""
+"""Number of alternatives of derived bits processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
-"""Steps of a window; the long ones are for round trips that one step saves."""
+"""Lengths of windows in steps; long windows find round trips that one step can save."""
 OPERATORS, EVALUATIONS = 150, 100
-"""Of a window's search, at most."""
+"""Maximum work of the search of a window."""
 WEIGHT = 3
-"""Of h_FF, where the whole plan is searched anew with all operators."""
+"""Maximum evaluations of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
-"""Operators done again, in all, to see which step might be left out."""
+"""Maximum number of repeated operators to find steps that can be left out."""
 LOOK = 50
-"""Operators ranked in the time in which one is evaluated."""
+"""Number of operators ranked in the time of one evaluation."""
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
-    """Return a plan that costs no more than a given one: a cheapest one where few states tell, else by replacing windows of it.
+    """Return a plan that costs no more than a given one: a cheapest one if few states suffice, otherwise by replacing windows.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
-    """Return a cheapest plan or, if few states don't tell one, the given one; and whether no plan is cheaper."""
+    """Return a cheapest plan or, if few states don't suffice, the given one; and whether it is proved cheapest."""
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
@@ -185,17 +185,17 @@ def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
 
 @dataclass
 class _Windows:
-    """What the windows of one task share; `work` counts down."""
+    """The common data of the windows of one task; `work` counts down."""
 
     task: Task
     work: int
     deadline: float | None
     failed: set[tuple[int, int, int]] = field(default_factory=set)
-    """Where nothing shorter was found: state, what was wanted, steps."""
+    """Windows without a shorter replacement: state, required bits, steps."""
 
     @property
     def over(self) -> bool:
-        """Whether no more work may be done."""
+        """Whether the work is used up."""
         return self.work <= 0 or self.late
 
     @property
@@ -221,7 +221,7 @@ class _Windows:
         return plan
 
     def needed(self, plan: Sequence[int]) -> list[int]:
-        """Return for each position the bits that the steps from there on need, the goal included."""
+        """Return for each position the bits that the steps from there on, and the goal, need."""
         states = _states(self.task, plan)
         wanted = self.task.goal
         found = [wanted]
@@ -237,7 +237,7 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
-        """Search fewer steps from a state to what is wanted; what is found is right as far as the window's operators tell."""
+        """Search fewer steps from a state to the required bits; valid as far as the window's operators determine."""
         if (state, wanted, len(steps)) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
@@ -249,13 +249,13 @@ class _Windows:
         return [operators[operator] for operator in found]
 
     def restarted(self, plan: list[int]) -> list[int]:
-        """Return a cheaper plan that is searched as a whole, with all operators, for what work is left; or the same."""
+        """Return a cheaper plan found by a search with all operators, within the remaining work; otherwise the same plan."""
         most = self.work // max(len(self.task.owners), 1)
         found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
         return plan if found is None else shortened(self.task, found, self.deadline)
 
     def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
-        """Search a plan that is cheaper than `upper`: A*, cut off where what was spent and h_FF reach that."""
+        """Search a plan cheaper than `upper`: A*, cut off where cost plus h_FF reaches that."""
         evaluate, costs = heuristic(task), task.costs
 
         def left(state: int) -> float:
@@ -386,7 +386,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the same with all bits, by which amounts are told."""
+        """Return the same state with all bits, by which amounts are identified."""
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]
@@ -405,7 +405,7 @@ class _Windows:
         )
 
     def _rows(self, operators: Sequence[int]) -> list[int]:
-        """Return the relaxed operators that are these operators or conditional effects of theirs."""
+        """Return the relaxed operators of these operators and of their conditional effects."""
         return [*operators, *sorted(chain.from_iterable(self._conditional.get(operator, ()) for operator in operators))]
 
     @cached_property

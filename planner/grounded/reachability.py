@@ -1,4 +1,4 @@
-"""Relaxed reachability: what becomes true on a level if nothing ever becomes false, by joins in rounds, each from what is new."""
+"""Relaxed reachability: the facts of a level that can become true if none becomes false, by joins in rounds."""
 
 from __future__ import annotations
 
@@ -219,7 +219,7 @@ class Reached:
             yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
 
     def _projected(self, columns: dict[str, Ints], count: int, wanted: Set[str]) -> tuple[dict[str, Ints], int]:
-        """Return columns without those that nothing asks for any more, each row once."""
+        """Return columns without unused variables, each distinct row once."""
         left = {name: column for name, column in columns.items() if name in wanted}
         if len(left) == len(columns):
             return columns, count
@@ -235,7 +235,7 @@ class Reached:
         check("grounding")
 
     def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
-        """Return the first of the atoms that match the fewest rows; one without a new variable is as good as any."""
+        """Return the first of the atoms that match the fewest rows; an atom without new variables is always good enough."""
         best, least = -1, float("inf")
         for i in waiting:
             rows = self._fan_out(schema.atoms[i], columns)
@@ -320,7 +320,7 @@ class Reached:
     def combinations(
         self, columns: Mapping[str, Ints], used: Sequence[str], count: int
     ) -> tuple[list[tuple[str, ...]], Ints]:
-        """Return the distinct combinations of individuals in some columns, and which of them each row has."""
+        """Return the distinct combinations of individuals in some columns, and the index of each row's combination."""
         if not used:
             return [()], np.zeros(count, np.int64)
         matrix = np.stack([columns[name] for name in used], axis=1)
@@ -341,7 +341,7 @@ class Reached:
         return np.stack(columns, axis=1) if columns else np.zeros((len(rows), 0), np.int64)
 
     def _exists(self, name: str, rows: Ints) -> Flags:
-        """Return for each row of a situation type's table whether there is such a symbol."""
+        """Return for each row of a situation type's table whether such a symbol exists."""
         situation = self.situations[name]
         if not situation.boolean:
             return self.symbols[name].find(rows[:, :-1]) >= 0

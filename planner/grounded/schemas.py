@@ -243,7 +243,7 @@ class _Compiler:
         yield from self._flat([substituted(c, names) for c in group], shared | set(names.values()), kinds, fresh)
 
     def _plain(self, condition: ValueCondition, kinds: Mapping[str, str]) -> Iterator[Condition]:
-        """Yield a condition on a boolean symbol as one on its being true, and on whether there is that symbol at all."""
+        """Yield a condition on a boolean symbol as a condition that it is true, and one that it exists."""
         situation = self.situations[condition.situation]
         if not situation.boolean or condition.value == TRUE:
             yield condition
@@ -281,5 +281,8 @@ class _Compiler:
 
 
 def plain_variables(group: Sequence[Condition]) -> set[str]:
-    """Return the variables that a group has from outside or determines; what only a nested condition mentions is that one's own."""
+    """Return the variables of a group that are bound outside or that it determines.
+
+    Variables of nested conditions are their own.
+    """
     return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

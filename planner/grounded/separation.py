@@ -19,7 +19,7 @@ Members = Callable[[str], frozenset[str]]
 
 
 def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, SituationType]]:
-    """Return a schema without what only some of its terms concern, rules for that, and the situation types made for it.
+    """Return a schema without the variables that only conditions use, rules for these conditions, and their situation types.
 
     Parameters
     ----------
@@ -65,7 +65,10 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
 def _separable(
     schema: Schema, named: set[str], members: Members
 ) -> tuple[int, str, tuple[str, ...], tuple[str, ...]] | None:
-    """Return the rows there are at most without a variable, it, those beside it and those left; None if that is no fewer."""
+    """Return the maximum number of rows without a variable, the variable, its neighbours and the rest.
+
+    None if that saves nothing.
+    """
     every = {term for atom in schema.atoms for term in atom.terms if is_variable(term)}
 
     def rows(names: Sequence[str]) -> int:

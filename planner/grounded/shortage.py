@@ -23,7 +23,7 @@ from confab.reasoner.amounts import written
 
 
 def shortage(task: Task) -> Reason | None:
-    """Return which amount doesn't suffice for the goal, and by how much, if adding up shows that."""
+    """Return the reason if adding up shows that an amount doesn't suffice for the goal, with the missing quantity."""
     amounts = task.amounts
     if amounts is None:
         return None
@@ -46,7 +46,7 @@ def shortage(task: Task) -> Reason | None:
 
 @dataclass(frozen=True)
 class _Sums:
-    """What is added up: amounts of one situation type, and what stands for amounts that were used up."""
+    """The terms of a sum: amounts of one situation type, and facts that stand for consumed amounts."""
 
     task: Task
     amounts: Amounts
@@ -54,7 +54,7 @@ class _Sums:
     moves: Mapping[int, Sequence[Move]]
 
     def short(self) -> Reason | None:
-        """Return which sum can't become what is wanted."""
+        """Return the reason if some sum can't reach the goal."""
         places = defaultdict[str, list[int]](list)
         for place, symbol in enumerate(self.amounts.symbols):
             places[symbol.situation].append(place)
@@ -67,7 +67,7 @@ class _Sums:
         return None
 
     def wanted_of(self, places: Sequence[int], left: Fraction) -> Reason | None:
-        """Return that some amounts together can't become what the goals take, and what has to be left."""
+        """Return the reason if some amounts together can't reach what the goals consume and require."""
         touched = {o for place in places for o, _ in self.of[place]}
         most = {o: _change(self.moves[o], places) for o in touched}
         used = {o: -change for o, change in most.items() if change is not None and change < 0}
@@ -85,7 +85,7 @@ class _Sums:
 
     @cached_property
     def of(self) -> Mapping[int, Sequence[tuple[int, Move]]]:
-        """For each amount, the operators that change it, and how."""
+        """For each amount, the operators that change it, with their changes."""
         found = defaultdict[int, list[tuple[int, Move]]](list)
         for o, its in self.moves.items():
             for move in its:
@@ -110,7 +110,7 @@ class _Sums:
         return found
 
     def counted(self, used: Mapping[int, Exact]) -> Iterator[Set[int]]:
-        """Yield bits that may stand for what was used up: goals to come; the facts of one situation type."""
+        """Yield sets of bits that may stand for consumed amounts: open goals; the facts of one situation type."""
         task = self.task
         yield {bit for bit in bits_of(task.goal & ~task.initial) if not self.amounts.compared >> bit & 1}
         kinds = {task.facts[bit].symbol.situation for o in used for bit in self.sets[o] if bit < len(task.facts)}
@@ -118,7 +118,7 @@ class _Sums:
             yield {bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == kind}
 
     def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
-        """Return for some bits how much is used up, at least, by whatever sets them; shared by those that it sets at once."""
+        """Return for some bits the least amount consumed by any operator that sets them, divided among bits set at once."""
         found = {
             bit: min(
                 (Fraction(used.get(o, 0)) / len(self.sets[o] & bits) for o in self.makers[bit]), default=Fraction(0)
@@ -128,14 +128,14 @@ class _Sums:
         return {bit: value for bit, value in found.items() if value > 0}
 
     def undone(self, operator: int, worth: Mapping[int, Fraction]) -> Fraction:
-        """Return the worth of what an operator surely makes false."""
+        """Return the worth of the bits that an operator certainly clears."""
         asked, changes = self.task.known(operator)
         cleared = reduce(or_, (bits for when, bits, _ in changes if not when & ~asked), 0)
         kept = reduce(or_, (bits for _, _, bits in changes), 0)
         return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))
 
     def least(self, worth: Mapping[int, Fraction]) -> Fraction:
-        """Return what the goals ask, at least, of what stands for amounts; what may serve two of them counts once."""
+        """Return the least worth that the goals require; bits that can serve two goals count once."""
         least, serving = dict(worth), {bit: 1 << bit for bit in worth}
         for part in self.task.derived.parts:
             for one in part if len(part) == 1 and not part[0].opposite else ():
@@ -167,7 +167,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """For each bit that asks for so much of one amount, which one and how much."""
+        """For each bit with a lower bound on one amount, the amount and the bound."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()
@@ -175,12 +175,12 @@ class _Sums:
         }
 
     def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
-        """Return what comparisons of one amount with a number ask of it, at least."""
+        """Return the lower bound of an amount in comparisons with a number."""
         found = (self.limits[bit] for bit in bits if bit in self.limits)
         return max((wanted for of, wanted in found if of == place), default=None)
 
     def kept(self, place: int) -> Fraction | None:
-        """Return what no operator takes of an amount, as far as each asks for more than it takes."""
+        """Return the part of an amount that no operator consumes, since each requires more than it takes."""
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:
             if move.operation == "increase" and move.by is not None and not move.by.terms and move.by.constant >= 0:
@@ -192,7 +192,7 @@ class _Sums:
         return least
 
     def left(self, place: int) -> Fraction | None:
-        """Return what is left of an amount in any state in which the goal holds, at least; None if that has no bound."""
+        """Return the least amount left in any goal state; None if unbounded."""
         wanted = self.asked(bits_of(self.task.goal), place)
         found = (self.amounts.quantities[place].least, self.kept(place), wanted)
         floor = [limit for limit in found if limit is not None]
@@ -202,7 +202,7 @@ class _Sums:
 def _extent(
     amounts: Amounts, place: int, vector: Vector, moves: Mapping[int, Sequence[Move]]
 ) -> tuple[Fraction | None, Fraction | None]:
-    """Return between what an amount stays, whatever is done; None for no bound."""
+    """Return the bounds of an amount over all operators; None for no bound."""
     low: Fraction | None = Fraction(vector[place])
     high: Fraction | None = Fraction(vector[place])
     for move in (move for its in moves.values() for move in its if move.place == place):

@@ -39,7 +39,7 @@ class Shortest:
 
 
 def nothing(state: int) -> float:
-    """Return the bound that knows nothing."""
+    """Return the trivial lower bound, 0."""
     return 0.0
 
 
@@ -54,7 +54,7 @@ class Cheapest:
         self.best: int | None = None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield what operators lead to from the states with the least f, until no cheaper plan can come."""
+        """Yield the successors of the states with the least f, until no cheaper plan is possible."""
         task, costs, priced = self.task, self.task.costs, bool(self.task.prices)
         while (drawn := self.open.first()) is not None:
             self.open.drop(0)
@@ -72,7 +72,7 @@ class Cheapest:
                     yield Candidate(state, (operator,), after, cost + spent)
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by f, unless no cheaper plan leads through it; one where the goal holds is what has to be beaten."""
+        """Rank a state by f, unless no cheaper plan leads through it; a goal state lowers the upper bound."""
         cost = candidate.cost
         h = self.bound(candidate.state)
         if cost + h >= self.upper:
@@ -123,10 +123,10 @@ def shortest(
 
 
 def ways(task: Task) -> Bound:
-    """Return what it costs to give every goal's symbol its value, each taken alone, in all.
+    """Return a lower bound: the sum of the costs of giving every goal's symbol its value separately.
 
-    Every operator counts for one symbol only, so that no plan is cheaper. A goal that isn't a value among several counts
-    for nothing.
+    Each operator counts for one symbol only, so that no plan is cheaper. A goal that isn't a value among several counts for
+    nothing.
     """
     of_symbol: dict[object, list[int]] = {}
     for bit, fact in enumerate(task.facts):
@@ -165,7 +165,10 @@ def ways(task: Task) -> Bound:
 
 
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return who sets bits of symbols: the operator, the bit of that symbol that it needs (-1: none), and the one that it sets."""
+    """Return the operators that set bits of symbols.
+
+    The operator, the bit of that symbol that it requires (-1: none), the bit it sets.
+    """
     owner = np.array(task.owners, np.int64)
     setter = owner[np.repeat(np.arange(len(owner)), np.diff(task.adds.starts))]
     here = (setter >= 0) & (symbol[task.adds.items] >= 0)

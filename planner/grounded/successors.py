@@ -14,7 +14,7 @@ from confab.planner.grounded.joins import Ints
 from confab.reasoner.limits import check
 
 Waiting = tuple[int, list[int], int]
-"""An operator, the bits that it needs in the order in which they are asked for, and how many were."""
+"""An operator, the bits that it requires in the order of testing, and their number."""
 
 
 class Tree:
@@ -34,7 +34,7 @@ class Tree:
         self.operators: list[int] = []
 
     def of(self, state: int) -> tuple[list[int], int]:
-        """Return the operators that are applicable in a state, and how many nodes were visited."""
+        """Return the applicable operators of a state, and the number of visited nodes."""
         found: list[int] = []
         visited = 0
         heads = [self]
@@ -56,7 +56,7 @@ class Tree:
         return found, visited
 
     def _branch(self) -> None:
-        """Send each operator that waits here on, by the value of the symbol that the first of them asks for."""
+        """Distribute the waiting operators by the value of the symbol that the first of them tests."""
         masks, others = self.masks, []
         by_value: dict[int, list[Waiting]] = {}
         for one in self.waiting:

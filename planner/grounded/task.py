@@ -112,14 +112,14 @@ class Task:
         return len(self.costs)
 
     def spent(self, state: int, operator: int) -> float:
-        """Return what an operator costs in a state."""
+        """Return the cost of an operator in a state."""
         price = self.prices.get(operator)
         return (
             self.costs[operator] if price is None or self.amounts is None else price.worth(self.amounts.vector(state))
         )
 
     def cost_of(self, plan: Sequence[int]) -> float:
-        """Return what a plan costs."""
+        """Return the cost of a plan."""
         total, state = 0.0, self.initial
         for operator in plan:
             total += self.spent(state, operator)
@@ -168,7 +168,7 @@ class Task:
 
     @cached_property
     def applicable(self) -> Callable[[int], tuple[list[int], int]]:
-        """To the operators whose preconditions a state fulfils, and the work of finding them, in nodes of a tree."""
+        """From a state to its applicable operators, with the work of finding them in tree nodes."""
         of_symbol: dict[Symbol, int] = {}
         for bit, fact in enumerate(self.facts):
             of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
@@ -177,14 +177,14 @@ class Task:
         return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
 
     def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
-        """Return an operator's precondition and changes, worked out once."""
+        """Return an operator's precondition and changes, computed once."""
         known = self._changes.get(operator)
         if known is None:
             known = self._changes[operator] = self.change(operator)
         return known
 
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
-        """Return the operators that do behaviours with their arguments one after the other; None if one can't be done."""
+        """Return the operators for behaviours with their arguments, executed one after the other; None if one isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
         for operator in range(len(self)):
             step = self.describe(operator)[:2]
