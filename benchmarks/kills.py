@@ -42,7 +42,7 @@ COMMANDS = {
     "execute": "execute --learn --save",
     "save": "Result.save",
     "run": "run",
-    "crowd": "learn`, one of eight at a time, by whichever path, `learn",
+    "crowd": "learn`, one of eight at a time, by any path, `learn",
 }
 LEARNING = ("learn", "execute", "run")
 """Commands that add an episode."""

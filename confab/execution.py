@@ -287,7 +287,7 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> dict[str, An
 @right_names("an execution", "confab.hints", "EXECUTION")
 @dataclass(frozen=True)
 class Execution:
-    """What came of carrying a task out: an episode, and the scene in which it happened."""
+    """The result of executing a task: an episode, and the scene in which it happened."""
 
     scene: Known
     episode: Episode

@@ -20,13 +20,13 @@ LOG = 6
 
 @dataclass(repr=False)
 class View:
-    """What is shown of the last moment, and of what happened before."""
+    """The view of the last event and of earlier ones."""
 
     moment: Moment | None = None
     log: list[str] = field(default_factory=list)
 
     def take(self, moment: Moment) -> None:
-        """Take note of a moment."""
+        """Record an event."""
         self.moment = moment
         if moment.what == "intervention":
             self.log.append(f"✋ {moment.text}")

@@ -298,7 +298,7 @@ AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 @right_names("a result", "confab.hints", "RESULT")
 @dataclass
 class Result:
-    """What came of planning: the outcome, and the scene in which it holds.
+    """The result of planning: the outcome, and the scene in which it holds.
 
     `problem` has the individuals that the task can need; `queries` is how many the store was asked. `part` is the part of the
     scene that the problem was read from, if it isn't the whole scene, and `goals` are those that replaced some of the task's.

@@ -4,7 +4,7 @@
 ``/sparql``     the SPARQL 1.1 protocol: GET, POST of a form, POST of a query; without a query, the service description
 ``/``           the page (`confab.page`)
 ``/page.json``  what the page shows: GET of the scene, or of a running execution (with ``after=VERSION`` 204 where nothing is
-                newer); POST of what was turned, answered with the plan that follows
+                newer); POST of changed controls, answered with the resulting plan
 ==============  ==========================================================================================================
 
 uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.query_process`), in lanes. The
@@ -183,7 +183,7 @@ class Service:
         try:
             turned = turned_from(json.loads(content or b"{}"))
         except (ValueError, RecursionError, KnowledgeError) as error:
-            raise HTTPException(400, f"wanted JSON of what was turned: {error}") from error
+            raise HTTPException(400, f"wanted JSON of changed controls: {error}") from error
         with self.planning:
             return json.dumps(self.sheet.answer(turned)).encode()
 

@@ -17,7 +17,7 @@ Values: TypeAlias = "list[str]"
 Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
 """Returns a function from the values of all terms to those of some."""
 Worth: TypeAlias = "Callable[[Said, Values], Fraction | None]"
-"""What an amount comes to; None if it comes to nothing."""
+"""The value of an amount; None if it has none."""
 Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
 
 
@@ -53,7 +53,7 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
 
 
 def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[[Said, Values], bool]:
-    """Return a comparison as a test; with what comes to nothing it doesn't hold."""
+    """Return a comparison as a test; with a missing value it is false."""
     of_left, of_right = worth(condition.left, key, relations), worth(condition.right, key, relations)
     holds = COMPARING[condition.operator]
 

@@ -1,4 +1,4 @@
-"""What is defined by rules, worked out where generated Python asks a table for it; only scenes that define something come here."""
+"""Defined situations, derived when generated Python reads them from a table; only scenes with definitions enter here."""
 
 from __future__ import annotations
 
@@ -78,10 +78,10 @@ class Stratum:
         self.table, self.age = table, -1
         self.tests: dict[str, Callable[..., bool]] = {}
         self.known: dict[Cell, bool] = {}
-        self.asked: dict[Cell, None] | None = None  # while something is worked out: with it, what that led to
+        self.asked: dict[Cell, None] | None = None  # during a derivation: the cells read, with the results
 
     def holds(self, cell: Cell) -> bool:
-        """Return whether a symbol is true; while another one is worked out: as far as is known."""
+        """Return whether a symbol is true; during the derivation of another one: as far as is known."""
         if self.age != self.table.age:
             self.age = self.table.age
             self.known.clear()

@@ -374,7 +374,7 @@ class Rules:
         return None if more is None else found + more
 
     def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-        """Return what a behaviour costs where it is done, if that is worked out and it can be done."""
+        """Return the calculated cost of a behaviour in the present state, if it has a price and is applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         return read.price(facts.value, values) if read.price and all_hold(read.preconditions, facts, values) else None

@@ -267,7 +267,7 @@ class Times:
     measured : mapping of behaviour to seconds
         How long behaviours without a stated duration took on average.
     events : mapping of behaviour to seconds
-        Behaviours that nobody does: they happen at that time (PDDL's timed initial literals).
+        Events, which no actor executes: they happen at that time (PDDL's timed initial literals).
     """
 
     deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)

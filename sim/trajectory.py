@@ -197,7 +197,7 @@ def _quaternion(rotation: Array) -> Array:
 
 @dataclass(frozen=True)
 class Replay:
-    """What came of replayed trajectories: the perceived facts in the end, and the largest error of a hand's position in metres."""
+    """The result of replayed trajectories: the perceived facts in the end, and the largest error of a hand's position in metres."""
 
     state: State
     tracking: float

@@ -33,7 +33,7 @@ def report(
     episode: Path | None,
     time_limit: float | None,
 ) -> None:
-    """Write the page of a plan, or of what was saved, into a file."""
+    """Write the page of a plan, or of a saved result, into a file."""
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 

@@ -41,7 +41,7 @@ class Following:
         return self._moment is not None
 
     def take(self, moment: Moment) -> None:
-        """Take note of a moment."""
+        """Record an event."""
         with self._lock:
             self._moment, self.version = moment, self.version + 1
             if moment.belief is not None:

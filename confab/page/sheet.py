@@ -1,4 +1,4 @@
-"""What can be turned by hand on the page, and what comes of it: facts, goals and interventions."""
+"""The controls of the page, and their results: facts, goals and interventions."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Turned(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Sheet:
-    """What of a scene can be turned, and what comes of it.
+    """The controls of a scene, and their results.
 
     Examples
     --------

@@ -245,7 +245,7 @@ class _Run:
         return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
-        """Carry the next primitive out and look what came of it; a primitive that failed, but did what it should, is done.
+        """Execute the next primitive and observe; a failed primitive that had its effects counts as done.
 
         Returns the primitive with what is above it, the situation before, and the verdict.
         """
@@ -326,14 +326,14 @@ class _Run:
             self.doubt("; ".join(map(_told, surprises[:3])), surprises)
 
     def note_what_happened_by_the_clock(self) -> None:
-        """Take note of what the world was told to let happen at a time that has passed."""
+        """Record announced interventions whose time has passed."""
         for intervention in [i for i in self.waiting if i.at is not None and i.of_world]:
             if (intervention.at or 0.0) <= self.world.seconds:
                 self.waiting.remove(intervention)
                 self.note(intervention, intervention.at or 0.0)
 
     def note(self, intervention: Intervention, seconds: float) -> None:
-        """Take note of an intervention that happened at a time, and change the goal if it says so."""
+        """Record an intervention, and change the goal if it says so."""
         self.record.interventions.append((intervention, seconds))
         goal = self.belief.goal
         if intervention.change is Change.GOAL:
@@ -437,7 +437,7 @@ class _Run:
     def despair(self, outcome: Outcome | None, limits: Limits) -> None:
         """Look for room; else set aside, or put off, the goals that can't be reached even alone; else try anew, or stop.
 
-        A goal that can't be reached for want of facts in doubt is put off until everything else is done.
+        A goal that needs facts in doubt is put off until everything else is done.
         """
         belief = self.belief
         reason = outcome.reason if outcome is not None and outcome.reason else Reason("no plan was found")

@@ -47,7 +47,7 @@ class SymbolicWorld:
         return dict(self.state)
 
     def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of what shall happen at a time."""
+        """Record interventions with their times."""
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
     def execute(self, step: Step) -> Report:

@@ -90,7 +90,7 @@ class Disturbable(World, Protocol):
         """Let an intervention take place now."""
 
     def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of interventions that shall take place at a time of the world's clock."""
+        """Record interventions with their times on the world's clock."""
 
 
 @runtime_checkable
@@ -160,7 +160,7 @@ class Guarded:
             self._disturbable().disturb(intervention)
 
     def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of interventions that shall take place at a time of the world's clock."""
+        """Record interventions with their times on the world's clock."""
         if interventions:
             with _asking("announce()"):
                 self._disturbable().announce(interventions)

@@ -63,7 +63,7 @@ class Activity:
     middle: Access
     end: Access
     at: Fraction | None = None
-    """When it happens, if nobody decides on that."""
+    """The fixed time of an event."""
 
     @property
     def accesses(self) -> tuple[Access, Access, Access]:
@@ -95,7 +95,7 @@ class Noting(Facts):
             self._definitions.forget()
 
     def noted(self) -> frozenset[Key]:
-        """Return what was read of what is stated."""
+        """Return the facts that were read."""
         rules = self.problem.domain.rules
         return frozenset(key for key in self.reads if key[0] not in rules) if rules else frozenset(self.reads)
 
@@ -158,7 +158,7 @@ class _Course:
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
         if seconds is None:
-            raise InapplicableError(f"{step} has no duration there: what it is worked out from is no number from 0 on")
+            raise InapplicableError(f"{step} has no duration there: its calculation gives no number of 0 or more")
         self.seconds[number] = seconds
         self.made[number]["begin"] = self.done(step, pieces.begin, terms, True)
         self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)

@@ -34,7 +34,7 @@ SECONDS = 10.0
 
 @dataclass(frozen=True)
 class Timed:
-    """What came of scheduling: a timed plan that the checker accepts, or why there is none."""
+    """The result of scheduling: a timed plan that the checker accepts, or why there is none."""
 
     plan: TimedPlan | None = None
     reason: Reason | None = None

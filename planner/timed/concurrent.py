@@ -288,7 +288,7 @@ class _Finder:
         return self.end_of.get((name.partition("@")[0], arguments))
 
     def completed(self, operators: list[int]) -> list[int] | None:
-        """Return operators with the ends of what runs at last; None if that undoes a goal, or an end isn't possible."""
+        """Return operators followed by the ends of running steps; None if an end is impossible or undoes a goal."""
         state, _ = self.task.carried_out(self.task.initial, operators)
         if not state & self.marks:
             return operators
