@@ -115,7 +115,7 @@ class _Causes:
         self.claims = Claims(self.lowest, certificate)
 
     def reading(self) -> tuple[Reading, _Noting]:
-        """Return what conditions are read with, and what notes the claims that are asked for."""
+        """Return the reader of conditions, and the view that records the claims used."""
         view = _Noting(self.claims, ())
         return Reading(self.lowest, view), view
 

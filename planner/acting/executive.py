@@ -1,4 +1,4 @@
-"""The executive: plan, act, look, be interrupted, repair.
+"""The executive: plan, act, observe, be interrupted, repair.
 
 belief    the situation as last seen, the goal as it is now, and what failures have taught about what is possible
 agenda    the steps that are still to be done; the first may be partly done
@@ -47,7 +47,7 @@ from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 @dataclass(frozen=True)
 class Patience:
-    """When to stop: attempts at one primitive, failures in all, primitives begun per primitive planned, and planning limits.
+    """Limits of an episode: attempts per primitive, failures in all, primitives begun per primitive planned, and planning limits.
 
     `rounds` is how often everything that failed is tried, anew once no other way is left: the situation has changed by then, and
     a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `planning` limits each
@@ -63,7 +63,7 @@ class Patience:
 
 @dataclass(frozen=True)
 class Moment:
-    """What a spectator is told: something happened, and this is how things stand.
+    """An event for observers of the execution.
 
     `seconds` is the time on the world's clock, `belief` the task as it is believed to be, with the situation in its initial state.
     """
@@ -90,7 +90,7 @@ def act(
     mending: bool = True,
     caution: Caution | None = None,
 ) -> Episode:
-    """Carry a task out in a world, whatever happens, until it is done, proved impossible, or a limit is reached.
+    """Execute a task in a world until it is done, proved impossible, or a limit is reached.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def act(
 
 @dataclass
 class _Run:
-    """One episode in the making. `act` is the loop; each method is one thing that it does."""
+    """An episode in progress. `act` is the loop; each other method is one of its actions."""
 
     belief: Belief
     world: Guarded
@@ -194,7 +194,7 @@ class _Run:
         self.say("plan", text="; ".join(reason.text for _, reason in self.aside.values()))
 
     def finish(self) -> None:
-        """Nothing is left to be done: what is wanted is there, or the agenda must be looked at again, or a goal was put off."""
+        """End the episode, look at the agenda again, or take up a goal that was put off: no step is left."""
         record = self.record
         if missing := open_goals(self.belief.problem):
             self.doubt(f"{missing[0]} doesn't hold yet")
@@ -211,20 +211,20 @@ class _Run:
         self.say("over", text=record.status.value)
 
     def break_off(self, why: str) -> None:
-        """Stop at once: the world doesn't answer."""
+        """Stop at once, since the world doesn't answer."""
         self.going, self.record.status = False, End.GAVE_UP
         self.record.reason(Reason(why))
         self.say("over", text=f"{End.GAVE_UP.value}: {why}")
 
     def episode(self) -> Episode:
-        """Return what happened."""
+        """Return the episode."""
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
         return self.record.episode(self.belief.problem, clock, tuple(self.waiting))
 
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
-        """Tell the spectator, if there is one."""
+        """Notify the observer, if there is one."""
         if self.tell is None:
             return
         done, events = self.record.done, self.record.events
@@ -240,7 +240,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- acting
 
     def expected(self) -> dict[Symbol, str] | None:
-        """Return the situation that the next primitive should lead to, or None if its precondition doesn't hold."""
+        """Return the expected situation after the next primitive; None if its precondition doesn't hold."""
         step, problem = first_chain(self.agenda)[-1], self.belief.problem
         return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
 
@@ -278,7 +278,7 @@ class _Run:
         return chain, before, verdict
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
-        """Return whether some of the expected changes can be perceived, and none of these is seen."""
+        """Return whether some of the expected changes can be perceived, and none of these was."""
         found = [
             seen.get(fact.symbol, FALSE) == fact.value
             for fact in changes
@@ -287,7 +287,7 @@ class _Run:
         return bool(found) and not any(found)
 
     def look(self, expected: dict[Symbol, str], seen: State | None = None) -> tuple[Surprise, ...]:
-        """Observe the world if that isn't `seen` yet, believe what is seen, and return what isn't as expected."""
+        """Observe the world unless `seen` is given, believe the observation, and return the differences from the expectation."""
         seen = self.world.observe() if seen is None else seen
         self.meet()
         before = self.belief.state
@@ -296,7 +296,7 @@ class _Run:
         return surprises
 
     def meet(self) -> None:
-        """Believe in what the world has come across."""
+        """Believe in the individuals that the world has discovered."""
         for found in self.world.discoveries():
             self.belief.meet(found)
             self.record.discovered.append((found, self.world.seconds))
@@ -306,7 +306,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- being interrupted
 
     def intervene(self) -> None:
-        """Let happen what shall happen after what was just done."""
+        """Let the interventions take place that follow the last primitive."""
         if not self.waiting:
             return
         done = self.record.done
@@ -350,13 +350,13 @@ class _Run:
         self.say("intervention", text=intervention.text)
 
     def forget(self, symbols: Iterable[Symbol]) -> None:
-        """Want nothing any more of symbols whose goals were set aside or put off."""
+        """Drop the goals that were set aside or put off."""
         for symbol in symbols:
             self.aside.pop(symbol, None)
             self.put_off.pop(symbol, None)
 
     def doubt(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
-        """Want the agenda looked at again. What is in progress is sound if it could have begun with the surprises known."""
+        """Request a new look at the agenda."""
         if why not in self.puzzled:
             self.puzzled = f"{self.puzzled}; {why}" if self.puzzled else why
         for surprise in surprises:
@@ -370,7 +370,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- repairing
 
     def reconsider(self) -> None:
-        """Repair the agenda, or replan; set aside what can't be reached any more."""
+        """Repair the agenda, or replan; set aside unreachable goals."""
         why, self.puzzled, belief, record = self.puzzled, "", self.belief, self.record
         if self.missed:
             self.want_again(self.aside)
@@ -408,7 +408,7 @@ class _Run:
             self.say(kind, text=why)
 
     def numbered(self, steps: Sequence[Step]) -> tuple[Step, ...]:
-        """Return steps with the paths that they have in the tree of all that is done; one that goes on keeps its own."""
+        """Return steps with their paths in the tree of executed steps; a step in progress keeps its path."""
         done = self.record.done
         following = 1 + max((path[0] for path in done), default=-1)
         if steps and self.agenda and self.agenda[0].path[:1] in {path[:1] for path in done}:
@@ -418,24 +418,24 @@ class _Run:
         return renumbered(steps, following)
 
     def set_aside(self, impossible: Mapping[Symbol, Reason]) -> None:
-        """Want no more what can't be, and remember why."""
+        """Drop an impossible goal, and record the reason."""
         if impossible:
             goal = self.belief.goal
             self.aside |= {symbol: (goal[symbol], reason) for symbol, reason in impossible.items()}
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
-        """Want goals again that were set aside or put off."""
+        """Take up goals again that were set aside or put off."""
         if goals:
             self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in goals.items()}})
             goals.clear()
 
     def set_aside_the_vanished(self) -> None:
-        """Want nothing of an object that is gone, or that is at no place that a fact could name."""
+        """Drop the goals about an object that is gone, or at no place that a fact could name."""
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
     def despair(self, outcome: Outcome | None, limits: Limits) -> None:
-        """Look for room; else set aside, or put off, the goals that can't be reached even alone; else try anew, or stop.
+        """Look for room; otherwise set aside, or put off, the goals that are unreachable even alone; otherwise try again, or stop.
 
         A goal that needs facts in doubt is put off until everything else is done.
         """
@@ -462,7 +462,7 @@ class _Run:
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
     def make_room(self) -> bool:
-        """Ask the world, once, for spots beside the places of the scene to put things down at; return whether it has any."""
+        """Ask the world, once, for spots beside the scene's places; return whether it has any."""
         if self.room_wanted:
             return False
         self.room_wanted = True
@@ -475,7 +475,7 @@ class _Run:
         return bool(spots)
 
     def blocked(self, fact: Fact, limits: Limits) -> Reason | None:
-        """Return the reason if a goal could be reached but for things that nothing can move, else None."""
+        """Return the reason if only immovable things block a goal; None otherwise."""
         if not self.belief.obstacles:
             return None
         free = self.belief.without_obstacles({fact.symbol: fact.value})
@@ -494,7 +494,7 @@ class _Run:
         return replace(reason, text="; ".join((*found, reason.text))) if found else reason
 
     def blamed(self, symbol: Symbol, value: str) -> Reason:
-        """Return the reason for giving a goal up: the last failure that concerns it, else the last one."""
+        """Return the reason for giving up a goal: the last failure that concerns it, or the last one of all."""
         concerned = {*symbol.arguments, value}
         failures = self.record.failures
         near = [f for f in failures if concerned & {*f.objects, *f.step.arguments, *f.step.bindings.values()}]
@@ -505,7 +505,7 @@ class _Run:
         return Reason(text, (*symbol.arguments, value, *objects))
 
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
-        """Stop wanting anything, so that only rest is left; stop at once if that was tried already."""
+        """Drop all goals, so that only rest values remain; stop at once if that was tried already."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
@@ -521,7 +521,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- failing
 
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
-        """Try again, then otherwise: what failed again and again is taken as impossible for the rest of the episode."""
+        """Try again, then in another way: a repeated failure counts as impossible for the rest of the episode."""
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
             self.doubt(verdict.message)
@@ -550,13 +550,13 @@ class _Run:
         facts: Iterable[tuple[str, tuple[str, ...]]] = (),
         refutations: Iterable[Refutation] = (),
     ) -> None:
-        """Doubt static facts or the possibility of behaviours, and plan what is in progress anew."""
+        """Doubt static facts or the possibility of behaviours, and plan the step in progress again."""
         self.belief.doubt(facts, refutations)
         self.sound = False
         self.doubt(why)
 
     def try_anew(self, why: str) -> bool:
-        """Rely on everything again and want again what was put off, if a round is left; return whether that is so."""
+        """Drop all doubts and take up goals that were put off, if a round is left; return whether one was."""
         if self.rounds >= self.patience.rounds:
             return False
         self.rounds += 1

@@ -1,4 +1,4 @@
-"""Which of several ways to follow rules: cogency, from what held of those that were chosen and of those that were passed over.
+"""Choice among rule instances: cogency, from the facts of earlier choices and rejections.
 
 Of each individual in a role of a rule these facts are looked at, none of them written by hand: to which of the classes that
 behaviours tell apart it belongs, its values and what the task wants of it, whether somebody has it or wants it as a value, and the
@@ -24,17 +24,17 @@ from confab.reasoner.memory.experience import ITSELF, Experience, Fact, Method, 
 from confab.reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
-"""What a case counts for when the next one came."""
+"""Factor by which a preference decays with each later episode."""
 CROWD = 4
-"""In roles of classes with at most so many members somebody himself may be preferred."""
+"""Maximum size of a class for which preferences for single individuals are counted."""
 Named: TypeAlias = "Mapping[str, str]"
-"""The roles that individuals fill."""
+"""The individuals by role."""
 Answer: TypeAlias = "Callable[[str, Named], str]"
-"""Says of somebody in a role what is asked."""
+"""Returns the answer to a question about an individual in a role."""
 
 
 class View:
-    """Reads facts about the individuals in a rule's roles off one table and goal."""
+    """Reads facts about the individuals in a rule's roles from one table and goal."""
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
         self.problem, self.table, self.goal = program.problem, table, goal
@@ -46,7 +46,7 @@ class View:
         self._plans: dict[tuple[str, bool], list[tuple[int, str, Answer]]] = {}
 
     def facts(self, rule: Rule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
-        """Return the facts about the individuals in a rule's roles, or those of them of which something is asked."""
+        """Return the facts about the individuals in a rule's roles; on request only those of given questions."""
         plan = self._plans.get((rule.name, among is None))
         if plan is None:
             asked = [question for question in self._questions(rule) if among is None or question[1] in among]
@@ -55,7 +55,7 @@ class View:
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
     def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
-        """Return who fills those roles in which few could."""
+        """Return the individuals in the roles that few individuals can fill."""
         members = self.problem.members
         return [
             (f"who is {role[1:]}", who)
@@ -113,7 +113,7 @@ class View:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
-    """Return who fills those open roles of a method in which few could: alone, and beside each individual of its behaviour."""
+    """Return the individuals in the open roles of a method that few can fill: alone, and with each individual of its behaviour."""
     found = list[Fact]()
     for role, who in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and who is not None and 1 < len(problem.members(role.kind)) <= CROWD:
@@ -124,14 +124,14 @@ def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> li
 
 @dataclass(frozen=True)
 class Factor:
-    """A summand of a cogency: the fact that it is of, and its weight in ln odds."""
+    """A summand of a cogency: its fact, and its weight in ln odds."""
 
     fact: Fact
     weight: float
 
 
 class Judge:
-    """Says how cogent it is to follow a rule, from what was counted."""
+    """Computes the cogency of following a rule from counts."""
 
     def __init__(self, experience: Experience) -> None:
         self.totals = experience.totals()
@@ -140,7 +140,7 @@ class Judge:
         self._asked: dict[str, frozenset[str]] = {}
 
     def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
-        """Return what each fact that was counted adds to the cogency of a rule, in ln odds; its own is there in any case."""
+        """Return the summand of each counted fact in the cogency of a rule, in ln odds; the rule's own is always included."""
         found = self._weights.get(rule.name)
         if found is None:
             counted = self.totals.get(rule.name, {})
@@ -173,7 +173,7 @@ class Judge:
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
     def told(self, view: View, rule: Rule, roles: tuple[str, ...]) -> float:
-        """Return the cogency of following a rule with individuals in its roles, by the facts that were counted."""
+        """Return the cogency of following a rule with individuals in its roles, by the counted facts."""
         weights = self.weights(rule)
         if rule.name not in self._asked:
             self._asked[rule.name] = frozenset(asks for asks, _ in weights)
@@ -183,7 +183,7 @@ class Judge:
 
 
 def told_apart(problem: Problem) -> tuple[str, ...]:
-    """Return the classes that behaviours, situation types or terms tell apart: what can be done depends on no other."""
+    """Return the classes that behaviours, situation types or terms use; no others affect applicability."""
     found: dict[str, None] = {}
     for behavior in problem.domain.behaviors.values():
         found.update(dict.fromkeys(behavior.kinds.values()))

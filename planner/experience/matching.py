@@ -1,8 +1,8 @@
-"""A rule as a join over the table: generated Python that yields the ways to fill its roles now, each with what it still lacks.
+"""A rule as a join over the table: generated Python that yields the rule instances now, each with its unmet conditions.
 
-What is static must hold; the rest may be *unmet*: it can be brought about first. What fills a role is, in this order of
-preference: the value that a symbol has, or who has a value; a static relation; a class. If nobody of the first kind fits, or
-everybody is asked for, the others are taken, one of each sort. Different roles are different individuals.
+Static conditions must hold; the others may be *unmet*, since steps can achieve them first. A role is filled, in this order of
+preference, by the value of a symbol or the holder of a value; by a static relation; by a class. If no individual of the first kind
+fits, or all instances are requested, the others follow, one of each symmetry class. Different roles have different individuals.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from confab.reasoner.memory.experience import Rule
 from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
-"""Given a goal's arguments and value, and whether everybody is asked for, yields individuals for the roles, and what is unmet."""
+"""Given a goal's arguments and value, and whether all instances are requested, yields individuals for the roles, and unmet
+conditions."""
 
 Pick: TypeAlias = "Callable[[tuple[str, ...], str], Sequence[str]]"
-"""Returns one of each sort, of many individuals, free ones first where they are to be values of a situation type."""
+"""Returns one individual of each symmetry class, free ones first where they are to be values of a situation type."""
 Bind: TypeAlias = "Callable[[Table, Pick], Find]"
 
 DEEPEST = 18
-"""So many loops inside each other Python allows, with a few to spare."""
+"""Maximum number of nested loops in Python, with a margin."""
 
 
 def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
-    """Return what may be brought about before a rule's step: what it asks of the state, and what the step compares."""
+    """Return what may be achieved before a rule's step: its conditions on the state, and its comparisons."""
     behavior = problem.domain.behaviors[rule.does[0]]
     put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
     compared = (c for c in behavior.preconditions if isinstance(c, Comparison) and mentions(c) <= put.keys())
@@ -36,9 +37,9 @@ def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
 
 
 def finder(rule: Rule, writer: Writer, asks: Sequence[Condition]) -> Bind | None:
-    """Return what binds a rule, of which some conditions may be unmet, to a table; None where it has too many roles.
+    """Return the function that binds a rule, with unmet conditions, to a table; None if the rule has too many roles.
 
-    The problem has what it speaks of (`known`).
+    The problem has the rule's terms (`known`).
     """
     lines = _Join(rule, writer, asks).lines()
     if lines is None:
@@ -85,7 +86,7 @@ class _Join:
         self.bound: set[str] = set()
 
     def lines(self) -> list[str] | None:
-        """Return the function, `None` if it would have too many loops inside each other."""
+        """Return the function; `None` if it would have too many nested loops."""
         rule, depth = self.rule, 0
         given = (*rule.goal.arguments, rule.goal.value)
         lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}, everybody):"]
@@ -122,7 +123,7 @@ class _Join:
         return lines
 
     def tests(self, role: str) -> list[str]:
-        """Fill a role; return the tests on who fills it: that it is of its class, fills no other role, and what must hold."""
+        """Fill a role; return the tests on its individual: its class, that it fills no other role, and its conditions."""
         members = self.problem.members
         mine = members(self.kinds[role])
         others = [r for r in sorted(self.bound) if not members(self.kinds[r]).isdisjoint(mine)]
@@ -133,7 +134,7 @@ class _Join:
         return found + self.ready() + self.ahead(role)
 
     def ahead(self, role: str) -> list[str]:
-        """Return tests for whether somebody stands in each static relation to who fills a role, of those who aren't known yet."""
+        """Return tests that each static relation relates the role's individual to some individual not yet bound."""
         found = []
         for c in self.hard:
             if isinstance(c, RelationCondition) and not c.negated and role in c.arguments:
@@ -142,14 +143,14 @@ class _Join:
         return found
 
     def ready(self) -> list[str]:
-        """Return tests for what must hold and speaks of nobody who isn't known yet, once."""
+        """Return tests for every required condition all of whose roles are bound, each once."""
         now = [c for c in self.hard if not mentions(c) - self.bound]
         self.hard = [c for c in self.hard if c not in now]
         now.sort(key=lambda c: not isinstance(c, ValueCondition))
         return [self.writer.expression(c, set(self.bound), self.kinds, self.rule.name) for c in now]
 
     def sources(self, role: str) -> tuple[list[str], tuple[float, str]]:
-        """Return who fills a role by the state, as elements of a list, and what else there is, with how many these are."""
+        """Return the candidates for a role by the state, as elements of a list, the other candidates, and their number."""
         now, writer = list[str](), self.writer
         members = self.problem.classes.get(self.kinds[role], ())
         other = len(members) + 1.0, writer.constant(("members", self.kinds[role]), members)

@@ -42,15 +42,15 @@ from confab.reasoner.symbols import (
 )
 
 WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf
-"""What memory's files have words for; a rule that asks for anything else isn't learned."""
+"""Conditions that memory files can express; a rule with any other isn't learned."""
 STATIC = RelationCondition, ClassCondition
 BINDINGS = 100
-"""So many ways in which something that is defined may follow from others are looked at, for one that isn't circular."""
+"""Maximum number of derivations of a defined fact that are examined for one that isn't circular."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """A step that was done: what it asked, as ground conditions, and the changes that it made, with the conditions of each."""
+    """An executed step: its ground conditions, and its changes with the conditions of each."""
 
     ground: Ground
     asked: tuple[Condition, ...]
@@ -59,7 +59,7 @@ class Done:
 
 
 class Course:
-    """The steps of a plan, one after the other, on the checker's facts.
+    """The steps of a plan, executed one after the other on the checker's facts.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Course:
         self.problem, self.rules, self.facts = problem, Rules(problem), Facts(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
-        """Who is asked for by name; all others, those with whom something rests included, become roles."""
+        """The individuals that behaviours name; all others, those in rest values included, become roles."""
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
         for number, (name, arguments) in enumerate(steps):
@@ -108,7 +108,7 @@ class Course:
     def plain(
         self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: Facts
     ) -> Iterator[Condition]:
-        """Yield conditions that hold without choices: the individual and the alternative that there are."""
+        """Yield conditions that hold with the individuals and alternatives chosen."""
         for condition in (substituted(lifted, bound) for lifted in conditions):
             if isinstance(condition, Witness) and not condition.negated:
                 inner = {**kinds, condition.variable: condition.kind}
@@ -124,7 +124,7 @@ class Course:
                 yield condition
 
     def because(self, condition: ValueCondition, facts: Facts) -> Iterator[list[Condition]]:
-        """Yield what a defined situation type may rest on where it is true."""
+        """Yield the facts from which a defined situation follows where it is true."""
         rules = self.problem.domain.rules
         of = [(rule.conditions, rule.behavior.kinds, rule.parameters) for rule in rules[condition.situation]]
         group = next(group for group in strata(rules) if condition.situation in group)
@@ -145,7 +145,7 @@ class Course:
     # -------------------------------------------------------------------------------------------------------- regressing
 
     def rules_of(self) -> Iterator[Rule]:
-        """Yield for each change of a step that a goal or a later step needed the rule that the step brings it about.
+        """Yield for each change of a step that a goal or a later step needed the rule that this step achieves it.
 
         The facts are as in the beginning then.
         """
@@ -171,7 +171,7 @@ class Course:
     def needed(
         self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
     ) -> tuple[dict[Condition, None], dict[Condition, None]]:
-        """Return what must hold before a step so that something holds after it, and whether the step serves that at all.
+        """Return the conditions before a step under which a condition holds after it, and whether the step contributes to it.
 
         What is defined is replaced by what it rests on, as far as the step brought it about; what follows no more, by what it
         followed from.
@@ -180,7 +180,10 @@ class Course:
         tries = BINDINGS
 
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
-            """Return what something rests on, each with whether it holds before the step; None if on itself alone."""
+            """Return the conditions from which a fact follows, each with whether it holds before the step.
+
+            None if only on itself.
+            """
             nonlocal tries
             if self.rules.satisfied([c], {}, {}, facts) is not None:
                 return [(c, True)]
@@ -214,7 +217,7 @@ class Course:
         return need, served
 
     def links(self, done: Done, served: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
-        """Yield for each change of a step that something needed the rule that the step brings it about: a goal of its own."""
+        """Yield for each needed change of a step the rule that the step achieves it, as a goal of its own."""
         goals: dict[ValueCondition, None] = {}
         for c in served:
             if isinstance(c, ValueCondition) and c.situation in self.problem.domain.rules:
@@ -236,13 +239,13 @@ class Course:
                     yield rule
 
     def aimed(self, goal: ValueCondition, facts: Facts) -> ValueCondition:
-        """Return a goal for rules: of an amount only whether it becomes more or less, since the same one seldom comes again."""
+        """Return a goal for rules; for an amount only whether it becomes more or less, since equal amounts seldom recur."""
         if self.problem.domain.situations[goal.situation].quantity is None:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
 
     def before(self, condition: Condition, done: Done) -> Iterator[Condition]:
-        """Yield what must hold before a step for what it makes true: the conditions of its effects."""
+        """Yield the conditions of a step's effects that make given facts true."""
         about = {(c.situation, c.arguments) for c in walk(condition) if isinstance(c, ValueCondition)}
         situations = {situation for situation, _ in about}
         plain = isinstance(condition, ValueCondition)
@@ -251,7 +254,7 @@ class Course:
                 yield from when
 
     def hindered(self, served: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
-        """Yield of what nobody may be what held of one who was, and that all others weren't."""
+        """For a "no object …" condition, yield the fact of the one object that violated it, and that no other did."""
         for c in served:
             if isinstance(c, Witness) and c.negated:
                 wanted = (*c.conditions, ClassCondition(c.variable, c.kind))
@@ -264,7 +267,7 @@ class Course:
     def lifted(
         self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]
     ) -> Rule | None:
-        """Return a rule: the individuals of a need as roles, and no condition that others imply; None if it says too little."""
+        """Return a rule: individuals become roles, implied conditions are left out; None if too little remains."""
         members = self.problem.members
         if not all(isinstance(inner, WRITABLE) for c in need if not isinstance(c, Comparison) for inner in walk(c)):
             return None
@@ -320,7 +323,7 @@ class Course:
         )
 
     def plainest(self, who: str, of: str) -> str:
-        """Return the widest class of somebody, within another one, that isn't made of the values of a situation type."""
+        """Return the widest class of an individual within another class that isn't made of a situation type's values."""
         members, situations = self.problem.members, self.problem.domain.situations
         if of and of not in situations:
             return of
@@ -337,14 +340,14 @@ class Course:
     # ------------------------------------------------------------------------------------------------------------ order
 
     def orders(self) -> Iterator[Order]:
-        """Yield for each two goals that were achieved one after the other which came first."""
+        """Yield for every two goals achieved one after the other which came first."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
                 yield Order.of(first, then, self.constants)
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
-    """Return conditions with those inside of witnesses beside them, and the classes of all variables."""
+    """Return conditions and those inside witnesses, and the classes of all variables."""
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
@@ -360,13 +363,13 @@ def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[t
 
 
 def situations_of(conditions: Iterable[Condition]) -> Iterator[str]:
-    """Yield the situation types that conditions ask for."""
+    """Yield the situation types in conditions."""
     for condition in conditions:
         yield from (inner.situation for inner in walk(condition) if isinstance(inner, ValueCondition))
 
 
 def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
-    """Yield the conditions on symbols, and the amounts, that a condition is made of."""
+    """Yield the conditions on symbols, and the amounts, inside a condition."""
     for inner in walk(condition):
         if isinstance(inner, ValueCondition):
             yield inner
@@ -375,7 +378,7 @@ def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
 
 
 def undo(facts: Facts, mark: int) -> None:
-    """Take back what was changed since the log had a length."""
+    """Undo the changes since the log had a length."""
     while len(facts.log) > mark:
         situation, key, old = facts.log[-1]
         facts.put(situation, key, old)
@@ -383,7 +386,7 @@ def undo(facts: Facts, mark: int) -> None:
 
 
 def ordered_inside(condition: Condition) -> Condition:
-    """Return a condition with those inside it in one order, so that the same rule has one name."""
+    """Return a condition with its parts in canonical order, so that equal rules have equal names."""
     if isinstance(condition, Witness):
         return replace(condition, conditions=tuple(sorted(map(ordered_inside, condition.conditions), key=repr)))
     if isinstance(condition, AnyOf):

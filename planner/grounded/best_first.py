@@ -30,12 +30,12 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
 SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
-"""Operators examined to shorten a plan: at least, for each of the first steps, and as a share of the search's work."""
+"""Operators looked at to make a plan shorter: at all, for each of so many first steps, and as a part of the search's work."""
 
 
 @dataclass(frozen=True)
 class Flat:
-    """The result of a flat search: `plan`, operators of the task, exactly if `status` is solved; and the work in bits."""
+    """What a flat search found: `plan`, operators of the task, is there exactly if `status` is solved; and its work, in bits."""
 
     status: Status
     plan: tuple[int, ...] = ()

@@ -1,4 +1,4 @@
-"""Plans with a proof of how far from optimal they can be, at most.
+"""Plans with a proved bound of their distance from the optimum.
 
 upper   cost of the best plan so far: the fast planner's, made shorter for as long as that helps
 lower   what any plan costs at least: the least f of A* on the lowest level, with what each goal costs alone and then with LM-cut
@@ -33,7 +33,7 @@ from confab.reasoner.limits import LimitError, OutOfTimeError
 from confab.reasoner.symbols import Problem
 
 WORK = 1_000_000
-"""Operators that are looked at to shorten the best plan on the lowest level: its length against CPU time."""
+"""Maximum number of operators examined to shorten the best plan on the lowest level."""
 
 
 def plan(
@@ -42,7 +42,7 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: Compiled | None = None,
 ) -> Outcome:
-    """Plan, and prove a bound: an outcome whose `bound` no plan of the lowest level can be cheaper than.
+    """Plan, and prove a lower bound of the cost of any plan of the lowest level.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Improve a plan by ever more orders of the goals, until that stops helping or half of the time is gone."""
+    """Improve a plan by more and more orders of the goals, until that no longer helps or half of the time has passed."""
     begin = perf_counter()
     improve = 2 * ORDERS
     while best.plan is not None and improve <= 64 * ORDERS:
@@ -154,7 +154,10 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
             added_by[bit].append(o)
 
     def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
-        """Return each bit's cost, the costliest need counting, and for each operator that need (-1: out of reach)."""
+        """Return the cost of each bit by its most expensive precondition, and that precondition for each operator (-1.
+
+        Unreachable).
+        """
         value = [math.inf] * (task.size + 2)
         missing = [len(bits) for bits in needs]
         support = [-1] * len(needs)

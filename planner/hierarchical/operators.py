@@ -1,4 +1,4 @@
-"""Behaviours compiled to Python source, once per problem: what each does, and how each could bring a value about.
+"""Behaviours compiled to Python source, once per problem: their changes, and the ways in which each effect achieves a value.
 
 Beside its function ``forward`` (`confab.planner.transitions`) a behaviour has for every effect one ``achieve(key …, value)``. It
 yields each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
@@ -42,12 +42,12 @@ from confab.reasoner.symbols import (
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
-"""Yields arguments, positions of unmet conditions, and (if any is unmet) the binding in which they are."""
+"""Yields arguments, positions of unmet conditions, and (if there are any) the binding."""
 
 
 @dataclass(frozen=True)
 class Achiever:
-    """One effect of one behaviour, seen from the value that it brings about.
+    """One effect of one behaviour, as an achiever of its value.
 
     `soft` are the conditions that the state can change, by position; `determined` says of which symbol a variable is the
     value: its situation type and argument terms; of a rule, `determining` has the conditions that do so. If `deep`, what nobody may
@@ -66,18 +66,18 @@ class Achiever:
 
 @dataclass
 class Bound:
-    """The compiled functions, bound to the table that they look at."""
+    """The compiled functions, bound to one table."""
 
     forward: dict[str, Forward]
     achieve: dict[tuple[str, int], Achieve]
 
 
 FEW = 8
-"""So many candidates are all tried; of more, one of each sort."""
+"""Maximum number of candidates that are all tried; of more, one of each symmetry class."""
 
 
 class Program:
-    """The compiled behaviours of one problem: they serve any table over the same individuals and static facts.
+    """The compiled behaviours of one problem, for any table over the same individuals and static facts.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Program:
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
     def bind(self, table: Table, few: int = FEW) -> Bound:
-        """Return the functions over a table; of more than a `few` alike that could be enumerated one stands for all."""
+        """Return the functions over a table; of more than `few` interchangeable candidates, one is tried."""
         if self._rules is not None:
             self._rules.define(table)
         return Bound(*self._bind(table.now, table.who, few))
@@ -123,7 +123,7 @@ class Program:
         return self.alike.unlike(candidates, representatives(groups, who, {}), now)
 
     def size(self, level: int) -> int:
-        """Return how many behaviours a level has at most, quantified over all individuals."""
+        """Return the maximum number of quantified behaviours of a level."""
         classes = self.problem.classes
         return sum(
             prod(len(classes.get(parameter.kind, ())) for parameter in behavior.parameters)
@@ -131,14 +131,14 @@ class Program:
         )
 
     def changing(self, level: int) -> list[SituationType]:
-        """Return the situation types, other than those that are true or false, that a level changes."""
+        """Return the situation types, except boolean ones, that a level changes."""
         situations = self.domain.situations
         names = dict.fromkeys(e.situation for behavior in self.domain.at_level(level) for e in behavior.effects)
         return [situations[name] for name in names if not situations[name].boolean]
 
     @cached_property
     def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
-        """For each static relation the tuples that an individual occurs in."""
+        """For each static relation the tuples of each individual."""
         found: dict[str, dict[str, list[tuple[str, ...]]]] = {}
         for relation, rows in self.problem.relations.items():
             index = found.setdefault(relation, {})
@@ -233,7 +233,7 @@ class Program:
 
     @staticmethod
     def _rule(rule: Behavior) -> tuple[tuple[str, ...], Achiever]:
-        """Return a rule's parameters, and it as an achiever of what it defines; its conditions bind before they use."""
+        """Return a rule's parameters, and the rule as an achiever of its situation type, with conditions in binding order."""
         waiting, soft = list(rule.preconditions), list[Condition]()
         parameters = tuple(p.name for p in rule.parameters)
         bound = set(parameters)
@@ -285,12 +285,12 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an iterable expression for the candidates, of many for free ones of each sort and state."""
+        """Return an iterable expression of the candidates; of many, free ones of each symmetry class and state."""
         taken = next((identifier("who", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
-        """Whether nothing that this level does can change the truth of a condition."""
+        """Whether no behaviour of this level can change the truth of a condition."""
         match condition:
             case ValueCondition(situation, arguments, _, _):
                 return not self.changeable(situation, arguments, kinds, behavior)
@@ -307,7 +307,7 @@ class Program:
     def changeable(
         self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str], behavior: Behavior
     ) -> bool:
-        """Whether an effect on the level of `behavior` can fall on a symbol with these terms."""
+        """Whether an effect on the level of `behavior` can change a symbol with these terms."""
         if situation in self.domain.rules:
             return True  # whatever it follows from
         here = [self._possible(term, kinds, behavior) for term in arguments]
@@ -321,7 +321,7 @@ class Program:
         return False
 
     def _possible(self, term: str, kinds: Mapping[str, str], behavior: Behavior) -> frozenset[str]:
-        """Return the individuals that a term of a behaviour can stand for."""
+        """Return the individuals that a term of a behaviour can denote."""
         if not term.startswith("?"):
             return frozenset((term,))
         found = self.problem.members(kinds[term])
@@ -333,7 +333,7 @@ class Program:
 
 
 def named(problem: Problem, rests: bool = True) -> list[str]:
-    """Return the individuals that behaviours and rules mention by name, and the values that situation types start or rest with."""
+    """Return the individuals in behaviours and rules, and in default and rest values."""
     every: set[str] = set()
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
     for behavior in (*problem.domain.behaviors.values(), *rules):

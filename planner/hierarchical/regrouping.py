@@ -1,4 +1,4 @@
-"""A plan of one level put under behaviours of the levels above, wherever a run of its steps does what one of these says."""
+"""Regrouping: steps of one level put below behaviours of the levels above that have the same effect."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LONGEST = 60
-"""Steps that may stand under one of the level above."""
+"""Maximum number of steps below one step of the level above."""
 
 
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan of one level with its steps under those of the levels above, wherever a run does what one of these says.
+    """Return a plan of one level with runs of its steps below steps of the levels above that have the same effect.
 
     As few as can be stay by themselves. Nothing is asked of the plan here: what the checker refuses is no plan.
     """
@@ -35,7 +35,7 @@ def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
 
 
 def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
-    """Return steps with as many of them as can be under as few steps of a level as can be, each run doing what its step says.
+    """Return steps with as many as possible below as few steps of a level as possible, each run with its step's effect.
 
     Where a run begins and ends, all is at rest that the level doesn't see and that was touched.
     """
@@ -70,7 +70,7 @@ def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
 
 
 def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
-    """Return what holds before the first of some steps and after each; None if one can't be done."""
+    """Return the states before the first step and after each; None if a step isn't applicable."""
     found: list[State] = [dict(problem.initial)]
     for step in steps:
         values = found[-1]
@@ -84,7 +84,7 @@ def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
 
 
 def _at_rest(problem: Problem, course: Sequence[State], level: int) -> Iterator[bool]:
-    """Yield of each state whether everything is at rest that a level doesn't see and that was touched on the way."""
+    """Yield for each state whether all changed symbols that a level doesn't see are at rest."""
     rests = {
         name: kind.rest
         for name, kind in problem.domain.situations.items()

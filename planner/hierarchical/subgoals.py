@@ -1,7 +1,7 @@
-"""What would have to change for an unmet condition to hold: from an achiever to the values that it wants.
+"""Subgoals: the values that an unmet condition of an achiever needs.
 
-A want is a symbol with the values of which one would do. Where many would, one of each sort is proposed (`Alike`), so that a
-thousand free places count as one; the values that goals name are proposed besides.
+A subgoal is a symbol with alternative values. If there are many, one of each symmetry class is proposed (`Alike`), so that a
+thousand free places count as one; values in goals are proposed as well.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from confab.reasoner.symbols import (
 )
 
 Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
-"""Situation type, key, and the values of which one is wanted."""
+"""Situation type, key, and the alternative values."""
 DEEPEST = 8
-"""Rules that are followed one inside the other to what they lack."""
+"""Maximum depth of nested rules examined for missing facts."""
 Env: TypeAlias = "Mapping[str, str | None]"
 
 
 class Wants:
-    """Turns unmet conditions into wants, for one table and goal.
+    """Turns unmet conditions into subgoals, for one table and goal.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Wants:
             self.wanted.setdefault(situation, {})[value] = None
 
     def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Want]:
-        """Return alternative wants for the soft condition `number`, as `of` does; the same as long as nothing changes."""
+        """Return alternative subgoals for the soft condition `number`, as `of` does; cached until the table changes."""
         self._forget()
         scope = self._scopes.get((id(achiever), number))
         if scope is None:
@@ -92,14 +92,14 @@ class Wants:
         return found
 
     def _forget(self) -> None:
-        """Forget what was read off the table before it changed."""
+        """Discard what was read from the table before a change."""
         if self._age != self.table.age:
             self._age = self.table.age
             self._fresh.clear()
             self._free.clear()
 
     def _scope(self, achiever: Achiever, condition: Condition) -> tuple[str, ...]:
-        """Return the variables on which the wants of a condition depend."""
+        """Return the variables on which the subgoals of a condition depend."""
         found = dict.fromkeys(self._about(condition)[2])
         for term in tuple(found):
             if term in achiever.determined:
@@ -107,7 +107,7 @@ class Wants:
         return tuple(found)
 
     def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
-        """Yield alternative wants, any of which may bring an achiever's unmet condition nearer."""
+        """Yield alternative subgoals, each of which may contribute to an achiever's unmet condition."""
         match condition:
             case ValueCondition(situation, arguments, value, negated) if situation in self.program.rules:
                 key = self._key(arguments, env)
@@ -148,7 +148,7 @@ class Wants:
         yield from self._redetermined(achiever, condition, env, level)
 
     def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Want]:
-        """Yield what those lack who could satisfy a witness."""
+        """Yield the missing facts of the individuals that could satisfy a witness."""
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
         for individual in self.one_of_each(witness.kind, env.values()):
@@ -161,7 +161,7 @@ class Wants:
                 yield from self.of(achiever, c, {**env, witness.variable: individual}, level)
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
-        """Return wants, any of which may make something that is defined true, or false."""
+        """Return alternative subgoals that may make a defined situation true, or false."""
         if self._entered is not None and situation in self._circular:  # then it depends on where one comes from
             return list(self._defining(situation, key, wanted, level))
         self._forget()
@@ -197,18 +197,18 @@ class Wants:
         self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
-        """Return of those who could satisfy a rule's witness the ones that it is about, or else a few that lack least."""
+        """Return the candidates for a rule's witness that its goal names, or else a few that lack the least."""
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 
     def concern(self, individuals: frozenset[str]) -> None:
-        """Say what it is about: who is to be looked for first where a rule asks for somebody."""
+        """Set the individuals to be tried first where a rule needs one."""
         if self.program.rules and individuals != self._concern:
             self._concern = individuals
             self._fresh.clear()
 
     def _holds_so_far(self, rule: Achiever, condition: Condition, env: dict[str, str | None]) -> bool:
-        """Whether a condition of a rule holds, those before it being put in; the individual that it determines is put in, too."""
+        """Whether a condition of a rule holds after the earlier ones; the variable that it determines is bound."""
         if condition in rule.determining and isinstance(condition, ValueCondition):
             key = self._key(condition.arguments, env)
             found = None if key is None else self.table.now[condition.situation].get(key)
@@ -217,7 +217,7 @@ class Wants:
         return self.holds(rule, condition, env)
 
     def _amounts(self, condition: Comparison, env: Env) -> Iterator[Want]:
-        """Yield for each amount in a comparison what it would have to be if the others stayed as they are."""
+        """Yield for each amount in a comparison the value that would satisfy it if the others stayed the same."""
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
         for part in dict.fromkeys((*inside(condition.left), *inside(condition.right))):
@@ -237,7 +237,7 @@ class Wants:
                 yield part.situation, key, (f"{flipped}{amount_written(limit)}".lstrip("="),)
 
     def worth(self, condition: Comparison, env: Env) -> Number:
-        """Return by how much the left side of a comparison is larger than the right one now."""
+        """Return the present difference between the sides of a comparison."""
         names = self._about(condition)[2]
         function = self._worths.get(id(condition))
         if function is None:
@@ -250,7 +250,7 @@ class Wants:
         return found
 
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
-        """Yield wants for other values of the symbols that determine a condition's variables.
+        """Yield subgoals for other values of the symbols that determine a condition's variables.
 
         With another value a witness need only be possible (that room has a door, which is shut): what it lacks is wanted, too.
         """
@@ -275,7 +275,7 @@ class Wants:
                         yield from self._lacking(achiever, condition, {**env, term: value}, level)
 
     def _possible(self, condition: Condition) -> Condition:
-        """Return the static part of a witness, always the same one, or the condition itself where it has none."""
+        """Return the static part of a witness (the same object each time), or the condition itself if it has none."""
         if not isinstance(condition, Witness) or condition.negated:
             return condition
         if id(condition) not in self._possibles:
@@ -285,7 +285,7 @@ class Wants:
         return self._possibles[id(condition)][0]
 
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
-        """Return whether nothing can change a condition, whether it compares, its variables, and itself.
+        """Return whether a condition is static, whether it compares, its variables, and the condition.
 
         Itself, so that its `id` stays its own.
         """
@@ -299,7 +299,7 @@ class Wants:
         return found
 
     def _negation(self, condition: Condition) -> Condition:
-        """Return the opposite of a condition, always the same one."""
+        """Return the negation of a condition, the same object each time."""
         found = self._negations.get(id(condition))
         if found is None:
             opposite = replace(condition, negated=not condition.negated)
@@ -323,7 +323,7 @@ class Wants:
         return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
-        """Return values of a class for a symbol: its goal, and one of each sort, free ones first."""
+        """Return values of a class for a symbol: its goal value, and one of each symmetry class, free ones first."""
         members = self.program.problem.classes.get(kind, ())
         if len(members) <= FEW:
             return members
@@ -344,12 +344,12 @@ class Wants:
         return tuple(found)
 
     def burden(self, situation: str, value: str) -> int:
-        """Return how little a value is to be had: least what nobody has, most what somebody has as a goal says."""
+        """Return the availability of a value: least for values that no object holds, most for values held as a goal requires."""
         keys = self.table.who[situation].get(value, ())
         return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
 
     def spare(self, beside: Collection[str], level: int, number: int) -> Iterator[str]:
-        """Yield values beside those of each sort that these belong to, least burdened first."""
+        """Yield further values of the same symmetry classes, least used first."""
         for situation in self.program.changing(level):
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
@@ -367,7 +367,7 @@ class Wants:
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
     def one_of_each(self, kind: str, beside: Collection[str | None] = ()) -> list[str]:
-        """Return the individuals of a class, or one of each symmetry class and state if they are many.
+        """Return the individuals of a class; of many, one of each symmetry class and state.
 
         Of a symmetry class that has an individual `beside`, one more: it may have to be another.
         """
@@ -387,7 +387,7 @@ class Wants:
         return None if None in found else key_of(found)  # type: ignore[arg-type]
 
     def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
-        """Whether a condition of an achiever holds now; what neither it nor the environment determines is nothing."""
+        """Whether a condition of an achiever holds now; undetermined terms have no value."""
         test, names = self._asked(achiever, condition, env, False)
         return bool(test(*[env.get(name) for name in names]))
 
@@ -400,7 +400,7 @@ class Wants:
     def _asked(
         self, achiever: Achiever, condition: Condition, env: Env, whom: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
-        """Return the function that tells whether a condition holds, or for whom a witness does, and its arguments."""
+        """Return the function that tests a condition, or yields the individuals of a witness, and its arguments."""
         key = id(condition), whom, *[name in env for name in self._about(condition)[2]]
         known = self._tests.get(key)
         if known is None:

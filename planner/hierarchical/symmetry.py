@@ -1,4 +1,4 @@
-"""Individuals that no static fact tells apart, so that one of them can stand for all."""
+"""Symmetry classes: individuals with the same static facts, of which one can stand for all."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from confab.planner.transitions import Key
 from confab.reasoner.symbols import Problem
 
 ENDS = 8
-"""So many individuals at each end of a large group are looked at for whether they are in another state."""
+"""Number of individuals at each end of a large class that are examined for another state."""
 
 
 class Alike:
-    """The individuals of a problem by what static facts say of them.
+    """The symmetry classes of a problem's individuals.
 
     Two individuals are alike if they belong to the same classes, exist from the same level on, and exchanging them leaves
     every static relation as it is. Names that behaviours mention are alike to nobody.
@@ -49,10 +49,10 @@ class Alike:
         self._named = frozenset(named)
         of = {s.name: s.arguments for s in problem.domain.situations.values()}
         self._whose = {name: problem.members(kinds[0]) for name, kinds in of.items() if len(kinds) == 1}
-        """Of whom a situation type says something."""
+        """The classes of individuals that have a situation type."""
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:
-        """Return `members` grouped by likeness, in their order."""
+        """Return `members` grouped by symmetry class, in their order."""
         found = self._groups.get(members)
         if found is None:
             by_sort: dict[int, list[str]] = {}
@@ -62,7 +62,7 @@ class Alike:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return members that differ by what holds of them now from those of their group that are known, one of each.
+        """Return members whose state differs from that of known members of their class, one for each state.
 
         Of a large group the first and the last few are looked at: what is used up is used up from one end.
         """
@@ -85,7 +85,7 @@ class Alike:
         return found
 
     def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
-        """Return the values of an individual, as far as behaviours mention them."""
+        """Return the values of an individual in situation types that behaviours use."""
         values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 
@@ -97,7 +97,7 @@ def representatives(
     cursors: dict[int, int] | None = None,
     burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
-    """Return one value per group: the first that nobody has and no goal wants.
+    """Return one value per class: the first that no object holds and no goal requires.
 
     Where there is none, a few that nobody has; where there are none of these either, that of least `burden`. With
     `cursors` (by the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone

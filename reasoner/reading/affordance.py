@@ -1,4 +1,4 @@
-"""Situated affordances: which behaviours which object affords here, asked of the graph by SPARQL.
+"""Situated affordances: the behaviours that each object affords in a state, found by SPARQL.
 
 A state is written into a named graph of its own (`SITUATION`), one fact for each symbol, with defaults filled in. A behaviour's
 preconditions become graph patterns on it:
@@ -58,7 +58,7 @@ RELATION_PROPERTIES = (
 TYPE = ox.NamedNode(RDF + "type")
 SIGNS = {"increase": "+", "decrease": "-"}
 MOST_TOGETHER = 3
-"""Maximum number of other effects that may change the same amount; of more, the query asks nothing."""
+"""Maximum number of effects that may change the same amount; with more, the query has no condition on bounds."""
 
 
 @dataclass(frozen=True, order=True)
@@ -85,7 +85,7 @@ class Affordance:
 
 
 def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
-    """Write a state, the initial one if none is given, with all that follows from it into the graph `SITUATION`."""
+    """Write a state (default: the initial one), with its derived facts, into the graph `SITUATION`."""
     name, properties = ox.NamedNode(SITUATION), value_properties(graph)
     graph.store.clear_graph(name)
     count = 0
@@ -106,7 +106,10 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
-    """Yield what follows from the graph `SITUATION`, which is to have each before the next is asked for, from nothing upwards."""
+    """Yield the derived facts of the graph `SITUATION`, from nothing upwards.
+
+    Each has to be added before the next is requested.
+    """
     rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
     again = circular(rules)
     for group in strata(rules):
@@ -123,7 +126,7 @@ def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
 
 
 def _names(condition: Condition, variable: str) -> bool:
-    """Whether a condition that holds says who a variable is."""
+    """Whether a true condition determines a variable."""
     match condition:
         case ValueCondition(_, arguments, value, False) if value != FALSE:
             return variable in (*arguments, value)
@@ -236,13 +239,13 @@ class _Writer:
         self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
 
     def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
-        """Yield what the parameters and variables stand for, once for each way in which a behaviour can be done."""
+        """Yield the bindings of parameters and variables with which a behaviour is applicable, once per binding."""
         names = self.names(behavior, when)
         for row in self.graph.select(self.query(behavior, when, ordered=False), SCENE):
             yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
 
     def effects(self, behavior: Behavior, arguments: tuple[str, ...], bindings: dict[str, str]) -> Iterator[Fact]:
-        """Yield what holds after a behaviour, conditional effects included."""
+        """Yield the effects of a behaviour, conditional ones included."""
         for effect in behavior.effects:
             if not effect.when:
                 yield _fact(effect, bindings)
@@ -252,7 +255,7 @@ class _Writer:
                     yield _fact(effect, row)
 
     def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
-        """Return the terms that a query binds: parameters in their order, then what value conditions determine."""
+        """Return the terms that a query binds: the parameters in order, then the variables that value conditions determine."""
         found = dict.fromkeys(parameter.name for parameter in behavior.parameters)
         for condition in (*behavior.preconditions, *when):
             if isinstance(condition, ValueCondition) and not condition.negated and condition.value.startswith("?"):
@@ -297,7 +300,7 @@ class _Writer:
             yield from self.positive(condition)
 
     def positive(self, condition: Condition) -> Iterator[str]:
-        """Yield the lines that say a condition without its negation."""
+        """Yield the lines of a condition without its negation."""
         match condition:
             case ValueCondition(situation, arguments, value):
                 yield self.value(situation, arguments, value)
@@ -322,7 +325,7 @@ class _Writer:
                 yield from (*patterns, test)
 
     def amount(self, expression: Expression, patterns: list[str]) -> str:
-        """Return an amount as an expression, and add the patterns that bind what is in it."""
+        """Return an amount as an expression, and add the patterns that bind its variables."""
         match expression:
             case Calculation(sign, left, right):
                 return f"({self.amount(left, patterns)} {sign} {self.amount(right, patterns)})"

@@ -62,11 +62,11 @@ INSIDE = "|".join(
         *("onDataRange", "withRestrictions", "datatypeComplementOf"),
     )
 )
-"""What leads from a class expression to what is nested inside, but for lists."""
+"""Properties from a class expression to its parts, except lists."""
 EXPRESSIONS = f"""{{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(!isLiteral(?value)) }} UNION
     {{ ?class owl:equivalentClass ?expression . ?expression ({INSIDE}|rdf:first|rdf:rest)* ?node .
       ?node ?property ?value . FILTER(isBlank(?node)) }}"""
-"""The part of a SPARQL query that yields every definition with what is nested inside, as (node, property, value)."""
+"""The part of a SPARQL query that yields every definition with its parts, as (node, property, value)."""
 
 AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
       FILTER(?property IN (owl:propertyChainAxiom, owl:inverseOf, owl:equivalentProperty)
@@ -78,15 +78,15 @@ AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
       FILTER(?property IN (rdf:first, rdf:rest)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest*/rdf:first ?node . ?node ?property ?value .
       FILTER(?property = owl:inverseOf && isBlank(?node)) }"""
-"""The part of a SPARQL query that yields what axioms say of value properties, as (node, property, value)."""
+"""The part of a SPARQL query that yields the axioms about value properties, as (node, property, value)."""
 
 _DEFINED = OWL + "equivalentClass"
 CLOSED = {OWL + name for name in ("complementOf", "allValuesFrom", "oneOf", "hasSelf")}
 CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinality")}
 CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
-"""What OWL 2 RL concludes no class from; what is stated of a scene is all there is in planning, so that it follows there."""
+"""Constructs from which OWL 2 RL concludes no class; planning can, since unstated facts are false."""
 MOST = 5
-"""How far a cardinality counts: trying who is who of more would take longer than any plan."""
+"""Maximum cardinality; larger ones would take longer to test than any plan to find."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
 
 
@@ -114,12 +114,12 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Tell whether a class is tested by its definition: its individuals change, or OWL 2 RL doesn't find all of them."""
+        """Return whether a class is tested by its definition: its members change, or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
 
     @cached_property
     def recursive(self) -> frozenset[str]:
-        """The classes that their own definition names, directly or in those of others."""
+        """The classes with a recursive definition, directly or through others."""
         names = {iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
         found = set()
         for iri in names:
@@ -141,7 +141,7 @@ class Definitions:
         return self._spread(set(self.concluded))
 
     def _spread(self, found: set[str]) -> frozenset[str]:
-        """Return named classes with all whose definition speaks of a value property, or of a class that does or is among them."""
+        """Return some classes with those whose definitions use a value property, or one of these classes."""
         defined = {
             iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node
         }
@@ -151,7 +151,7 @@ class Definitions:
 
     @cached_property
     def _closed(self) -> frozenset[str]:
-        """The classes of which OWL 2 RL finds nobody, since they are defined by what nobody is or has only (`CLOSED`).
+        """The classes without members for OWL 2 RL, since their definitions use `CLOSED` constructs.
 
         Those are meant that are *Base and …*, where planning knows all that the definition speaks of.
         """
@@ -170,13 +170,13 @@ class Definitions:
         return frozenset(found)
 
     def _mentioned(self, iri: str) -> set[str]:
-        """Return the properties and classes that a definition names."""
+        """Return the properties and classes in a definition."""
         inside = [self.nodes.get(node, {}) for node in self._expressions(iri)]
         named = [*self._definitions(iri), *(value for said in inside for values in said.values() for value in values)]
         return {value for value in named if not _blank(value)}
 
     def _expressions(self, iri: str) -> list[str]:
-        """Return the expressions of a definition, those inside of others as well."""
+        """Return the expressions of a definition, nested ones included."""
         found = dict.fromkeys(node for node in self._definitions(iri) if _blank(node))
         waiting = list(found)
         while waiting:
@@ -189,7 +189,7 @@ class Definitions:
         return self.nodes.get(iri, {}).get(OWL + "equivalentClass", [])
 
     def base(self, iri: str) -> str:
-        """Return the class that bounds a changing one: the first static class that its definition names as a part."""
+        """Return a static superclass of a changing class: the first static class in its definition."""
         if not self.changes(iri):
             return iri
         if iri in self.concluded:
@@ -211,7 +211,7 @@ class Definitions:
         )
 
     def conditions(self, term: str, iri: str, negated: bool = False) -> tuple[Condition, ...]:
-        """Return what it takes for a term to be in a class: one class condition, or the definition of a changing class."""
+        """Return the conditions for a term to be in a class: a class condition, or the definition of a changing class."""
         if not self.changes(iri):
             return (ClassCondition(term, self.names.short(iri), negated),)
         if iri in self.recursive - self.concluded.keys():
@@ -228,7 +228,7 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return what makes a situation type hold of a class's individuals, besides what rules conclude of them."""
+        """Return the conditions for a situation type of a class's members, besides those of rules."""
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):
@@ -236,12 +236,12 @@ class Definitions:
         return (ClassCondition(term, self.names.short(iri)),)
 
     def condition(self, term: str, iri: str, negated: bool = False) -> Condition:
-        """Return the same as one condition."""
+        """Return these conditions as one condition."""
         found = self.conditions(term, iri, negated)
         return found[0] if len(found) == 1 else AnyOf((found,))
 
     def beyond_base(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return what a changing class asks of a term besides its base; nothing for a class that doesn't change."""
+        """Return the conditions of a changing class on a term besides its base class; empty for a static class."""
         return self.conditions(term, iri) if self.changes(iri) else ()
 
     def _one_definition(self, iri: str) -> str:
@@ -255,7 +255,7 @@ class Definitions:
     # -------------------------------------------------------------------------------------------------------- properties
 
     def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
-        """Return the rules that axioms about a value property say: it follows from others, or from chains of them.
+        """Return the rules of the axioms about a value property: subproperties and chains.
 
         A transitive one is followed from what it follows from otherwise, one link after the other; `more` tells whether there are
         rules of another kind from which it does.
@@ -277,7 +277,7 @@ class Definitions:
         return found
 
     def _below(self, prop: str) -> list[str]:
-        """Return the properties that are said to be sub-properties of one, or equivalent to it."""
+        """Return the stated subproperties and equivalent properties of one."""
         nodes, said = self.nodes.items(), (RDFS + "subPropertyOf", OWL + "equivalentProperty")
         found = {iri for iri, node in nodes for name in said if prop in node.get(name, ())}
         return sorted((found | {*self.nodes.get(prop, {}).get(said[1], ())}) - {prop})
@@ -288,7 +288,7 @@ class Definitions:
         )
 
     def _way(self, way: Sequence[str], situation: str, kinds: Sequence[str]) -> Rule:
-        """Return the rule that a chain of properties is."""
+        """Return the rule of a property chain."""
         variables: list[Parameter] = []
 
         def rest(place: int, one: str) -> tuple[Condition, ...]:
@@ -316,7 +316,7 @@ class Definitions:
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
     def _between(self, one: str, other: str) -> str:
-        """Return the class of what stands between two properties of a chain: the values of the first one."""
+        """Return the class of the individuals between two properties of a chain: the values of the first one."""
         for prop, at_its_end in ((one, True), (other, False)):
             iri, inverse = self._named(prop)
             if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
@@ -329,7 +329,7 @@ class Definitions:
     # -------------------------------------------------------------------------------------------------- class expressions
 
     def expression(self, term: str, node: str) -> Iterator[Condition]:
-        """Yield the conditions, all of which must hold, that a class expression stands for."""
+        """Yield the conditions whose conjunction a class expression means."""
         if not _blank(node):
             if node != THING:
                 yield from self.conditions(term, node)
@@ -365,7 +365,7 @@ class Definitions:
 
     @staticmethod
     def _cardinality(said: Mapping[str, Sequence[str]]) -> tuple[int, int | None] | None:
-        """Return how many values a restriction asks for, at least and at most; None if it isn't one of number."""
+        """Return the minimum and maximum cardinality of a restriction; None if it has none."""
         for name in ("cardinality", "qualifiedCardinality"):
             capital = name[0].upper() + name[1:]
             found = [said.get(OWL + one, [""])[0] for one in (name, f"min{capital}", f"max{capital}")]
@@ -377,7 +377,7 @@ class Definitions:
         return None
 
     def _counted(self, prop: str, term: str, filler: str, least: int, most: int | None) -> Iterator[Condition]:
-        """Yield that so many values are in a class, at least and at most."""
+        """Yield the conditions that the number of values in a class lies between a minimum and a maximum."""
         if max(least, -1 if most is None else most) > MOST:
             raise KnowledgeError(
                 f"a definition counts up to {max(least, most or 0)} values of {local_name(self._named(prop)[0])}; planning counts "
@@ -389,7 +389,7 @@ class Definitions:
             yield replace(self._some(prop, term, filler, outside=False, others=most), negated=True)
 
     def _numbers(self, said: Mapping[str, Sequence[str]], term: str) -> Condition:
-        """Return what a restriction says of an amount, or of the number that a relation gives."""
+        """Return the condition of a restriction on an amount, or on the number of a relation."""
         prop = said[OWL + "onProperty"][0]
         amount = self.number(prop, term)
         there = Comparison(amount, "=", amount)
@@ -441,7 +441,7 @@ class Definitions:
         return found
 
     def number(self, prop: str, term: str) -> Expression:
-        """Return the number that a property gives of a term."""
+        """Return the number of a term that a property states."""
         if prop not in self.situations:
             return Measure(self.names.short(prop), (term,))
         return Amount(self.names.short(self.situations[prop][0]), (term,))
@@ -449,7 +449,7 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return that some value is in a class (so many `others` besides), or (`outside`) that none is outside it."""
+        """Return that some value is in a class (with `others` further ones), or (`outside`) that no value is outside it."""
         variable = f"{term if term.startswith('?') else '?' + term}_{local_name(self._named(prop)[0])}"
         variable += str(len(before) + 1) if before else ""
         inside = tuple(self.expression(variable, filler))
@@ -466,7 +466,7 @@ class Definitions:
         return Witness(variable, kind, (self.related(prop, term, variable), *inside), negated=outside)
 
     def _range(self, prop: str) -> str:
-        """Return the class of what a property leads to: the situation type, for a value property."""
+        """Return the class of a property's values: the situation type, for a value property."""
         iri, inverse = self._named(prop)
         kind = self.kinds.get(iri, ("", ""))[not inverse]
         if not kind:
@@ -491,7 +491,7 @@ class Definitions:
         return ValueCondition(name, (one,), other) if functional else ValueCondition(name, (one, other), TRUE)
 
     def _named(self, prop: str) -> tuple[str, bool]:
-        """Return a property's IRI, and whether the inverse of it is meant."""
+        """Return a property's IRI, and whether the expression is its inverse."""
         inverse = self.nodes.get(prop, {}).get(OWL + "inverseOf", [])
         return (inverse[0], True) if inverse and prop not in self.situations else (prop, False)
 

@@ -1,4 +1,4 @@
-"""What is said of some individuals of a scene, read by queries whose size is theirs and not the scene's."""
+"""The facts about some individuals of a scene, read by queries of their size and not of the scene's."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
 PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
-"""What leads from a fact that is a node of its own to the individuals in it."""
+"""Properties from a fact with a node of its own to its individuals."""
 NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
 INDEX = CORE + "index"
 FACT = CORE + "SituatedObjectInstance"
 
 
 class Individuals:
-    """What was read of some individuals so far.
+    """The facts read about some individuals so far.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Read what is said of some individuals and of those of some classes, and by whom others are named backward."""
+        """Read the facts about some individuals, about members of some classes, and the facts that name given individuals."""
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, whom in (back or {}).items():
             if not whom:
@@ -87,7 +87,7 @@ class Individuals:
         return found
 
     def members(self) -> list[Member]:
-        """Return what was read as individuals of classes."""
+        """Return the individuals read, by class."""
         named = set[str]()
         kinds: list[tuple[str, str]] = []
         indices: dict[str, int] = {}
@@ -102,12 +102,12 @@ class Individuals:
         return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
 
     def facts(self, known: Frame) -> list[Triple]:
-        """Return the values and relations that were read, between individuals whose own triples were read."""
+        """Return the values and relations between individuals whose own facts were read."""
         wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
         return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
 
     def tuples(self) -> dict[str, Node]:
-        """Return the facts that are nodes of their own, as far as all individuals in them were read."""
+        """Return the facts with nodes of their own all of whose individuals were read."""
         nodes = self.schema.nodes
         facts = (
             {s for s, p, o in self.triples if p == TYPE and o == FACT} - nodes.keys() if self.schema.tuples else set()
@@ -123,7 +123,7 @@ class Individuals:
 
 
 def values_of(iris: Iterable[str]) -> str:
-    """Return IRIs as they stand in a VALUES clause; what people wrote and is no IRI is left out."""
+    """Return IRIs for a VALUES clause, without invalid ones."""
     return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
 
 

@@ -1,4 +1,4 @@
-"""What was seen in the world, as facts of the graph: a file of its own, beside the scene that people edit.
+"""Observed facts in the graph: a file of their own, beside the edited scene.
 
 Each fact is a situated object instance, an individual with object, situation type and value. It isn't the property assertion that
 the scene makes: a scene that says where a cup was, and a file that says where it was seen, don't contradict each other. A planning
@@ -44,7 +44,7 @@ def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
 
 
 def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
-    """Put an observed state into the graph `observed`, in place of what was there."""
+    """Put an observed state into the graph `observed`, replacing the previous one."""
     target = ox.NamedNode(BASE + "observed")
     graph.store.clear_graph(target)
     triples = _triples(state, names, graph.scene)
@@ -52,7 +52,7 @@ def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:
-    """Return a reading whose initial state is what a file says was observed, where it says something.
+    """Return a reading whose initial state has the observed facts of a file in the place of the scene's.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
 
 
 def observed_iri(scene: str) -> str:
-    """Return the IRI of the ontology of what was observed in a scene."""
+    """Return the IRI of the ontology of a scene's observed facts."""
     return f"{scene.rstrip('#/')}.observed"
 
 

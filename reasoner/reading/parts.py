@@ -56,9 +56,9 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE
 
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
-"""Conditions inside one another."""
+"""Maximum depth of nested conditions."""
 MOST_CONDITIONS = 10_000
-"""In one behaviour, each counted as often as it is named."""
+"""Maximum number of conditions in a behaviour, each counted as often as it is named."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Parts:
     count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
 
     def values(self, iri: str, name: str) -> Sequence[str]:
-        """Return what a property of a node leads to."""
+        """Return the values of a property of a node."""
         return self.nodes.get(iri, {}).get(CORE + name, ())
 
     def one(self, iri: str, name: str) -> str:
@@ -89,7 +89,7 @@ class Parts:
         return found[0]
 
     def number(self, iri: str, name: str, least: int, most: int, default: int | None = None) -> int:
-        """Return a whole number that a property gives, between bounds."""
+        """Return the value of a property as a whole number between bounds."""
         found = self.values(iri, name)
         if not found and default is not None:
             return default
@@ -100,7 +100,7 @@ class Parts:
         return self.number(iri, "level", 1, HIGHEST_LEVEL)
 
     def price(self, iri: str) -> Expression | None:
-        """Return what a behaviour is worked out to cost, if it is."""
+        """Return the price of a behaviour; None if it has none."""
         if not self.values(iri, "price"):
             return None
         if self.values(iri, "cost"):
@@ -108,7 +108,7 @@ class Parts:
         return self.expression(self.one(iri, "price"))
 
     def cost(self, iri: str) -> float:
-        """Return what a behaviour costs where nothing is worked out."""
+        """Return the fixed cost of a behaviour."""
         if not self.values(iri, "cost"):
             return 1.0
         said = self.one(iri, "cost")
@@ -121,20 +121,20 @@ class Parts:
         return cost
 
     def decimal(self, iri: str, name: str) -> Fraction | None:
-        """Return a number that a property gives, exact; None if it gives none."""
+        """Return the exact number of a property; None if it has none."""
         if not self.values(iri, name):
             return None
         return decimal(self.one(iri, name), f"<{iri}>: :{name}")
 
     def word(self, iri: str, name: str, known: Sequence[str]) -> str:
-        """Return the one of some known words that a property gives."""
+        """Return the value of a property, which has to be one of some known words."""
         said = self.one(iri, name)
         if said not in known:
             raise KnowledgeError(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
         return said
 
     def flag(self, iri: str, name: str) -> bool:
-        """Return whether a property is said to be true."""
+        """Return whether a boolean property is stated true."""
         said = set(self.values(iri, name))
         if said - {"true", "false", "1", "0"} or len(said) > 1:
             raise KnowledgeError(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
@@ -163,22 +163,22 @@ class Parts:
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
     def membership(self, iri: str) -> tuple[Condition, ...]:
-        """Return what the type of a term asks of it, if that is a class defined by situations."""
+        """Return the conditions of a term's class, if situations define it."""
         return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
 
     def arguments(self, iri: str) -> tuple[str, ...]:
-        """Return the terms that a node is about, in order."""
+        """Return the argument terms of a node, in order."""
         return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
 
     def situation(self, iri: str) -> str:
-        """Return the situation type that a condition, an effect or a calculation is about."""
+        """Return the situation type of a condition, an effect or a calculation."""
         situation = self.one(iri, "situationType")
         if situation not in self.nodes or not is_a(self.nodes[situation], "SituationType"):
             raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
         return situation
 
     def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
-        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+        """Return situation type, arguments and value; the value of a boolean symbol may be its last argument."""
         situation = self.situation(iri)
         if is_a(self.nodes[situation], "Amount"):
             raise KnowledgeError(
@@ -192,7 +192,7 @@ class Parts:
         return self.names.short(situation), arguments, value[0] if value else TRUE
 
     def condition(self, iri: str) -> Condition:
-        """Return a condition; one that contains itself, or is too deep, is a fault."""
+        """Return a condition; a recursive or too deeply nested one is a fault."""
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
         if iri in self.inside or len(self.inside) > DEEPEST:
@@ -209,7 +209,7 @@ class Parts:
         return found
 
     def classes_in(self, iri: str) -> list[str]:
-        """Return the classes that stand in the place of an individual of a condition or an effect, and stand for nobody yet."""
+        """Return the classes in the place of individuals in a condition or effect that have no variable yet."""
         said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
@@ -226,7 +226,7 @@ class Parts:
         return found
 
     def _of_all(self, iri: str) -> Condition:
-        """Return a condition; of a class in the place of an individual it asks for each of the class."""
+        """Return a condition; a class in the place of an individual means all its members."""
         kinds = self.classes_in(iri)
         for kind in kinds:
             self.standing[kind] = f"?each{len(self.standing) or ''}"
@@ -287,7 +287,7 @@ class Parts:
         return number
 
     def measured(self, iri: str) -> Expression:
-        """Return the amount of an object, or what a relation gives for it."""
+        """Return the amount of an object, or the number of a relation."""
         if self.values(iri, "relation"):
             relation = self.one(iri, "relation")
             if relation not in self.nodes or not is_a(self.nodes[relation], "Relation", "ReachRelation"):
@@ -318,18 +318,18 @@ class Parts:
         return found
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
-        """Return the conditions that a property leads to."""
+        """Return the conditions under a property of a node."""
         return tuple(condition for value in self.values(iri, name) for condition in self.group(value))
 
     def group(self, iri: str) -> tuple[Condition, ...]:
-        """Return a condition, or those that all have to hold where it says so."""
+        """Return a condition, or the conditions of a conjunction."""
         found = self.condition(iri)
         if is_a(self.nodes[iri], "AllOf") and isinstance(found, AnyOf) and not found.negated:
             return found.alternatives[0]
         return (found,)
 
     def effect(self, iri: str) -> Effect:
-        """Return an effect; with a class in the place of an individual it is made for each of the class for which `when` holds."""
+        """Return an effect; with a class in the place of an individual, on every member for which `when` holds."""
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
         kinds = self.classes_in(iri)
@@ -424,7 +424,7 @@ class Parts:
         return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
-        """Return a rule of a situation type with arguments of some classes; an individual among its terms is compared."""
+        """Return a rule of a situation type with arguments of some classes; an individual among its terms becomes an equality."""
         situation, arguments, value = self.situation_and_value(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
@@ -475,7 +475,7 @@ class Parts:
         return tuple(parameters), variables, conditions
 
     def terms_below(self, iri: str) -> set[str]:
-        """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
+        """Return all terms of a behaviour, except those that a witness binds."""
         found: set[str] = set()
         bound: set[str] = set()
         waiting, seen = [iri], {iri}

@@ -32,7 +32,7 @@ Node = Mapping[str, str]
 
 
 def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph in which some facts hold, each in place of what was stated of its symbol.
+    """Return a copy of a graph with some facts replaced.
 
     What follows by inference is for the caller to conclude anew.
 
@@ -62,7 +62,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 
 
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph in which some facts are wanted, each in place of the goal of its symbol."""
+    """Return a copy of a graph with some goals replaced."""
     copy = _copied(graph)
     asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
     task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")
@@ -82,7 +82,7 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
 
 
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
-    """Return a copy of a graph in which some behaviours are refuted, among what geometry says of the scene."""
+    """Return a copy of a graph with some refutations, stored with the scene's geometry."""
     copy, target = _copied(graph), ox.NamedNode(BASE + "reach")
     triples = (triple for one in refutations for triple in refuted(graph, reading, one))
     copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
@@ -90,7 +90,7 @@ def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[
 
 
 def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterator[ox.Triple]:
-    """Yield what states a refutation: none of one alternative, that these are the arguments and that these facts hold."""
+    """Yield the triples of a refutation: the negated conjunction of these arguments and these facts."""
     behavior = reading.names.iri(one.behavior)
     terms = [row[1] for row in graph.select(PARAMETERS, SCENE, behavior=behavior)]
     if len(terms) != len(one.arguments):
@@ -123,7 +123,7 @@ def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
 
 
 def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
-    """Yield what states a fact: by its value property if that holds all of it, else as a node of its own; false is left unsaid."""
+    """Yield the triples of a fact: by its value property if possible, otherwise as a node; false isn't stated."""
     iri, symbol, value = reading.names.iri, fact.symbol, fact.value
     if value == FALSE:
         return
@@ -175,14 +175,14 @@ def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Tri
 
 
 def _individual(node: ox.NamedNode, kind: str, label: str) -> Iterator[ox.Triple]:
-    """Yield that a node is an individual of one of core's classes, and its label."""
+    """Yield the type of a node, a class of the core, and its label."""
     yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
     yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + kind))
     yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(label, language="en"))
 
 
 def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:
-    """Return the nodes of conditions or facts that speak of a symbol."""
+    """Return the nodes of conditions or facts about a symbol."""
     nodes: dict[ox.NamedNode | ox.BlankNode, dict[str, str]] = {}
     for node, prop, value in graph.select(query, SCENE):
         if isinstance(node, ox.NamedNode | ox.BlankNode):

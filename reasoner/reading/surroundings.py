@@ -1,4 +1,4 @@
-"""A part of a scene that grows by what a check depends on, read without the routes of task recognition.
+"""A part of a scene that grows with the dependencies of a check, read without the routes of task recognition.
 
 A checker says which individuals it looks for: those of a class that satisfy conditions at first. The graph is asked for all of
 them, by one query. What was found is read with the values that it leads to, until nothing that is looked for is missing.
@@ -27,11 +27,11 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""Situation types or relations as IRIs, each with the places where the individual stands that is looked for."""
+"""Situation types or relations as IRIs, each with the positions of the sought individual."""
 
 
 class Surroundings:
-    """Individuals of a scene with all that is said of them: at first those of a slice, of classes in goals, and constants.
+    """Individuals of a scene with all their facts: initially those of a slice, of classes in goals, and constants.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class Surroundings:
         self._known: Frame | None = None
 
     def _classes_of_goals(self) -> set[str]:
-        """Return every class that a goal names, and that of the values where a goal excludes one."""
+        """Return every class in a goal, and the classes of values that a goal excludes."""
         goals = [self.schema.nodes.get(iri, {}) for iri in goal_conditions(self.schema)]
         named = {v for node in goals for values in node.values() for v in values}
         values = {v for node in goals if CORE + "negated" in node for v in node.get(CORE + "situationType", ())}
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read some individuals, those of some classes, and all to which their values lead."""
+        """Read some individuals, members of some classes, and all individuals in their values."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)
@@ -69,7 +69,7 @@ class Surroundings:
 
     @property
     def frame(self) -> Frame:
-        """The behaviours and classes of what was read."""
+        """The behaviours and classes of the individuals read."""
         if self._known is None:
             self._known = frame(self.schema, self.individuals.members(), self.names.iris)
         return self._known
@@ -85,12 +85,12 @@ class Surroundings:
         return self.frame.lifted
 
     def problem(self) -> Problem:
-        """Return the planning problem of what was read."""
+        """Return the planning problem of the individuals read."""
         facts, tuples = self.individuals.facts(self.frame), self.individuals.tuples()
         return reading_of(self.graph.scene, self.frame, facts, tuples, whole=False).problem
 
     def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
-        """Read whom some lookups find, of each witness with its open terms as in each row; whether there was anything new."""
+        """Read the individuals that some lookups find, for each row of known terms; return whether any is new."""
         classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
         for (witness, known), rows in lookups.items():
             for row in rows:
@@ -117,7 +117,7 @@ class Surroundings:
         return bool(fresh)
 
     def _asked(self, variable: str, conditions: Iterable[Condition]) -> Iterator[tuple[str, tuple[str | None, ...]]]:
-        """Yield the conditions whose facts are stated where they hold, each by its IRI and terms, with None for the variable."""
+        """Yield the conditions on stated facts, each by its IRI and terms, with None for the variable."""
         iri, situations, rules = self.frame.names.iri, self.frame.domain.situations, self.frame.domain.rules
         for condition in conditions:
             match condition:
@@ -133,7 +133,7 @@ class Surroundings:
             yield name, tuple(None if t == variable else iri(t) for t in terms)
 
     def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
-        """Return a graph pattern that binds ``?x`` to all of whom facts are stated, with the known terms as in each row."""
+        """Return a graph pattern that binds ``?x`` to all individuals with stated facts, with the known terms of each row."""
         number, parts = 0, []
         at = "|".join(f"<{place}>" for place in PLACES)
         for i, (name, places) in enumerate(shape):

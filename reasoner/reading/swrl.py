@@ -45,7 +45,7 @@ RULES = f"""{{ ?rule a <{SWRL}Imp> .
       ?rule (<{SWRL}body>|<{SWRL}head>|rdf:first|rdf:rest|<{SWRL}arguments>|<{SWRL}classPredicate>|{INSIDE})* ?node .
       ?node ?property ?value . FILTER(isBlank(?node) || ?node = ?rule) }} UNION
     {{ ?node a <{SWRL}Variable> . BIND(rdf:type AS ?property) BIND(<{SWRL}Variable> AS ?value) }}"""
-"""The part of a SPARQL query that yields every SWRL rule with what is nested inside, as (node, property, value)."""
+"""The part of a SPARQL query that yields every SWRL rule with its parts, as (node, property, value)."""
 
 COMPARES = {"lessThan": "<", "lessThanOrEqual": "<=", "equal": "=", "greaterThanOrEqual": ">=", "greaterThan": ">"}
 COMPUTES = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
@@ -70,7 +70,7 @@ def heads(nodes: Mapping[str, Node]) -> set[str]:
 
 
 def _rules(nodes: Mapping[str, Node]) -> list[str]:
-    """Return the rules that nobody has switched off."""
+    """Return the enabled rules."""
     return [
         iri
         for iri, node in nodes.items()
@@ -110,7 +110,7 @@ def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -
 
 @dataclass
 class _Imp:
-    """One SWRL rule: what its variables stand for, and what its body asks."""
+    """One SWRL rule: the meaning of its variables, and the conditions of its body."""
 
     definitions: Definitions
     arguments: Mapping[str, Sequence[str]]
@@ -167,7 +167,7 @@ class _Imp:
         return sorted(found)
 
     def _numbers(self, body: Sequence[Atom]) -> None:
-        """Find what the variables for numbers stand for."""
+        """Determine the expressions of numeric variables."""
         numbers = self.definitions.numbers
         for predicate, said in body:
             if predicate in numbers and len(said) == 2 and self.variable(said[1]):
@@ -203,7 +203,7 @@ class _Imp:
         return found
 
     def _said(self, predicate: str, said: tuple[str, ...]) -> None:
-        """Take down what one atom of the body asks."""
+        """Record the condition of an atom of the body."""
         definitions = self.definitions
         terms = tuple(map(self.term, said)) if not predicate.startswith(BUILT_IN) else ()
         if predicate in ("sameAs", "differentFrom"):
@@ -290,7 +290,7 @@ class _Imp:
     def _nested(
         self, asked: Sequence[Condition], bound: set[str], sought: Sequence[str], variables: list[Parameter]
     ) -> tuple[Condition, ...]:
-        """Return conditions with a witness around those that need a further variable, which a value determines if one can."""
+        """Return conditions with witnesses for further variables, unless a value determines them."""
         here = tuple(condition for condition in asked if mentions(condition) <= bound)
         rest = [condition for condition in asked if condition not in here]
         if not sought:

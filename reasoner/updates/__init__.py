@@ -1,1 +1,1 @@
-"""Behaviours written as SPARQL updates: read into the individuals that say the same, and written back."""
+"""Behaviours as SPARQL updates: compiled into individuals, and written back."""

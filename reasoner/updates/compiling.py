@@ -1,4 +1,4 @@
-"""What behaviours of a graph say as SPARQL updates, as the individuals that say the same (`confab.reasoner.updates.nodes`)."""
+"""The SPARQL updates of a graph's behaviours, compiled into individuals (`confab.reasoner.updates.nodes`)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UPDATES = """SELECT ?behavior ?property ?value WHERE {
   FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
   FILTER(?property != :construct || NOT EXISTS { ?behavior :situationType ?situation })
 } ORDER BY ?behavior ?property ?value"""
-"""Of behaviours that aren't written out already, as they are in a store that took them from files."""
+"""Updates of behaviours without individuals; a store that was filled from files has these already."""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
   ?behavior a/rdfs:subClassOf* :Behavior . { ?behavior :update ?text } UNION { ?behavior :extends ?other }
   ?term :termType ?type . FILTER(STRSTARTS(STR(?term), CONCAT(STR(?behavior), ".")) || EXISTS { ?behavior :parameter ?term })
@@ -31,20 +31,20 @@ PREFERRED = """SELECT ?prefix ?namespace WHERE {
 
 @dataclass(frozen=True)
 class Fault:
-    """What keeps an update from being read."""
+    """A fault for which an update can't be read."""
 
     place: Place
     what: str
     remedy: str
 
     def __str__(self) -> str:
-        """Return it in one line."""
+        """Return the fault in one line."""
         return f"<{self.place.behavior}>: {self.what} ({self.place}); {self.remedy}"
 
 
 @dataclass
 class Compiled:
-    """What the updates of a graph say as individuals: triples, where each individual stands, and what can't be read."""
+    """The individuals of a graph's updates: triples, the place of each individual, and faults."""
 
     triples: list[ox.Triple] = field(default_factory=list)
     places: dict[str, Place] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Compiled:
 
 
 def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mapping[str, str]) -> Compiled:
-    """Return as individuals what the behaviours of a graph say as updates.
+    """Return the individuals of a graph's updates.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _compile(
     vocabulary: Vocabulary,
     done: Compiled,
 ) -> None:
-    """Compile one behaviour, those first that it extends, or note why that can't be."""
+    """Compile one behaviour after those that it extends, or record why that isn't possible."""
     sources = list(_sources(behavior, extends, ()))
     if lacking := [source for source in sources if source not in updates and source not in extends]:
         name = local_name(lacking[0])
@@ -133,7 +133,7 @@ def _compile(
 
 
 def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield a behaviour behind all that it extends; one that extends itself comes twice."""
+    """Yield a behaviour after all that it extends; one that extends itself comes twice."""
     if behavior in above:
         yield behavior
         return

@@ -38,7 +38,7 @@ Triples = Sequence[tuple[ox.NamedNode | ox.BlankNode, ox.NamedNode, ox.NamedNode
 
 @dataclass(frozen=True)
 class Converted:
-    """A file as it should be, which behaviours were written anew, and why others stay as they are."""
+    """The converted file, the converted behaviours, and the reasons why others are unchanged."""
 
     text: str
     behaviors: Sequence[str]
@@ -47,7 +47,7 @@ class Converted:
 
 @dataclass
 class _Statement:
-    """A part of a file up to a full stop; its triples are none for a prefix and for comments."""
+    """A statement of a file; prefixes and comments have no triples."""
 
     text: str
     triples: Triples = ()
@@ -56,7 +56,7 @@ class _Statement:
 
 @dataclass
 class _File:
-    """A Turtle file in statements, with what spells its names."""
+    """A Turtle file as statements, with the spelling of its names."""
 
     statements: list[_Statement]
     prefixes: Mapping[str, str]
@@ -225,7 +225,7 @@ def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> C
 def _exchange(
     file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
 ) -> None:
-    """Put other parts into the statements of a behaviour, and its own statements behind the first of them."""
+    """Replace the parts of a behaviour in its statements; its own statements follow the first of them."""
     node = ox.NamedNode(iri)
     for number, statement in enumerate(file.said[iri]):
         rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]
@@ -278,7 +278,7 @@ def _is_said(iri: str, schema: Schema) -> bool:
 
 
 def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str:
-    """Return why the parts of a behaviour can't go; nothing if they can."""
+    """Return why the parts of a behaviour can't be replaced; None if they can."""
     for part in sorted(parts):
         if part not in file.said:
             return f"{local_name(part)} isn't stated in this file"
@@ -291,7 +291,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Tell whether the other form says a triple of a part, or leaves it out since it is a label of a condition."""
+    """Return whether the other form expresses a triple of a part, or omits it as the label of a condition."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
@@ -299,7 +299,7 @@ def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> boo
 
 
 def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
-    """Return what an update doesn't say as the behaviour does; nothing if it says the same."""
+    """Return the difference between an update and the behaviour; None if they are equivalent."""
     if behavior.price is not None:
         return "a price that is calculated stays with individuals"
     if spans_of(behavior):
@@ -311,7 +311,7 @@ def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, 
 
 
 def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapping[str, str]) -> Behavior | str:
-    """Return the behaviour that an update stands for in a graph that has it as individuals, or why there is none."""
+    """Return the behaviour of an update in a graph that has it as individuals, or why there is none."""
 
     def ask(query: str) -> Sequence[Sequence[object]]:
         if "?text" in query:
@@ -345,7 +345,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
 
 
 def situations_of(schema: Schema) -> Situations:
-    """Return how the situations of a schema are said, by their IRIs."""
+    """Return the notation of a schema's situations, by their IRIs."""
     properties = {
         iri: prop
         for iri in schema.of_kind("SituationType")
@@ -355,7 +355,7 @@ def situations_of(schema: Schema) -> Situations:
 
 
 def plainly(behavior: Behavior) -> object:
-    """Return what a behaviour says, whatever its bound variables are called, and in whatever order it says it."""
+    """Return a canonical form of a behaviour, independent of names of bound variables and of order."""
     effects = ((e.situation, e.arguments, e.value, _plain(e.when), e.each) for e in behavior.effects)
     return (
         behavior.name,
@@ -380,7 +380,7 @@ def spans_of(behavior: Behavior) -> frozenset[object]:
 
 
 def _plain(conditions: Iterable[Condition], depth: int = 0) -> frozenset[object]:
-    """Return what a conjunction says; alternatives of which there is only one are it."""
+    """Return a canonical form of a conjunction; a disjunction with one alternative is that alternative."""
     found: set[object] = set()
     for condition in conditions:
         match condition:

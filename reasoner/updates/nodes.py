@@ -57,10 +57,10 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE, XSD
 
 SIGNS = {sign: sign for sign in ("<", "<=", "=", ">=", ">")} | {"!=": "="}
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
-"""What an amount is changed by if it becomes itself, this sign, and something."""
+"""The change of an amount that becomes itself, an operator, and a term."""
 ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 ANYONE = "?anyone"
-"""What a variable is called that is nothing but the subject of an absence condition."""
+"""The name of a variable that is only the subject of an absence condition."""
 
 
 @dataclass
@@ -89,7 +89,7 @@ class Writer:
     now: Update = field(default_factory=lambda: Update("", "", {}))
 
     def write(self, update: Update) -> None:
-        """Add what an update says; the first of its operations is the behaviour's, further ones are conditional."""
+        """Add an update; its first operation is the behaviour's, further ones are conditional."""
         own, operations = parsed(update.text)
         self.now, self.prefixes = update, {**update.prefixes, **own}
         for name, (node, kind, number) in self.declared.items():
@@ -163,7 +163,7 @@ class Writer:
     # ---------------------------------------------------------------------------------------------------------- terms
 
     def bind(self, name: str, kind: str, role: str, node: str, place: Place, sought: bool = False) -> None:
-        """Make a variable a term of the behaviour; one that another part of it calls the same is another, unless it is alike."""
+        """Make a variable a term of the behaviour; a different variable of the same name becomes another term."""
         found = self.declared.get(name, ("", "", 0))
         if not node and found[0]:
             node = found[0]
@@ -183,13 +183,13 @@ class Writer:
                 self.nodes[iri][CORE + "index"] = [str(len(self.links["parameter"]))]
 
     def determine(self, group: _Group) -> None:
-        """Make variables of what value conditions determine."""
+        """Make variables of the terms that value conditions determine."""
         for name, (kind, at) in group.determined.items():
             iri = self.iri(kind) if isinstance(kind, Word) else kind
             self.bind(name, iri, "Variable", "", self.now.place(at))
 
     def iri(self, word: Word) -> str:
-        """Return what a name stands for."""
+        """Return the IRI of a name."""
         if word.startswith("<"):
             return word[1:-1]
         prefix, _, name = word.partition(":")
@@ -228,7 +228,7 @@ class Writer:
     # --------------------------------------------------------------------------------------------------------- groups
 
     def group(self, where: Sequence[Any], known: Collection[str]) -> _Group:
-        """Return the parts of a group, and which variables begin in it: by their type, or as the value of a situation."""
+        """Return the parts of a group, and the variables introduced in it: by class, or as the value of a situation."""
         found = _Group()
         for part in where:
             if part.name in ("TriplesBlock", "Read"):
@@ -248,7 +248,7 @@ class Writer:
         return found
 
     def begins(self, one: Triple, group: _Group, known: Collection[str]) -> bool:
-        """Note what a triple says of variables that are new; return whether it says nothing else."""
+        """Record a triple about new variables; return whether it has no other meaning."""
         subject, value = one.subject, one.object
         if one.predicate == A:
             if subject.variable and isinstance(value, Word) and not value.variable and subject not in known:
@@ -272,14 +272,14 @@ class Writer:
         return False
 
     def sought(self, group: _Group, known: Collection[str], at: int) -> list[str]:
-        """Return the conditions of a group inside of others; what it chooses, witnesses look for."""
+        """Return the conditions of a nested group, with witnesses for the variables that it introduces."""
         if not group.chosen:
             self.determine(group)
             return self.conditions(group, {*known, *group.names})
         return [self.witness(group, known, at)]
 
     def witness(self, group: _Group, known: Collection[str], at: int) -> str:
-        """Return a witness for each variable that a group chooses, one inside of the other."""
+        """Return nested witnesses for the variables that a group introduces."""
         inside = {*known, *group.names}
         names = list(group.chosen)
         depth = {name: level for level, name in enumerate(names)}
@@ -310,11 +310,11 @@ class Writer:
     # ----------------------------------------------------------------------------------------------------- conditions
 
     def conditions(self, group: _Group, known: Collection[str]) -> list[str]:
-        """Return the nodes of what a group asks."""
+        """Return the nodes of a group's conditions."""
         return [node for part in group.parts for node in self.part(part, known)]
 
     def part(self, part: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions that one part of a group is."""
+        """Return the conditions of one part of a group."""
         if isinstance(part, Triple):
             return [self.pattern(part, known)]
         if part.name == "Filter":
@@ -338,7 +338,7 @@ class Writer:
         return self.sought(self.group(parts(graph), known), known, place(graph))
 
     def filter(self, expression: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions, all of which must hold, of what stands in a FILTER."""
+        """Return the conditions whose conjunction a FILTER means."""
         one = _unwrapped(expression)
         name = getattr(one, "name", "")
         if name == "ConditionalAndExpression":
@@ -371,7 +371,7 @@ class Writer:
         )
 
     def equal(self, left: Any, right: Any, negated: bool, known: Collection[str]) -> str:
-        """Return that two terms are the same, or not."""
+        """Return the condition that two terms are the same, or differ."""
         at = place((left, right))
         one, other = (term(_unwrapped(side), at) for side in (left, right))
         node = self.leaf("EqualityCondition", at, about=self.put(one, known, at), value=self.put(other, known, at))
@@ -380,7 +380,7 @@ class Writer:
         return node
 
     def values(self, part: Any, known: Collection[str]) -> str:
-        """Return what VALUES says: that one of its rows is it."""
+        """Return the condition of VALUES: one of its rows applies."""
         at = place(part)
         several = not isinstance(part.var[0], str) or len(part.var) > 1
         rows = [tuple(row) if several else (row,) for row in part.value or ()]
@@ -397,7 +397,7 @@ class Writer:
         return self.any_of(groups, at)
 
     def any_of(self, groups: Sequence[Sequence[str]], at: int, negated: bool = False) -> str:
-        """Return that one of several groups of conditions holds; of one condition alone, that one."""
+        """Return a disjunction of groups of conditions; of a single condition, that condition."""
         if len(groups) == 1 and len(groups[0]) == 1 and not negated:
             return groups[0][0]
         node = self.new("condition", "AnyOf", at)
@@ -416,7 +416,7 @@ class Writer:
         return node
 
     def negated(self, conditions: Sequence[str], binds: bool, at: int) -> str:
-        """Return that not all of some conditions hold."""
+        """Return the negation of a conjunction."""
         if len(conditions) != 1 or (binds and CORE + "witness" not in self.nodes[conditions[0]]):
             return self.any_of([conditions], at, negated=True)
         said = self.nodes[conditions[0]]
@@ -425,7 +425,7 @@ class Writer:
         return self.absence(conditions[0])
 
     def absence(self, witness: str) -> str:
-        """Return a witness that only asks who has a value as the absence condition that it is."""
+        """Return a witness that only tests a value as the equivalent absence condition."""
         said = self.nodes[witness]
         found = [self.nodes[inner] for inner in said.get(CORE + "condition", ())]
         sought = said.get(CORE + "witness", [""])[0]
@@ -451,11 +451,11 @@ class Writer:
 
     @property
     def pairs(self) -> Collection[str]:
-        """The situation types of which a subject may have several values at once."""
+        """The situation types with several values per subject."""
         return {s for p, s in self.vocabulary.properties.items() if p not in self.vocabulary.functional}
 
     def pattern(self, one: Triple, known: Collection[str]) -> str:
-        """Return the condition that a triple is."""
+        """Return the condition of a triple."""
         if one.predicate == A:
             if not isinstance(one.object, Word) or one.object.variable:
                 raise UpdateError("a class isn't looked for", "name the class", one.predicate.at)
@@ -483,7 +483,7 @@ class Writer:
         return [self.put(one.subject, known, at), *(self.put(each, known, at) for each in said)]
 
     def situation(self, one: Triple, known: Collection[str]) -> dict[str, str]:
-        """Return the properties that say a value of a situation."""
+        """Return the properties that state a situation's value."""
         prop, at = self.iri(one.predicate), one.predicate.at
         if prop in self.vocabulary.properties:
             if isinstance(one.object, tuple):
@@ -511,14 +511,14 @@ class Writer:
     # -------------------------------------------------------------------------------------------------------- numbers
 
     def is_number(self, tree: Any) -> bool:
-        """Tell whether an expression is one of numbers."""
+        """Return whether an expression is numeric."""
         one = _unwrapped(tree)
         if isinstance(one, Word):
             return one in self.numbers
         return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
 
     def expression(self, tree: Any, known: Collection[str], at: int) -> _Side:
-        """Return what a number is worked out from."""
+        """Return the calculation of a number."""
         one = _unwrapped(tree)
         if isinstance(one, Number):
             return one
@@ -541,7 +541,7 @@ class Writer:
         raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
 
     def measured(self, one: Triple, known: Collection[str]) -> _Measured:
-        """Return the amount of which a triple speaks."""
+        """Return the amount in a triple."""
         prop, at = self.iri(one.predicate), one.predicate.at
         terms = [self.put(each, known, at) for each in (one.subject, *_middle(one))]
         kind = "relation" if prop in self.vocabulary.measures else "situationType"
@@ -558,7 +558,7 @@ class Writer:
         return node
 
     def side(self, node: str, name: str, side: _Side, at: int) -> None:
-        """Say one side of a comparison, calculation or effect: an amount on the left and a number on the right need no node."""
+        """Write one side of a comparison, calculation or effect: an amount on the left and a number on the right need no node."""
         if name == "left" and isinstance(side, _Measured):
             self.nodes[node] |= side.said()
             return
@@ -580,7 +580,7 @@ class Writer:
     # -------------------------------------------------------------------------------------------------------- effects
 
     def effects(self, operation: Operation, when: Sequence[str], known: Collection[str], *asked: _Group) -> None:
-        """Add what an operation deletes and inserts."""
+        """Add the deletions and insertions of an operation."""
         inserted = {(one.subject, one.predicate, _middle(one)) for one in operation.insert}
         said = {(t.subject, t.predicate, t.object) for group in asked for t in group.parts if isinstance(t, Triple)}
         for one in operation.delete:
@@ -610,7 +610,7 @@ class Writer:
             self.effect(one, when, known, negated=False)
 
     def changes(self, one: Triple) -> None:
-        """Raise `UpdateError` unless a triple is about something that changes."""
+        """Raise `UpdateError` unless a triple is about a changing situation."""
         prop = "" if one.predicate == A else self.iri(one.predicate)
         if prop and prop not in self.vocabulary.relations:
             return
@@ -620,7 +620,7 @@ class Writer:
         raise UpdateError(what, "use the property of a situation type", one.predicate.at)
 
     def effect(self, one: Triple, when: Sequence[str], known: Collection[str], negated: bool) -> None:
-        """Add the effect that a triple is: inserted, or deleted if negated."""
+        """Add the effect of a triple: inserted, or deleted if negated."""
         if self.vocabulary.numeric(self.iri(one.predicate)):
             node = self.new("effect", "AmountEffect", one.subject.at)
             own, by = self.measured(one, known), self.expression(_last(one), known, one.predicate.at)
@@ -639,7 +639,7 @@ class Writer:
     # ---------------------------------------------------------------------------------------------------------- nodes
 
     def new(self, name: str, kind: str, at: int) -> str:
-        """Return a new node, called by its number."""
+        """Return a new node, named by a number."""
         self.count[name] = self.count.get(name, 0) + 1
         node = f"{self.behavior}.{name}{self.count[name]:03}"
         self.nodes[node] = {TYPE: [INDIVIDUAL, CORE + kind]}
@@ -647,13 +647,13 @@ class Writer:
         return node
 
     def leaf(self, kind: str, at: int, **said: str) -> str:
-        """Return a new condition that says no more than its properties."""
+        """Return a new condition with nothing but its properties."""
         node = self.new("condition", kind, at)
         self.nodes[node] |= {CORE + key: [value] for key, value in said.items()}
         return node
 
     def triples(self) -> Iterator[ox.Triple]:
-        """Yield what the behaviour and its nodes say."""
+        """Yield the triples of the behaviour and its nodes."""
         links = {CORE + link: found for link, found in self.links.items()}
         for node, said in [(self.behavior, links), *self.nodes.items()]:
             for prop, found in said.items():
@@ -677,7 +677,7 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Sum:
-    """Two numbers with a sign between them."""
+    """An arithmetic operation on two numbers."""
 
     sign: str
     left: _Side
@@ -737,7 +737,7 @@ def _middle(one: Triple) -> tuple[Said, ...]:
 
 
 def _unwrapped(expression: Any) -> Any:
-    """Return an expression without the levels of the grammar that say nothing."""
+    """Return an expression without redundant levels of the grammar."""
     passing = ("ConditionalOrExpression", "ConditionalAndExpression", "RelationalExpression", "AdditiveExpression")
     while getattr(expression, "name", "") in (*passing, "MultiplicativeExpression") and not expression.other:
         expression = expression.expr

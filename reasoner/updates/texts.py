@@ -1,4 +1,4 @@
-"""What an update is read with: its text with the prefixes of its file, its places, and the properties that it can speak of."""
+"""The context of an update: its text with the prefixes of its file, positions, and available properties."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
 
 @dataclass(frozen=True)
 class Place:
-    """Where something stands in the update of a behaviour, or in the query of a rule; line and column count from 1."""
+    """A position in the update of a behaviour; line and column count from 1."""
 
     behavior: str
     line: int
@@ -31,7 +31,7 @@ class Place:
     form: str = "update"
 
     def __str__(self) -> str:
-        """Return it as messages have it."""
+        """Return the position for a message."""
         of = (
             f"the update of {local_name(self.behavior)}"
             if self.form == "update"
@@ -49,7 +49,7 @@ class Update:
     prefixes: Mapping[str, str]
 
     def place(self, at: int) -> Place:
-        """Return line and column of a character."""
+        """Return the line and column of a character."""
         before = self.text[:at]
         return Place(self.behavior, before.count("\n") + 1, at - (before.rfind("\n") + 1) + 1)
 
@@ -71,12 +71,12 @@ class Vocabulary:
     measures: Collection[str]
 
     def numeric(self, prop: str) -> bool:
-        """Tell whether a property, or what stands for one, gives numbers."""
+        """Return whether a property, or a situation type or relation, gives numbers."""
         return prop in self.measures or self.properties.get(prop, prop) in self.amounts
 
     @classmethod
     def read(cls, ask: Ask) -> Vocabulary:
-        """Return that of a graph."""
+        """Return the vocabulary of a graph."""
         rows = [[part.value if part is not None else "" for part in row] for row in ask(VOCABULARY)]
         return cls(
             properties={prop: term for kind, term, prop in rows if kind == "situation" and prop},

@@ -26,7 +26,7 @@ FIRST, REST, NIL = (RDF + name for name in ("first", "rest", "nil"))
 
 
 class Word(str):
-    """A variable (``?cup``), a name (``:Cup``, ``<https://…>``) or ``a``, as it is written, and where."""
+    """A variable (``?cup``), a name (``:Cup``, ``<https://…>``) or ``a``, as written, with its position."""
 
     at: int = 0
 
@@ -86,7 +86,7 @@ class Construction:
 
 
 class UpdateError(ValueError):
-    """An update can't be read: what is wrong, what to do, and at which character."""
+    """An update can't be read: the fault, the remedy, and the position."""
 
     def __init__(self, what: str, remedy: str, at: int) -> None:
         super().__init__(f"{what}; {remedy}")
@@ -231,7 +231,7 @@ def _grammar(unit_name: str) -> pyparsing.ParserElement:
 
 
 def _stuck(unit_name: str, text: str) -> int:
-    """Return how far any part of the grammar gets in a text that isn't of its language."""
+    """Return the position up to which any part of the grammar matches an invalid text."""
     from rdflib.plugins.sparql import parser
 
     unit, farthest = deepcopy(getattr(parser, unit_name)).parse_with_tabs(), 0
@@ -248,7 +248,7 @@ def _stuck(unit_name: str, text: str) -> int:
 
 
 def _skipped(text: str, at: int) -> int:
-    """Return where something stands that begins behind the space at some character."""
+    """Return the position of the first character after white space."""
     return len(text) - len(text[at:].lstrip())
 
 
@@ -381,5 +381,5 @@ def words(tree: Any) -> Iterator[Word]:
 
 
 def place(tree: Any) -> int:
-    """Return where a part of the tree begins, as far as its words tell."""
+    """Return the position of a part of the tree, as far as its words determine it."""
     return min((word.at for word in words(tree)), default=0)

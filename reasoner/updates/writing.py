@@ -33,12 +33,12 @@ from confab.reasoner.symbols import (
 
 CHANGES = {"increase": "+", "decrease": "-", "scale": "*"}
 Spell = Callable[[str], str]
-"""Returns how an individual, class or property is written."""
+"""Returns the written form of an individual, class or property."""
 
 
 @dataclass(frozen=True)
 class Situations:
-    """How situations are said: the property of each type that has one, and the types whose property takes many values."""
+    """The notation of situations: the property of each type that has one, and the types whose property takes many values."""
 
     properties: Mapping[str, str]
     pairs: Collection[str]
@@ -75,7 +75,7 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 
 
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
-    """Return what has to hold, besides the preconditions, and the effects of each operation; the first has no condition.
+    """Return the operations: conditions besides the preconditions, and effects; the first has no condition.
 
     Their order is that in which effects are made: only where nothing becomes false can it matter.
     """
@@ -104,7 +104,7 @@ class _Writer:
     given: dict[Expression, str] = field(default_factory=dict)  # the numbers that it names
 
     def main(self, effects: Sequence[ValueEffect | AmountEffect], labels: Sequence[str]) -> str:
-        """Return the first operation: it says parameters and preconditions."""
+        """Return the first operation, with parameters and preconditions."""
         behavior = self.behavior
         for term in (*behavior.parameters, *behavior.variables):
             self.put(term.name)
@@ -139,7 +139,7 @@ class _Writer:
         return "\n".join([*head, "WHERE {", *(f"  {line}" for line in (*lines, *more)), "}"])
 
     def changed(self, effect: AmountEffect) -> tuple[str, str, list[str]]:
-        """Return what a change of an amount deletes and inserts, and the lines that work it out."""
+        """Return the deletions and insertions of an amount's change, and the lines that calculate it."""
         own, lines = Amount(effect.situation, effect.arguments), list[str]()
         given = dict(self.given)
         before = self.number(own, lines, given)
@@ -158,7 +158,7 @@ class _Writer:
         return self.with_number(*said, before), self.with_number(*said, after), [" ".join(lines)] if lines else []
 
     def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
-        """Return what an effect deletes: what it makes false, or the value that the conditions say was there."""
+        """Return the deletion of an effect: the fact that it makes false, or the value that the conditions require."""
         if effect.value == FALSE:
             return self.situation(effect.situation, effect.arguments, TRUE)
         if effect.value == TRUE:
@@ -170,7 +170,7 @@ class _Writer:
         return None
 
     def put(self, term: str) -> str:
-        """Return how a term is written; a variable is called by letters, digits and underscores."""
+        """Return the written form of a term; names of variables have letters, digits and underscores."""
         if term in (TRUE, FALSE):
             return term
         if not term.startswith("?"):
@@ -281,7 +281,7 @@ class _Writer:
         return " UNION ".join(f"{{ {group} }}" for group in groups)
 
     def typed(self, situation: str, value: str, known: dict[str, bool]) -> Iterator[str]:
-        """Yield the type of a variable behind what determines it, where its situation doesn't say it."""
+        """Yield the class of a determined variable, unless its situation implies it."""
         if not value.startswith("?") or known.get(value, True):
             return
         known[value] = True
@@ -290,7 +290,7 @@ class _Writer:
             yield f"{self.put(value)} a {self.spell(kind)} ."
 
     def asked_of_class(self, term: str) -> bool:
-        """Tell whether some condition asks of which class a term is: such a line isn't to be taken for its type."""
+        """Return whether a condition on a term's class exists, whose line could be taken for the term's declaration."""
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
             for condition in self.behavior.conditions
@@ -299,7 +299,7 @@ class _Writer:
 
 
 def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:
-    """Yield labelled conditions, the only alternative in the place of an `AnyOf` that has no other."""
+    """Yield labelled conditions; an `AnyOf` with one alternative becomes that alternative."""
     for condition, label in conditions:
         match condition:
             case AnyOf((group,), False):
@@ -309,7 +309,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of alternatives that only say which individual it is."""
+    """Return the variable and the individuals of a disjunction that only enumerates individuals."""
     found: list[str] = []
     name = ""
     for group in alternatives:
