@@ -13,7 +13,14 @@ RIDDLES = re.compile(
     re.IGNORECASE,
 )
 """Turns of speech in place of the field's nouns and verbs: calculated, not applicable, failed, result, move away."""
-REWRITTEN: tuple[str, ...] = ("sim", "confab", "reasoner/embodiment", "reasoner/graph", "reasoner/memory", "reasoner/pddl")
+REWRITTEN: tuple[str, ...] = (
+    "sim",
+    "confab",
+    "reasoner/embodiment",
+    "reasoner/graph",
+    "reasoner/memory",
+    "reasoner/pddl",
+)
 REWRITTEN += ("reasoner/validation", "planner/acting", "planner/paper")
 OTHER_PAGES = ("constants", "memory", "search", "libraries", "page")
 """Pages that may have some; all others have none, nor have the rewritten rooms."""
