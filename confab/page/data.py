@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol, TypedDict
 from confab import ontology
 from confab.page.ground import Ground, ground_of
 from confab.page.markup import number
-from confab.page.timeline import Bar, Timeline, of_episode, of_plan, of_rollout
+from confab.page.timeline import Bar, Timeline, of_episode, of_plan, of_rollout, of_schedule
 from confab.planner.causal_links import purposes
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.physics import Report
     from confab.planner.acting.episode import Episode
+    from confab.planner.timed.plan import TimedPlan
     from confab.reasoner.embodiment.values import Embodiment
 
 FORMAT = 1
@@ -225,6 +226,7 @@ class Planned(Protocol):
 
     problem: Problem
     outcome: Outcome
+    timed: TimedPlan | None
 
     def dearer(self) -> str:
         """Return what is known of a cheaper plan."""
@@ -277,6 +279,7 @@ def page_data(
     problem = result.problem if result is not None else scene.problem
     labels = page_labels(scene, problem)
     outcome = result.outcome if result is not None else None
+    timed = result.timed if result is not None and report is None and execution is None else None
     planned = execution is not None or report is not None or (outcome is not None and outcome.plan is not None)
     timeline = _timeline(problem, result, report, execution)
     notes = execution.notes() if execution is not None else report.notes() if report is not None else {}
@@ -302,6 +305,13 @@ def page_data(
         ],
         "again": again or _again(scene, report, execution, timeline.unit == "s"),
     }
+    if timed is not None:
+        data["tiles"] = [
+            {"name": "makespan", "text": f"{float(timed.makespan):.3g} s"},
+            {"name": "one after the other", "text": f"{float(timed.serial):.3g} s"},
+            {"name": "lower bound", "text": f"{float(timed.bound):.3g} s for {timed.bounds}"},
+            *(tile for tile in data["tiles"] if tile["name"] != "simulated"),
+        ]
     if alarm := _alarm(timeline, labels, outcome, report, execution):
         data["alarm"] = alarm
     if film := _film(report):
@@ -363,6 +373,8 @@ def _timeline(problem: Problem, result: Planned | None, report: Report | None, e
         return of_episode(problem, execution.episode)
     if report is not None:
         return of_rollout(problem, report.plan, report.shown)
+    if result is not None and result.timed is not None:
+        return of_schedule(problem, result.timed)
     plan = result.outcome.plan if result is not None else None
     return of_plan(problem, plan or Plan(()))
 
@@ -400,18 +412,17 @@ def _rows(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
     rows: list[Row] = []
     for level in sorted({step.level for step in timeline.plan.walk() if step.steps}):
         on = [s for s in timeline.plan.walk() if s.level == level and s.steps and s.path in by_path]
-        bars = [_interval(by_path[step.path], labels) for step in on]
-        rows.append({"group": "levels", "label": f"level {level}", "bars": bars})
+        rows += _lanes("levels", f"level {level}", [by_path[step.path] for step in on], labels)
     for actor, those in timeline.lanes().items():
         label = labels.name(actor) if actor else "primitives"
-        rows.append({"group": "actors", "label": label, "bars": [_interval(bar, labels) for bar in those]})
+        rows += _lanes("actors", label, those, labels)
     end, fixed = _axis_end(timeline), 0
     for symbol, periods in sorted(timeline.phases.items()):
         group = "changes" if len(periods) > 1 else "wanted" if symbol in timeline.problem.goal else "fixed"
         fixed += group == "fixed"
         if group == "fixed" and fixed > MOST_FIXED:
             continue
-        bars = [
+        bars: list[Interval] = [
             {
                 "begin": round(period.begin, 3),
                 "end": round(end if period.end >= timeline.end and i == len(periods) - 1 else period.end, 3),
@@ -428,6 +439,25 @@ def _rows(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
     return rows, max(0, fixed - MOST_FIXED)
 
 
+def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[Row]:
+    """Return as many rows for some bars as it takes for no two in a row to overlap."""
+    rows: list[list[Bar]] = []
+    for bar in sorted(bars, key=lambda bar: (bar.begin, bar.end)):
+        free = next((row for row in rows if row[-1].end <= bar.begin + 1e-6), None)
+        if free is None:
+            rows.append([bar])
+        else:
+            free.append(bar)
+    return [
+        {
+            "group": group,
+            "label": f"{label}, meanwhile" if number else label,
+            "bars": [_interval(bar, labels) for bar in row],
+        }
+        for number, row in enumerate(rows)
+    ]
+
+
 def _interval(bar: Bar, labels: Labels) -> Interval:
     tone = "failed" if bar.ok is False else "planned" if bar.planned else "action"
     interval: Interval = {
@@ -439,6 +469,8 @@ def _interval(bar: Bar, labels: Labels) -> Interval:
     }
     if bar.ok is False and bar.note:
         interval["note"] = bar.note
+    if bar.slack:
+        interval["slack"] = round(bar.slack, 3)
     return interval
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from confab.planner.acting.schedule import worker_of, workers_of
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import successor
-from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Problem, Span, State, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.acting.episode import Episode
+    from confab.planner.timed.plan import TimedPlan
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
@@ -24,7 +25,11 @@ MOST_HANDS = 8
 
 @dataclass(frozen=True)
 class Bar:
-    """A step in time; `ok` is None if it was not checked, `note` is a remark on its result, `planned`: it isn't begun yet."""
+    """A step in time.
+
+    `ok` is None if it was not checked, `note` is a remark on its result, `planned` tells that it isn't begun yet. Of a schedule
+    it has `actors`, and in `slack` the time by which its end may be later without an effect on the makespan.
+    """
 
     step: Step
     begin: float
@@ -34,6 +39,8 @@ class Bar:
     measured: Mapping[str, float] = field(default_factory=dict)
     code: str | None = None
     planned: bool = False
+    actors: tuple[str, ...] = ()
+    slack: float | None = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +108,8 @@ class Timeline:
         workers = workers_of(self.problem)
         found: dict[str, list[Bar]] = {}
         for bar in self.bars:
-            found.setdefault(worker_of(bar.step, workers), []).append(bar)
+            for actor in bar.actors or (worker_of(bar.step, workers),):
+                found.setdefault(actor, []).append(bar)
         if set(found) == {""}:
             by_first: dict[str, list[Bar]] = {}
             for bar in self.bars:
@@ -120,6 +128,37 @@ def of_plan(problem: Problem, plan: Plan) -> Timeline:
     steps = plan.primitives
     bars = tuple(Bar(step, float(i), i + 1.0) for i, step in enumerate(steps))
     return _course(problem, plan, bars, _states(problem, steps), "steps")
+
+
+def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
+    """Return the timeline of a plan in time; effects count from the ends of primitives, or from their beginnings if so stated."""
+    bars = tuple(
+        Bar(slot.step, float(slot.begin), float(slot.end), actors=slot.actors, slack=float(slot.slack))
+        for slot in timed.slots
+    )
+    end = float(timed.makespan)
+    changes: dict[Symbol, list[tuple[float, str]]] = {
+        symbol: [(0.0, value)] for symbol, value in problem.initial.items()
+    }
+    before: State = problem.initial
+    for bar, state in zip(bars, _states(problem, [bar.step for bar in bars]), strict=True):
+        timing = problem.domain.behaviors[bar.step.behavior].timing
+        at_once = {effect.situation for effect in (timing.made(Span.START) if timing is not None else ())}
+        for symbol, value in state.items():
+            if before.get(symbol) != value:
+                first = [(0.0, FALSE)] if symbol not in problem.initial else []
+                at = bar.begin if symbol.situation in at_once else bar.end
+                changes.setdefault(symbol, first).append((at, value))
+        before = state
+    for symbol in problem.goal:
+        changes.setdefault(symbol, [(0.0, FALSE)])
+    phases = {}
+    for symbol, those in changes.items():
+        ordered = sorted(those, key=lambda one: one[0])
+        ends = [*(at for at, _ in ordered[1:]), end]
+        phases[symbol] = tuple(Period(at, until, value) for (at, value), until in zip(ordered, ends, strict=True))
+    final = {symbol: periods[-1].value for symbol, periods in phases.items()}
+    return Timeline(problem, timed.plan, bars, phases, end, "s", final)
 
 
 def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:

@@ -167,6 +167,20 @@ def test_time_is_told_once_and_whole(serving_plan: confab.Result, failed: confab
     assert all(of_plan(problem, plan).met(symbol) for symbol in problem.goal)
 
 
+@pytest.mark.parametrize("name", ["laboratory-small", "couriers-small"])
+def test_a_schedule_has_a_lane_for_each_actor_with_slack(name: str) -> None:
+    result = confab.load(name).plan(minimise="makespan")
+    data, timed = page_data(result.scene, result), result.timed
+    assert timed is not None
+    assert (data["unit"], data["tiles"][0]["text"]) == ("s", f"{float(timed.makespan):.3g} s")
+    actors = [row for row in data["rows"] if row["group"] == "actors"]
+    assert sum(len(row["bars"]) for row in actors) == sum(max(1, len(slot.actors)) for slot in timed.slots)
+    slack = sorted(bar["slack"] for row in actors for bar in row["bars"] if "slack" in bar)
+    assert slack == sorted(float(slot.slack) for slot in timed.slots for _ in slot.actors or ("",) if slot.slack)
+    for row in data["rows"]:
+        assert all(one["end"] <= other["begin"] + 1e-3 for one, other in pairwise(row["bars"])), row["label"]
+
+
 def test_an_episode_is_told_as_it_was_seen(scene: confab.Scene) -> None:
     episode = scene.execute(interventions=FIGURE_8).episode
     timeline = of_episode(scene.problem, episode)
