@@ -533,7 +533,7 @@ FACTS = (
 
 
 def interventions(draw: random.Random, folder: Path) -> Call:
-    """Interfere in words that are broken."""
+    """Give a broken intervention."""
     call = ["execute", str(folder / "scene.ttl"), "--json"]
     for _ in range(draw.choice((1, 2, 4))):
         when = draw.choice(("after=1", "after=0", "at=0", "at=1.5", "after=0.0", "after=99"))

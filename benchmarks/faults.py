@@ -160,7 +160,7 @@ def nominal(name: str) -> Trial:
 
 
 def rows() -> Iterator[tuple[bool, str]]:
-    """Yield whether each fault was found as it must be, and its line."""
+    """Yield whether each fault was found as expected, and its line."""
     for planted in PLANTED:
         rollout = planted.run(nominal(planted.scene))
         yield planted.found(rollout), row(planted, rollout)

@@ -1,4 +1,4 @@
-"""What a wrong name meant: names that other libraries use, and the ones that do the same here."""
+"""Hints for wrong names: names of other libraries, and the ones with the same function here."""
 
 from __future__ import annotations
 

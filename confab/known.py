@@ -1,4 +1,4 @@
-"""What is known of a scene, at the front desk: read, asked in SPARQL, edited and changed."""
+"""Knowledge about a scene: reading, SPARQL queries, edits."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Amounts in generated Python: what they are compared with, what behaviours make of them, and what comes nearer to a wanted one.
+"""Amounts in generated Python: comparisons, changes by behaviours, and tests whether a change approaches a goal.
 
-A table keeps an amount as text; functions of this module are called by what is generated, with the numbers behind the texts.
+A table stores an amount as text; generated code calls functions of this module with the numbers of the texts.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from confab.reasoner.symbols import AmountEffect, Comparison
 
 Rows: TypeAlias = "frozenset[tuple[str, ...]]"
 Constant: TypeAlias = "Callable[[tuple[str, str], object], str]"
-"""Makes a value known to what is generated, and returns its name there."""
+"""Makes a value available to generated code, and returns its name there."""
 
 
 def amount(expression: Expression, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return an amount as a Python expression; what has none is `NOTHING`."""
+    """Return an amount as a Python expression; a missing one is `NOTHING`."""
     match expression:
         case Amount(situation, arguments):
             return _now(situation, key_written(arguments), constant)
@@ -56,7 +56,7 @@ def comparison(condition: Comparison, relations: Mapping[str, Rows], constant: C
 
 
 def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return the call that changes an amount in `amounts`, of a symbol that exists."""
+    """Return the call that changes an existing symbol's amount in `amounts`."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     old = f"{identifier('now', effect.situation)}[{key}]"
     function = constant(("amounts", "changed"), changed)
@@ -64,7 +64,7 @@ def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Consta
 
 
 def comes_nearer(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return the test that an effect brings its amount nearer to what is wanted, which stands in a variable."""
+    """Return the test that an effect brings its amount nearer to a goal, which is in a variable."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     after = (
         f"{constant(('amounts', 'done'), done)}({effect.operation!r}, {_now(effect.situation, key, constant)}, {by})"
@@ -79,7 +79,7 @@ def _now(situation: str, key: str, constant: Constant) -> str:
 
 @lru_cache(maxsize=64)
 def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
-    """Return the numbers that a relation gives."""
+    """Return the numbers of a relation."""
     return {row[:-1]: number(row[-1]) for row in rows}
 
 
@@ -89,7 +89,7 @@ def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
 def changed(
     amounts: dict[tuple[str, object], Number], situation: str, key: object, old: str, operation: str, by: Number
 ) -> None:
-    """Change an amount, as earlier effects of the same behaviour left it."""
+    """Change an amount after earlier effects of the same behaviour."""
     cell = situation, key
     amounts[cell] = done(operation, amounts[cell] if cell in amounts else number(old), by)
 
@@ -99,7 +99,7 @@ def settled(
     quantities: Mapping[str, Quantity],
     changes: list[tuple[str, object, str]],
 ) -> bool:
-    """Add amounts to the changes; whether all are such as they can be."""
+    """Add amounts to the changes; return whether all are valid."""
     for (situation, key), found in amounts.items():
         if not quantities[situation].allows(found):
             return False

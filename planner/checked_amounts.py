@@ -1,4 +1,4 @@
-"""Amounts as the checker works them out, from what is written, without a line in common with any search."""
+"""Amounts as the checker calculates them, without a line in common with any search."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from confab.reasoner.symbols import Comparison
 Arguments: TypeAlias = "tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Arguments]"
 Said: TypeAlias = "Callable[[str, Arguments], str | None]"
-"""Returns the value of a symbol, None if there is no such symbol."""
+"""Returns the value of a symbol; None if it doesn't exist."""
 Values: TypeAlias = "list[str]"
 Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
 """Returns a function from the values of all terms to those of some."""
@@ -22,7 +22,7 @@ Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
 
 
 def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
-    """Return a function to the amount that an expression comes to."""
+    """Return a function that calculates an expression."""
     match expression:
         case Amount(situation, arguments):
             of = key(arguments)
@@ -67,7 +67,7 @@ def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[
 def changed(
     effects: Iterable[tuple[Cell, str, Fraction | None]], said: Said, quantities: Mapping[str, Quantity | None]
 ) -> list[tuple[str, Arguments, str]] | None:
-    """Return the amounts after effects, each changed by what held before; None if one can't be what it would be.
+    """Return the amounts after effects, each calculated in the state before; None if one is invalid.
 
     An effect is a symbol, what is done to it, and by how much; on one that doesn't exist it has no effect.
     """

@@ -27,15 +27,15 @@ from confab.reasoner.symbols import (
 Arguments: TypeAlias = "tuple[str, ...]"
 Bindings: TypeAlias = "dict[str, str]"
 Values: TypeAlias = "list[str]"
-"""What the terms of some conditions stand for, by their places."""
+"""The individuals of terms, by position."""
 Test: TypeAlias = "Callable[[Stated, Values], bool]"
 Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
 Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
-"""Individuals that a check depends on: those that satisfy a witness's conditions at first, with its open terms as in each row."""
+"""A dependency of a check: the individuals that initially satisfy the conditions of a witness, for each row of open terms."""
 
 
 class Stated(Protocol):
-    """A state as conditions ask it."""
+    """The part of a state that conditions read."""
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
         """Return the value of a symbol, or None if there is no such symbol."""
@@ -45,28 +45,28 @@ class Stated(Protocol):
 
 
 class Source(Protocol):
-    """What conditions are read with: the problem, its relations by one of their places, and where lookups are put down."""
+    """The context for reading conditions: the problem, its relations by position, and the list of lookups."""
 
     problem: Problem
     lookups: Lookups | None
 
     def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, by what stands at a position."""
+        """Return the tuples of a relation, by the individual at a position."""
 
 
 class ConditionReader:
-    """Conditions that share their terms, each of which has a place: there stands what it is, at first the term itself."""
+    """Conditions with shared terms; each term has a position that holds its individual, initially the term itself."""
 
     def __init__(self, rules: Source, terms: Iterable[str]) -> None:
         self.rules, self.problem = rules, rules.problem
         self.places = {term: i for i, term in enumerate(terms)}
 
     def place(self, term: str) -> int:
-        """Return the place of a term."""
+        """Return the position of a term."""
         return self.places.setdefault(term, len(self.places))
 
     def key(self, terms: Sequence[str]) -> Callable[[Values], Arguments]:
-        """Return a function to what some terms stand for."""
+        """Return a function that yields the individuals of some terms."""
         places = [self.place(term) for term in terms]
         if len(places) > 1:
             return itemgetter(*places)
@@ -104,7 +104,7 @@ class ConditionReader:
         return [*tests, *(self.test(condition, bound, kinds) for condition in nested), *last]
 
     def given(self, condition: ValueCondition, kind: str) -> Test:
-        """Return the choice of a value where the state leaves none."""
+        """Return the choice of a value that the state doesn't determine."""
         key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
 
         def given(facts: Stated, values: Values) -> bool:
@@ -133,7 +133,7 @@ class ConditionReader:
     def noted(
         self, candidates: Candidates, variable: str, kind: str, conditions: Sequence[Condition], bound: set[str]
     ) -> Candidates:
-        """Return candidates that are put down where they are looked for, as those that satisfy what is known of them at first.
+        """Return candidates and record the lookup, as the individuals that initially satisfy the known conditions.
 
         An individual that the problem doesn't have keeps its values, as no step names it.
         """
@@ -149,7 +149,7 @@ class ConditionReader:
         return noting
 
     def candidates(self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str]) -> Candidates:
-        """Return those that the first unknown variable of a condition could be."""
+        """Return the candidates for the first unknown variable of a condition."""
         variable, kind = unknown[0], kinds[unknown[0]]
         match condition:
             case ValueCondition(situation, arguments, value, False) if (
@@ -176,7 +176,7 @@ class ConditionReader:
         return lambda facts, values: self.problem.classes.get(kind, ())
 
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
-        """Return a condition as a test; what is chosen inside of it is forgotten."""
+        """Return a condition as a test; choices inside it are discarded."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 key, at = self.key(arguments), self.place(value)
@@ -203,7 +203,7 @@ class ConditionReader:
 
 
 def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
-    """Whether tests hold; the first choices with which they do are put into `values`."""
+    """Whether tests hold; the first satisfying choices are stored in `values`."""
     for test in tests:  # noqa: SIM110 - a generator takes twice as long
         if not test(facts, values):
             return False
@@ -211,14 +211,17 @@ def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
 
 
 def _breadth(condition: Condition, bound: set[str]) -> int:
-    """Rank conditions with unknown variables: 0 where the state leaves one individual, 1 where few could do, 2 for others."""
+    """Rank conditions with unknown variables.
+
+    0 if the state determines the individual, 1 if there are few candidates, otherwise 2.
+    """
     if isinstance(condition, ValueCondition) and not condition.negated:
         return not (variables_of(condition) - bound == {condition.value} and condition.value not in condition.arguments)
     return 1 if isinstance(condition, RelationCondition) and not condition.negated else 2
 
 
 def variables_of(condition: Condition) -> set[str]:
-    """Return the variables of a condition that isn't nested."""
+    """Return the variables of a condition without nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms = {*arguments, value}

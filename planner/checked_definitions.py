@@ -1,4 +1,4 @@
-"""What follows from rules and aggregates, as the checker works it out, without a line in common with any search."""
+"""Derived situations of rules and aggregates, as the checker computes them, without a line in common with any search."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
 def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]]:
-    """Return for each situation type that rules define those that depend on it and on which it depends."""
+    """Return for each defined situation type those that are mutually dependent with it."""
     return {name: group for group in strata(rules) for name in group}
 
 
 class Definitions:
-    """What is defined, asked one symbol at a time, and known until `forget`.
+    """Defined situations, evaluated one symbol at a time and cached until `forget`.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class Definitions:
         self._known: dict[Cell, bool] = {}
 
     def forget(self) -> None:
-        """Take notice that something has changed that rules may ask for."""
+        """Discard the cache after a change that rules may depend on."""
         self._known.clear()
 
     def follows(self, cell: Cell) -> bool:
-        """Return whether something that is defined holds: whether its rules give it, or what they ask for in turn.
+        """Return whether a defined situation holds by its rules, which may depend on other defined situations.
 
         What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
         tried again until nothing more becomes true. What is true by then stays so, and all else that was asked for is false.
@@ -68,7 +68,7 @@ class Definitions:
 
 
 class Total:
-    """A sum or count, worked out from its definition whenever it is asked for.
+    """A sum or count, calculated from its definition on each access.
 
     Parameters
     ----------
@@ -89,14 +89,14 @@ class Total:
         self._terms = tuple(reading.places)
 
     def _added(self, facts: Stated, values: Values) -> bool:
-        """Note one solution, and ask for the next."""
+        """Record one solution, and request the next."""
         number = self._number(facts.value, values)
         if number is not None:
             self._found[self._names(values)] = number
         return False
 
     def value(self, facts: Stated, arguments: tuple[str, ...]) -> str | None:
-        """Return the sum for some arguments as text, None if they aren't of its classes."""
+        """Return the sum for some arguments as text; None if they aren't of its classes."""
         if not all(a in members for a, members in zip(arguments, self._members, strict=True)):
             return None
         self._found = {}

@@ -25,7 +25,7 @@ class Rules:
         self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
 
     def define(self, table: Table) -> None:
-        """Have a table work out what is defined; before any function is bound to it."""
+        """Let a table derive defined situations; to be called before any function is bound to it."""
         for group in strata(self.domain.rules):
             stratum = Stratum(table)
             for name in group:
@@ -38,7 +38,7 @@ class Rules:
 
 
 def _lines(writer: Writer) -> Iterator[str]:
-    """Yield the lines that put a function for each situation type that is defined into `rules`."""
+    """Yield the lines that define a function for each defined situation type in `rules`."""
     for name, rules in writer.problem.domain.rules.items():
         arguments = [f"a{i}" for i in range(len(writer.problem.domain.situations[name].arguments))]
         yield f"def {identifier('rule', name)}({', '.join(arguments)}):"
@@ -54,14 +54,14 @@ def _lines(writer: Writer) -> Iterator[str]:
 
 
 class Derived(dict[Key, str]):
-    """In place of the cells of a situation type that is defined: nothing is kept in it, and `get` works a value out."""
+    """Replaces the cells of a defined situation type: it stores nothing, and `get` derives a value."""
 
     def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
         super().__init__()
         self.name, self.alone, self.stratum = name, arity == 1, stratum
 
     def get(self, key: Key, default: str | None = None) -> str:  # type: ignore[override]
-        """Return whether it holds of the arguments behind a key; of a key that has more or fewer, nothing is said."""
+        """Return whether the situation holds for the arguments of a key; a key of another length has no value."""
         if isinstance(key, str) is not self.alone:
             return default  # type: ignore[return-value]
         return TRUE if self.stratum.holds((self.name, key)) else FALSE

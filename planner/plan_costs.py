@@ -1,4 +1,4 @@
-"""What plans cost, as the checker works it out: each primitive its cost, or what its price comes to where it is done."""
+"""Costs of plans, as the checker calculates them: each primitive's cost, or its price in the state before it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from confab.reasoner.symbols import Problem
 
 
 def cost_of(problem: Problem, plan: Plan) -> float:
-    """Return what the primitives of a plan cost."""
+    """Return the cost of a plan's primitives."""
     return sum(costs(problem, plan.primitives))
 
 
 def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
-    """Return what each of some primitives costs that are done one after the other, from the initial state."""
+    """Return the cost of each primitive of a sequence, executed from the initial state."""
     behaviors = [problem.domain.behaviors[step.behavior] for step in primitives]
     if all(behavior.price is None for behavior in behaviors):
         return [behavior.cost for behavior in behaviors]
@@ -55,7 +55,7 @@ def in_circles(problem: Problem, plan: Plan) -> int:
 
 
 def costs_of_steps(problem: Problem, steps: Sequence[Step]) -> list[float]:
-    """Return what each of some steps costs, with all that is below it."""
+    """Return the cost of each step, including all steps below it."""
     parts = [Plan((step,)).primitives for step in steps]
     each = iter(costs(problem, [step for part in parts for step in part]))
     return [sum(next(each) for _ in part) for part in parts]

@@ -1,4 +1,4 @@
-"""A planning call, top to bottom: a mode proves and searches, the checker validates, and what a plan gives up is said.
+"""A planning call, top to bottom: a mode proves and searches, the checker validates, and levels given up are reported.
 
 =========  ==========================================================  ================================
 mode       how it plans                                                 module
@@ -44,7 +44,7 @@ class RejectedPlanError(Exception):
 
 @dataclass(frozen=True)
 class Request:
-    """What one planning call is asked.
+    """The request of one planning call.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Request:
 
 
 def solve(request: Request) -> Outcome:
-    """Plan, and return how that ended; a plan is checked before it is returned.
+    """Plan, and return the outcome; a plan is checked before it is returned.
 
     Parameters
     ----------

@@ -36,20 +36,20 @@ from confab.reasoner.symbols import (
 )
 
 Cell: TypeAlias = "tuple[str, Arguments]"
-"""A symbol as its situation type and arguments."""
+"""A cell of a state: a symbol as its situation type and arguments."""
 Change: TypeAlias = "tuple[str, Arguments, str]"
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with a plan: where in the tree (empty for the whole), and what."""
+    """A fault of a plan: its path in the tree (empty for the whole plan), and a sentence."""
 
     path: tuple[int, ...]
     text: str
 
 
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
-    """Return what is wrong with a plan; nothing if it is one.
+    """Return the faults of a plan; empty if it is valid.
 
     Checked are: every step's ID, and all that `carried_out` checks.
     """
@@ -63,7 +63,7 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
 
 
 def _fits(problem: Problem, step: Step) -> bool:
-    """Whether a step has a number: its behaviour exists, and its arguments are of the classes of the parameters."""
+    """Whether a step has an ID: its behaviour exists, and its arguments are of the classes of the parameters."""
     behavior = problem.domain.behaviors.get(step.behavior)
     if behavior is None or len(behavior.parameters) != len(step.arguments):
         return False
@@ -73,7 +73,7 @@ def _fits(problem: Problem, step: Step) -> bool:
 def carried_out(
     problem: Problem, plan: Plan, lookups: Lookups | None = None, lifted: Mapping[str, Behavior] | None = None
 ) -> list[Fault]:
-    """Return what goes wrong where a plan is carried out on paper.
+    """Return the faults of a plan during its execution on symbols.
 
     Checked are: on each level, every step's preconditions in the state in which it is done; that the
     refinement of a step leaves what that step says, as far as its level knows the symbols, and at rest what else it touched;
@@ -98,7 +98,7 @@ def carried_out(
 
 
 def open_goals(problem: Problem) -> list[Fact]:
-    """Return the goals that don't hold in the initial state, whether they are stated there or follow by rules."""
+    """Return the goals that don't hold in the initial state, stated or derived."""
     return [fact for fact, _ in _unreached(problem, Facts(problem, problem.initial))]
 
 
@@ -121,7 +121,7 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
 
 
 class _Check:
-    """A plan carried out on paper: the facts so far, and what was wrong."""
+    """A plan during its execution on symbols: the present facts, and the faults."""
 
     def __init__(self, problem: Problem, depth: int, rules: Rules) -> None:
         self.problem = problem
@@ -161,7 +161,7 @@ class _Check:
         return True
 
     def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield what isn't at rest and changed between some marks of the log or since, with its value and that at rest."""
+        """Yield the changed symbols that aren't at rest, with their values and rest values, since some marks of the log."""
         first, now = marks[0] if marks else len(self.facts.log), self.facts.value
         changed = {
             (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
@@ -176,7 +176,7 @@ class _Check:
                 yield Symbol(*cell), got, self.rests[cell[0]]
 
     def step(self, step: Step) -> bool:
-        """Carry out one step with its refinement; whether all of it could be done."""
+        """Execute one step with its refinement; return whether all of it was applicable."""
         behavior = self.problem.domain.behaviors.get(step.behavior)
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
@@ -203,7 +203,7 @@ class _Check:
         return True
 
     def within_bounds(self, step: Step) -> bool:
-        """Note which totals a step leaves outside their bounds; whether there are none."""
+        """Record the totals that a step leaves outside their bounds; return whether there are none."""
         for name in self.rules.bounded:
             kind = self.problem.domain.situations[name]
             for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
@@ -235,7 +235,7 @@ def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
 
 
 class Facts:
-    """A state that remembers what was changed: ``log`` has what was overwritten, oldest first."""
+    """A state with a log of overwritten values, oldest first."""
 
     def __init__(self, problem: Problem, state: State, rules: Rules | None = None) -> None:
         self.problem = problem
@@ -265,11 +265,11 @@ class Facts:
         return Definitions(self.rules.strata, lambda about, key: self.rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
-        """Return what is stated now."""
+        """Return the stated facts."""
         return {Symbol(name, key): value for name, values in self._values.items() for key, value in values.items()}
 
     def exists(self, situation: str, arguments: Arguments) -> bool:
-        """Return whether there is such a symbol: it is stated, or boolean and about individuals of the right classes."""
+        """Return whether a symbol exists: it is stated, or boolean and its arguments are of the right classes."""
         if arguments in self._values[situation]:
             return True
         kind = self.problem.domain.situations[situation]
@@ -287,7 +287,7 @@ class Facts:
         return self._holders[situation].get(value, ())
 
     def put(self, situation: str, arguments: Arguments, value: str) -> None:
-        """Give a symbol that exists a value."""
+        """Give an existing symbol a value."""
         old = self._values[situation].get(arguments, FALSE)
         if old == value:
             return
@@ -301,7 +301,7 @@ class Facts:
             self._holders[situation].setdefault(value, {})[arguments] = None
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return what has another value than when the log had the length `mark`, with the value of then."""
+        """Return the cells that have changed since the log had the length `mark`, with their values then."""
         before: dict[Cell, str] = {}
         for situation, arguments, old in self.log[mark:]:
             before.setdefault((situation, arguments), old)
@@ -309,7 +309,7 @@ class Facts:
 
 
 class Rules:
-    """What the behaviours of one problem ask and do, each read when it is first asked for.
+    """The preconditions and effects of one problem's behaviours, each read on demand.
 
     `lookups` and `lifted` are as for `carried_out`.
     """
@@ -329,7 +329,7 @@ class Rules:
         ]
 
     def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
-        """Whether one of the rules of a situation type gives it of some arguments."""
+        """Whether a rule of a situation type derives it for some arguments."""
         if situation not in self._defined:
             self._defined[situation] = [_Behavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]]
         for rule in self._defined[situation]:
@@ -339,7 +339,7 @@ class Rules:
         return False
 
     def read(self, behavior: Behavior) -> _Behavior:
-        """Return how a behaviour is read."""
+        """Return the reading of a behaviour."""
         if behavior.name not in self._read:
             self._read[behavior.name] = _Behavior(self, behavior)
         return self._read[behavior.name]
@@ -382,7 +382,7 @@ class Rules:
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
-        """Return a way to put individuals in for the other variables of conditions with which all hold, or None."""
+        """Return a binding of the other variables with which all conditions hold, or None."""
         reading, bound = ConditionReader(self, terms), set(terms)
         tests = reading.conjunction(conditions, bound, kinds)
         values = [terms.get(term, term) for term in reading.places]
@@ -391,7 +391,7 @@ class Rules:
         return {term: value for term, value in zip(reading.places, values, strict=True) if term in bound}
 
     def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, by what stands at a position."""
+        """Return the tuples of a relation, by the individual at a position."""
         if (relation, position) not in self._rows:
             found: dict[str, list[Arguments]] = {}
             for row in sorted(self.problem.relations.get(relation, ())):
@@ -401,7 +401,7 @@ class Rules:
 
 
 class _Behavior:
-    """A behaviour as it is read: its terms by their places, its preconditions, and its effects with what each asks."""
+    """The reading of a behaviour: positions of terms, preconditions, and effects with their conditions."""
 
     def __init__(self, rules: Rules, behavior: Behavior) -> None:
         reading, bound = (
@@ -445,7 +445,7 @@ class _Behavior:
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
 
     def on_amounts(self, values: Values, facts: Facts) -> Iterator[tuple[Cell, str, Fraction | None]]:
-        """Yield the symbols whose amounts change, what is done to each, and by how much."""
+        """Yield the symbols whose amounts change, with the operation and the number."""
         for when, situation, key, operation, amount in self.amounts:
             inner = values.copy()
             if all_hold(when, facts, inner):

@@ -1,4 +1,4 @@
-"""An execution while it happens, as the page shows it: what was done by the world's clock, and what is still planned."""
+"""A running execution on the page: the executed steps by the world's clock, and the planned rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from confab.reasoner.symbols import Problem, Symbol
 
 
 class Following:
-    """What a spectator was told of an execution so far; `version` grows with each moment. Threads may share it."""
+    """The events of an execution so far; `version` grows with each one. Threads may share it."""
 
     def __init__(self, scene: Known) -> None:
         self.scene, self.version = scene, 0
@@ -59,14 +59,14 @@ class Following:
                 self._marks.append((moment.seconds, text))
 
     def _believe(self, belief: Problem, now: float) -> None:
-        """Note which symbols have another value than before, and what is wanted."""
+        """Record the symbols that have changed, and the goals."""
         for symbol, value in belief.initial.items():
             if self.known.get(symbol) != value:
                 self._periods.setdefault(symbol, []).append((now, value))
         self.known, self._wanted = dict(belief.initial), belief
 
     def data(self) -> PageData:
-        """Return what the page shows now."""
+        """Return the present data of the page."""
         with self._lock:
             moment, now = self._moment, self._moment.seconds if self._moment is not None else 0.0
             bars, marks = list(self._bars), tuple(self._marks)

@@ -41,7 +41,7 @@ class TurnedIntervention(TypedDict):
 
 
 class Turned(TypedDict, total=False):
-    """What was turned: values of facts and goals by the symbol's words; None drops a goal."""
+    """Changed controls: values of facts and goals by the symbol's words; None drops a goal."""
 
     facts: dict[str, str]
     goals: dict[str, str | None]
@@ -142,7 +142,7 @@ class Sheet:
         return value
 
     def plan(self, by: Turned) -> Result:
-        """Return what planning gives in what was turned."""
+        """Return the result of planning with changed controls."""
         problem = self.turned(by)
         return Result(self.scene, problem, solve(Request(problem, DEFAULT_MODE, Limits(seconds=SECONDS))), {})
 
@@ -169,13 +169,13 @@ class Sheet:
 
     @cached_property
     def scene_data(self) -> PageData:
-        """What the page shows of the scene before anything is planned, with what can be turned and asked."""
+        """The page of a scene before planning, with its controls and queries."""
         data = page_data(self.scene)
         data["turnable"], data["queries"] = self.turnable(), ready_queries()
         return data
 
     def answer(self, by: Turned) -> PageData:
-        """Return what the page shows after something was turned; `problem` says why nothing could be planned."""
+        """Return the data of the page after a control was changed; `problem` says why planning wasn't possible."""
         try:
             result = self.plan(by)
             execution = self.act(by, result)
@@ -217,7 +217,7 @@ def ready_queries() -> list[ReadyQuery]:
 
 
 def turned_from(data: object) -> Turned:
-    """Return what was turned, from the JSON that the page sends.
+    """Return the changed controls in the JSON that the page sends.
 
     Raises
     ------

@@ -33,7 +33,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
         raise KnowledgeError(MISSING) from error
 
     class Board(anywidget.AnyWidget):
-        """What the page shows and what was turned or asked on it: `turned` and `asked` are written by the page."""
+        """The state of the page: its data; the page writes `turned` and `asked`."""
 
         _esm = script()
         _css = asset("page.css")
@@ -69,7 +69,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
 
         @property
         def result(self) -> Result:
-            """What planning gives as the board stands."""
+            """The result of planning with the present controls."""
             return self.sheet.plan(turned_from(self.turned))
 
     return Board(Sheet(scene))

@@ -27,7 +27,7 @@ class Change(Enum):
 
 @dataclass(frozen=True)
 class Intervention:
-    """Something that a person does in the course of an episode.
+    """An intervention by a person during an episode.
 
     It happens as soon as the step with the ID `after` (an int: a step of the most abstract level) or the path `after` (a tuple)
     is done, or when the world's clock shows `at` seconds, which may be inside a primitive.
@@ -61,7 +61,7 @@ class Intervention:
 
     @property
     def of_world(self) -> bool:
-        """Whether it changes the world, and not what is wanted of it."""
+        """Whether it changes the world, and not the goal."""
         return self.change not in (Change.GOAL, Change.DROP_GOAL)
 
 
@@ -75,7 +75,7 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """A symbol that wasn't observed as expected; `None` where nothing was perceived, or nothing expected."""
+    """A symbol with an unexpected value; `None` if nothing was perceived, or nothing expected."""
 
     symbol: Symbol
     expected: str | None
@@ -84,7 +84,7 @@ class Surprise:
 
 @dataclass(frozen=True)
 class Seen:
-    """That a symbol came to have another value, as far as was believed; `None` where it was not to be seen any more."""
+    """A believed change of a symbol; `None` if its value could no longer be observed."""
 
     seconds: float
     symbol: Symbol
@@ -93,7 +93,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Failure:
-    """A primitive that failed: in which situation, how, and what it tells about."""
+    """A failed primitive: the situation, the failure, and the objects concerned."""
 
     step: Step
     code: str
@@ -104,7 +104,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Event:
-    """A primitive that was begun: when, how it ended, what was surprising afterwards.
+    """An executed primitive: its times, its verdict, and the surprises after it.
 
     `relied_on` are the static facts, as relation and individuals, that it or the behaviour above it relied on.
     """
@@ -144,7 +144,7 @@ class Replan:
 
 @dataclass(frozen=True)
 class Episode:
-    """What was planned, done and seen, what people did, and how the plan changed.
+    """The plan, the executed steps, the observations, the interventions, and the changes of the plan.
 
     Attributes
     ----------

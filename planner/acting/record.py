@@ -1,4 +1,4 @@
-"""The record of an episode in the making."""
+"""The record of an episode in progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from confab.reasoner.symbols import Problem, State
 
 @dataclass
 class Record:
-    """What has happened so far: steps done by path, events, and why not everything that was wanted is reached."""
+    """The events so far: executed steps by path, events, and reasons for unreached goals."""
 
     initial: State
     planned: Plan = Plan(())  # noqa: RUF009 - frozen

@@ -1,4 +1,4 @@
-"""What each step of a sequence reads and changes at its begin, throughout, and at its end.
+"""The facts that each step of a sequence reads and changes at its beginning, throughout, and at its end.
 
 The sequence is of steps, or of begins and ends of steps where some only exist during others. It is carried out once on paper; each
 condition notes what it looks at while it is evaluated.
@@ -20,7 +20,7 @@ from confab.reasoner.limits import check
 from confab.reasoner.symbols import Behavior, Problem, Times
 
 Key: TypeAlias = "tuple[str, object]"
-"""What is read: the value of a symbol (its situation type and arguments), or which symbols have a value (and that value)."""
+"""A read access: the value of a symbol (situation type and arguments), or the holders of a value."""
 
 
 class Moment(Enum):
@@ -32,7 +32,7 @@ class Moment(Enum):
 
 
 Event: TypeAlias = "tuple[int, Moment]"
-"""The number of a step, and what happens to it."""
+"""The number of a step, and its event."""
 
 
 class InapplicableError(Exception):
@@ -41,7 +41,7 @@ class InapplicableError(Exception):
 
 @dataclass(frozen=True)
 class Access:
-    """What is read, and which cells change from which value to which, at one moment or throughout."""
+    """The reads and the changes (cell, old and new value) at one moment or throughout."""
 
     reads: frozenset[Key] = frozenset()
     writes: Mapping[Cell, tuple[str, str]] | None = None
@@ -72,7 +72,7 @@ class Activity:
 
 
 class Noting(Facts):
-    """Facts that note what is read of them."""
+    """Facts that record read accesses."""
 
     def __init__(self, problem: Problem, rules: Rules) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -153,7 +153,7 @@ class _Course:
         return self.pieces[name]
 
     def begin(self, number: int) -> None:
-        """Begin a step: what it asks at its begin, what it makes then, and what will be in the making."""
+        """Begin a step: test its conditions, make its first effects, and register the later ones."""
         step, pieces = self.steps[number], self.piece(number)
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
@@ -164,13 +164,13 @@ class _Course:
         self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
 
     def end(self, number: int) -> None:
-        """End a step: what was in the making is made, and what it asks and makes at its end."""
+        """End a step: make the registered effects, and test its last conditions."""
         for cell, (_, after) in self.made[number]["middle"].changes.items():
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
 
     def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
-        """Do a piece of a step, or only say what it would change."""
+        """Execute a part of a step, or only return its changes."""
         if not piece.preconditions and not piece.effects and not piece.amounts:
             return Access()
         facts = self.facts

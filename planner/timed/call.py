@@ -1,4 +1,4 @@
-"""From a plan to a plan in time: the order that its steps need, a schedule, who takes which turn, and the checker's word on it."""
+"""From a plan to a timed plan: the necessary order, a schedule, the actors of each turn, and the check."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def in_time(
 
 
 def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
-    """Return why there is no schedule: what would come too late, and by how much, if it didn't matter."""
+    """Return why there is no schedule: the activity that would be late, and by how much."""
     free = replace(network, latest=[None] * len(network.latest))
     found = shortest(order, free, Choices(), perf_counter())
     if found is None:
