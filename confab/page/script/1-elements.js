@@ -26,6 +26,16 @@ const clear = (element, ...inner) => element.replaceChildren(...inner.flat(3).fi
 const lead = (id) => id.slice(0, Math.max(0, id.lastIndexOf(".")));
 const figure = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(1)).replace(/\.0$/, "");
 
+/** The width of a word in a lane of primitives, in pixels. */
+const wide = (() => {
+  const pen = document.createElement("canvas").getContext("2d"), known = new Map();
+  return (word) => {
+    pen.font = "9.6px system-ui, sans-serif";
+    if (!known.has(word)) known.set(word, pen.measureText(word).width);
+    return known.get(word);
+  };
+})();
+
 /** Elements for some values, a few at first; a button opens more of them. */
 const folded = (values, element, few = FEW, step = MANY) => {
   const shown = values.slice(0, few).map(element), left = values.slice(few);

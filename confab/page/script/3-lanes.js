@@ -95,7 +95,7 @@ class Lanes {
     const lines = row.group === "levels" || row.group === "actors" ? 2 : 1;
     const room = width - 3, first = bar.label.split(" ")[0], doing = row.group === "levels" || row.group === "actors";
     // Of what is done at least the whole verb is shown, or nothing; a value ends in dots. The title has all of it.
-    const fits = room > (doing ? 60 : 20) ? bar.label : doing && room > first.length * 5.1 ? first : "";
+    const fits = room > (doing ? 60 : 20) ? bar.label : doing && room > wide(first) * (row.group === "levels" ? 1.25 : 1) ? first : "";
     const words = (bar.tone === "failed" ? "✗ " : "") + fits;
     const title = `${bar.label}${bar.note ? `: ${bar.note}` : ""} (${figure(bar.begin)} to ${figure(bar.end)} ${this.page.data.unit})`;
     const element = made("div", { class: `bar ${bar.tone} lines${lines}`, title, "data-step": bar.step, "data-begin": bar.begin,
@@ -115,7 +115,7 @@ class Lanes {
     const { end, unit } = this.page.data, wanted = end / Math.max(3, (this.width / 90));
     const step = [1, 2, 5].flatMap((base) => [-2, -1, 0, 1, 2, 3, 4, 5, 6].map((power) => base * 10 ** power)).sort((a, b) => a - b).find((one) => one >= wanted && (unit === "s" || one >= 1)) || 1;
     const ticks = [];
-    for (let i = 0; i * step <= end && i < 2000; i += 1) ticks.push(made("span", { style: `left:${this.share(i * step)}` }, `${figure(i * step)}${i && unit !== "s" ? "" : ` ${unit}`}`));
+    for (let i = 0; i < 2000 && (i === 0 || (end - i * step) * (this.width / end) > 28); i += 1) ticks.push(made("span", { style: `left:${this.share(i * step)}` }, `${figure(i * step)}${i && unit !== "s" ? "" : ` ${unit}`}`));
     return made("div", { class: "row axis" }, made("div", { class: "who" }), made("div", { class: "track" }, ticks), made("div", { class: "met" }));
   }
 

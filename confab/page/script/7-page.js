@@ -60,8 +60,8 @@ class Page {
     this.scene.hidden = !data.film && !data.map;
     this.scene.classList.toggle("single", !data.film || !data.map);
     const tones = new Set(data.rows.flatMap((row) => row.bars.map((bar) => bar.tone)));
-    clear(this.legend, TONES.filter(([tone]) => tones.has(tone)).map(([tone, words]) => [made("i", { class: `bar ${tone}` }), `${words} `]),
-      data.marks.length > 0 && [made("i", { class: "mark" }), "interventions and changes of plan"]);
+    clear(this.legend, TONES.filter(([tone]) => tones.has(tone)).map(([tone, words]) => made("span", {}, made("i", { class: `bar ${tone}` }), words)),
+      data.marks.length > 0 && made("span", {}, made("i", { class: "mark" }), "interventions and changes of plan"));
     clear(this.happened, folded(data.marks, (mark) => made("li", {}, made("button", { type: "button", class: "link", onclick: () => this.seek(mark.at) }, `${figure(mark.at)} ${data.unit}`), ` ${mark.text}`), 12));
     this.timed.hidden = !data.rows.length;
     this.range.max = data.end;
