@@ -18,14 +18,16 @@ from random import Random
 from typing import Any
 
 from confab.reasoner.aggregates import read_by
-from confab.reasoner.amounts import Quantity, written
+from confab.reasoner.amounts import Amount, Quantity, bounds, written
 from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Aggregate,
     AmountEffect,
+    AnyOf,
     Behavior,
+    Comparison,
     Condition,
     Domain,
     Parameter,
@@ -36,6 +38,7 @@ from confab.reasoner.symbols import (
     Symbol,
     ValueCondition,
     ValueEffect,
+    Witness,
 )
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
@@ -53,6 +56,8 @@ NEAR = 0.25
 """Share of one-step goals that are kept."""
 AGGREGATED = 0.4
 """Share of worlds with derived sums, counts, maxima or minima."""
+ALTERNATIVES = 0.15
+"""Share of worlds with a goal of alternatives, or of some individual."""
 UPDATES = 0.15
 """Share of worlds in which some behaviours are written as SPARQL updates, which take long to read."""
 
@@ -98,7 +103,41 @@ def drawn(seed: int) -> tuple[World, Interpreter]:
         goal = _Wishes(rng, interpreter, {node[0]: cost for node, cost in costs.items()}).goal(rng.random() < EXCLUDED)
         if goal:
             meant = interpreter.wanting(goal)
-            return replace(world, problem=meant.problem), meant
+            return _with_derived_goal(replace(world, problem=meant.problem), meant)
+
+
+def _with_derived_goal(world: World, meant: Interpreter) -> tuple[World, Interpreter]:
+    """Return a world whose goal is, in some, that one of two facts holds or that some individual has a value."""
+    rng, problem = Random(f"alternatives {world.seed}"), world.problem
+    domain = problem.domain
+    if rng.random() > ALTERNATIVES:
+        return world, meant
+    facts = [_as_conditions(problem, symbol, value) for symbol, value in problem.goal.items()]
+    (symbol, value), others = next(iter(problem.goal.items())), facts[1:]
+    kind = domain.situations[symbol.situation]
+    wanted: Condition = AnyOf(tuple(facts[:2])) if others else AnyOf((facts[0],))
+    if "|" not in kind.arguments[0] and (not others or rng.random() < 0.4):
+        some = Symbol(symbol.situation, ("?w", *symbol.arguments[1:]))
+        wanted = Witness("?w", kind.arguments[0], _as_conditions(problem, some, value))
+    rule = Rule("goal0", (Parameter("?task", "Task"),), (), (wanted,))
+    level = max(domain.situations[s].level for s in named([wanted]))
+    derived = SituationType("goal0", ("Task",), "Truth", level, boolean=True, default=FALSE)
+    more = replace(domain, situations={**domain.situations, "goal0": derived}, rules={**domain.rules, "goal0": (rule,)})
+    left = dict(list(problem.goal.items())[2 if isinstance(wanted, AnyOf) else 1 :])
+    goal = {Symbol("goal0", ("task",)): TRUE, **left}
+    changed = replace(problem, domain=more, goal=goal, classes={**problem.classes, "Task": ("task",)})
+    other = Interpreter(changed)
+    if other.wanted(other.initial):
+        return world, meant
+    return replace(world, problem=changed, owners={**world.owners, "goal0": ()}), other
+
+
+def _as_conditions(problem: Problem, symbol: Symbol, value: str) -> tuple[Condition, ...]:
+    """Return the conditions that a goal is."""
+    if problem.domain.situations[symbol.situation].quantity is None:
+        return (ValueCondition(symbol.situation, symbol.arguments, value),)
+    amount = Amount(symbol.situation, symbol.arguments)
+    return tuple(Comparison(amount, sign, limit) for sign, limit in bounds(value))
 
 
 class _Wishes:

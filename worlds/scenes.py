@@ -68,11 +68,14 @@ class _Scene:
     def lines(self) -> Iterator[str]:
         yield from self.classes()
         for one in self.situations.values():
-            yield from self.situation(one)
+            if one.arguments != ("Task",):
+                yield from self.situation(one)
         for relation, kind in (("near", "owl:ObjectProperty"), ("size", "owl:DatatypeProperty")):
             if relation in self.problem.relations:
                 yield self.node(relation, f"{kind}, owl:NamedIndividual, c:Relation")
         for name, rules in self.problem.domain.rules.items():
+            if self.situations[name].arguments == ("Task",):
+                continue
             yield from self.world.axioms.get(name, ())
             for number, rule in enumerate(() if name in self.world.axioms else rules):
                 yield from self.rule(f"{name}.r{number}", rule)
@@ -355,6 +358,12 @@ class _Scene:
         self.begin("task", ())
         goals = []
         for symbol, value in self.problem.goal.items():
+            if symbol.arguments == ("task",):
+                (rule,) = self.problem.domain.rules[symbol.situation]
+                goals.append(f":{symbol.situation}")
+                node = self.condition(rule.conditions[0])
+                self.nodes[-1] = self.nodes[-1].replace(node, goals[-1], 1)
+                continue
             if self.situations[symbol.situation].quantity is None:
                 goals.append(self.part("ValueCondition", *self.said(symbol.situation, symbol.arguments, value)))
                 continue

@@ -7,28 +7,37 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from confab.reasoner.aggregates import with_extrema
 from confab.reasoner.amounts import (
     DECIMAL,
     Amount,
     bounds_written,
     written,
 )
+from confab.reasoner.derivation import needed
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import is_variable, terms, walk
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.parts import Parts
+from confab.reasoner.reading.rows import is_a
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Comparison,
     Condition,
     Domain,
+    Parameter,
     Problem,
+    Rule,
+    SituationType,
     Symbol,
     ValueCondition,
     Witness,
     substituted,
 )
 
+TASK = "Task"
+"""The class of the individual that derived goals are about."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """What is wanted of an amount, as people write it."""
 
@@ -102,12 +111,16 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     Raises
     ------
     KnowledgeError
-        A goal is none, or two exclude each other.
+        Two goals exclude each other, or one says something of what isn't in the scene.
     """
     goal = dict[Symbol, str]()
     for task in tasks:
         goals = parts.values(task, "goal")
         for iri, wanted in ((goal, one) for goal in goals for one in _wanted(parts, goal, problem.classes)):
+            if not _is_fact(wanted, problem):
+                problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
+                goal[symbol] = TRUE
+                continue
             if isinstance(wanted, Comparison):
                 symbol, value = _bounds(iri, wanted)
                 value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
@@ -115,8 +128,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                 if symbol not in problem.initial:
                     raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
                 continue
-            if not isinstance(wanted, ValueCondition):
-                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
+            assert isinstance(wanted, ValueCondition)
             symbol = Symbol(wanted.situation, wanted.arguments)
             check_arguments(symbol, problem.domain, "a goal")
             value = _wanted_value(iri, symbol, wanted, problem)
@@ -131,6 +143,38 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
                 )
     return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _is_fact(wanted: Condition, problem: Problem) -> bool:
+    """Whether a goal is a fact: a value of a symbol, or bounds of an amount that is part of each state."""
+    match wanted:
+        case ValueCondition():
+            return True
+        case Comparison(Amount(situation), sign, Fraction(), negated):
+            aggregates = problem.domain.aggregates
+            return (situation not in aggregates or aggregates[situation].kept) and not (negated and sign == "=")
+        case _:
+            return False
+
+
+def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition) -> tuple[Problem, Symbol]:
+    """Return the problem with a situation type that a rule derives from a condition, and its symbol.
+
+    It is about the task, so that a goal of alternatives, or of some individual, is a fact like others.
+    """
+    domain = problem.domain
+    names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]
+    free = next(one for one in names if one not in domain.situations and one not in problem.individuals)
+    conditions = with_extrema([wanted], domain.aggregates)
+    individuals = {t for c in conditions for inner in walk(c) for t in terms(inner) if not is_variable(t)}
+    levels = [domain.situations[situation].level for situation, _ in needed(conditions)]
+    levels += [problem.value_levels.get(individual, 1) for individual in individuals]
+    derived = SituationType(free, (TASK,), "Truth", max(levels, default=1), default=FALSE, boolean=True)
+    rule = Rule(free, (Parameter("?task", TASK),), (), conditions)
+    tasks = tuple(dict.fromkeys((*problem.classes.get(TASK, ()), task)))
+    more = replace(domain, situations={**domain.situations, free: derived}, rules={**domain.rules, free: (rule,)})
+    classes = {**problem.classes, TASK: tasks, "Truth": problem.classes.get("Truth", (FALSE, TRUE))}
+    return replace(problem, domain=more, classes=classes), Symbol(free, (task,))
 
 
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
@@ -158,6 +202,8 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
     """Return what a goal wants: of a class in the place of an individual, the same of each of the class."""
+    if is_a(parts.nodes.get(iri, {}), "AllOf") and not parts.flag(iri, "negated"):
+        return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
     if not (isinstance(found, Witness) and parts.classes_in(iri)):
         return [found]

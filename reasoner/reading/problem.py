@@ -47,6 +47,7 @@ from confab.reasoner.reading.rows import (
     Triple,
     classes_of,
     core_triple,
+    derived_goals,
     index_of,
     is_a,
     nodes_of,
@@ -315,10 +316,13 @@ def _names(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] =
     """Return short names of a schema's terms, of some individuals, and of others that may end alike."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
+    derived = {*derived_goals(schema)}
     return Names(
         {
             *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
             *(iri for iri in namesakes if iri not in nodes),
+            *derived,
+            *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
             *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),

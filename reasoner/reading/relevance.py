@@ -28,8 +28,8 @@ from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.goals import BOUNDS, with_goals
 from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
-from confab.reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
-from confab.reasoner.reading.rows import Member, Schema, Triple
+from confab.reasoner.reading.problem import Frame, Reading, frame, read, read_schema, reading_of
+from confab.reasoner.reading.rows import Member, Schema, Triple, derived_goals
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -90,6 +90,9 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ('bottle1', 'bottle2', 'cup1', 'cup2')
     """
     schema = read_schema(graph)
+    if derived_goals(schema):
+        reading = read(graph, schema)  # their alternatives may be about any individual
+        return replace(reading, problem=with_goals(reading.problem, goals))
     constants = constants_of(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)
     search = _Search(graph, schema)

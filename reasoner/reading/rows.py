@@ -241,3 +241,24 @@ def classes_of(
             members.setdefault(kind, []).append(name)
     classes = {name: tuple(members[kind]) for name, kind in sorted((names.short(kind), kind) for kind in members)}
     return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
+
+
+def derived_goals(schema: Schema) -> list[str]:
+    """Return the goals that are no facts, but alternatives, witnesses, or comparisons of more than an amount and a number."""
+    extrema = {
+        situation
+        for iri in schema.of_kind("Rule")
+        if {"max", "min"}.intersection(schema.nodes[iri].get(CORE + "aggregate", ()))
+        for situation in schema.nodes[iri].get(CORE + "situationType", ())
+    }
+
+    def fact(node: Node) -> bool:
+        if is_a(node, "Comparison"):
+            plain = (
+                CORE + "amount" in node and not {CORE + name for name in ("left", "right", "relation")} & node.keys()
+            )
+            return plain and not extrema.intersection(node.get(CORE + "situationType", ()))
+        return is_a(node, "ValueCondition")
+
+    goals = dict.fromkeys(iri for node in schema.nodes.values() for iri in node.get(CORE + "goal", ()))
+    return sorted(iri for iri in goals if iri in schema.nodes and not fact(schema.nodes[iri]))

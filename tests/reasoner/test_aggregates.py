@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab import ontology
 from confab.planner.plan import Status
 from confab.planner.validation import validate
 from confab.reasoner.aggregates import compiled, with_totals
@@ -81,7 +82,7 @@ def test_a_rule_reads_the_same_as_a_query_and_as_individuals(tmp_path: Path) -> 
         SELECT ?rack (COUNT(?crate) AS ?stock) WHERE { ?rack a :Rack . ?crate a :Crate ; :in ?rack } GROUP BY ?rack }\"\"\" ."""
     begin = domain.index(":STOCK.rule a")
     other = domain[:begin] + query + "\n" + domain[domain.index("#####", begin) :]
-    scene = confab.ontology.ROOT / "scenes" / "carts-small.ttl"
+    scene = ontology.ROOT / "scenes" / "carts-small.ttl"
     (tmp_path / "carts.ttl").write_text(other, "utf-8")
     (tmp_path / "scene.ttl").write_text(scene.read_text("utf-8"), "utf-8")
     uri = '<uri name="https://w3id.org/confab/carts" uri="carts.ttl"/>'
@@ -94,7 +95,7 @@ def test_a_rule_reads_the_same_as_a_query_and_as_individuals(tmp_path: Path) -> 
 
 
 def test_a_rule_without_an_aggregate_is_a_query_too(tmp_path: Path) -> None:
-    scene = (confab.ontology.ROOT / "scenes" / "carts-small.ttl").read_text("utf-8")
+    scene = (ontology.ROOT / "scenes" / "carts-small.ttl").read_text("utf-8")
     file = tmp_path / "scene.ttl"
     file.write_text(scene + CONSTRUCTED, "utf-8")
     (rule,) = read(load(file)).problem.domain.rules["OVER"]
