@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 import runpy
 import xml.etree.ElementTree as ElementTree
@@ -22,6 +23,31 @@ from confab.reasoner.symbols import Condition, Fact, Problem
 
 RETRIES = 5
 """Number of failures after which an exported tree fails; until then it is ticked from the beginning."""
+
+RESERVED = {
+    "ID",
+    "name",
+    "kind",
+    "key",
+    "leaf",
+    "Action",
+    "Condition",
+    "Control",
+    "Decorator",
+    "SubTree",
+    "BehaviorTree",
+}
+RESERVED |= {
+    "Sequence",
+    "Fallback",
+    "Parallel",
+    "ReactiveSequence",
+    "ReactiveFallback",
+    "Sleep",
+    "Script",
+    "ScriptCondition",
+}
+"""Names that leaves, ports and subtrees can't have, since nodes of the engines or their attributes have them."""
 
 
 @dataclass(frozen=True)
@@ -109,9 +135,10 @@ class _Lowering:
             case Together(nodes):
                 return Element("Parallel", children=tuple(map(self.lowered, nodes)))
             case Subtree(name, child):
-                self.subtrees[name] = Element("")  # its place is before those of the subtrees in it
-                self.subtrees[name] = self.lowered(child)
-                return Element("SubTree", name)
+                own = _identifier(name)  # engines allow no spaces in it
+                self.subtrees[own] = Element("")  # its place is before those of the subtrees in it
+                self.subtrees[own] = self.lowered(child)
+                return Element("SubTree", own)
 
     def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
         """Return a leaf with a key of its own."""
@@ -128,7 +155,7 @@ class _Lowering:
     def words(self, one: Fact | Condition) -> tuple[str, dict[str, str]]:
         """Return name and ports of a condition: those of a situation type, or its text."""
         if not isinstance(one, Fact):
-            return "Condition", {"condition": said(one)}
+            return "Holds", {"condition": said(one)}
         arguments = {f"argument{number}": each for number, each in enumerate(one.symbol.arguments, 1)}
         return _identifier(one.symbol.situation), {**arguments, "value": one.value}
 
@@ -138,7 +165,10 @@ def _mark(path: tuple[int, ...]) -> str:
 
 
 def _identifier(name: str) -> str:
-    return re.sub(r"\W+", "_", name).strip("_")
+    """Return a name as engines allow it: letters, digits and underscores, no digit first, and none of their own names."""
+    found = re.sub(r"\W+", "_", name).strip("_")
+    found = f"_{found}" if found[:1].isdigit() else found
+    return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
 
 
 # ------------------------------------------------------------------------------------------------------------- BehaviorTree.CPP

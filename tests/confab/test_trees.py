@@ -2,6 +2,7 @@
 
 import ast
 import random
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -144,11 +145,13 @@ def test_the_files_are_whole_and_say_what_their_leaves_are(tmp_path: Path) -> No
     model = root.find("TreeNodesModel")
     assert model is not None
     ports = {node.get("ID"): {port.get("name") for port in node} for node in model}
-    own = {"ReactiveFallback", "ReactiveSequence", "Sequence", "Parallel", "Script", "ScriptCondition", "Sleep"}
+    own = {"BehaviorTree", "SubTree", "RetryUntilSuccessful", "ReactiveFallback", "ReactiveSequence", "Sequence"}
+    own |= {"Parallel", "Script", "ScriptCondition", "Sleep"}
     for tree in root.iter("BehaviorTree"):
-        for node in tree.iter():
-            if node.tag not in own | {"BehaviorTree", "SubTree", "RetryUntilSuccessful"}:
-                assert {*node.attrib} - {"name"} == ports[node.tag]
+        for leaf in [node for node in tree.iter() if node.tag not in own]:
+            assert {*leaf.attrib} - {"name"} == ports[leaf.tag]
+    names = [str(node.get("ID", "x")) for node in root.iter()]
+    assert all(re.fullmatch(r"\w+", name) for name in names), "BehaviorTree.CPP refuses other names"
     assert {"B2_PICK", "B2_PICK_possible", "THING_AT"} <= ports.keys()
     ast.parse(python.read_text(encoding="utf-8"))
     export_trees(problem, plan, tmp_path)  # replaces its own files
