@@ -331,6 +331,7 @@ class Execution:
             text += (
                 f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
             )
+        text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
         return text + (f"; never came: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
