@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import imageio.v2 as imageio
 import numpy as np
+import pybullet
 from PIL import Image, ImageDraw, ImageFont
 from PIL.PngImagePlugin import PngInfo
 
 from confab.reasoner.files import write_whole, written_whole
 from confab.reasoner.kinds import MAKER
 from confab.sim.bodies import outline
-from confab.sim.engine import Engine
-from confab.sim.picture import Camera, hide_vessels, picture, view_of
+from confab.sim.engine import NEAR_PLACE, Engine
+from confab.sim.linkage import feature_frame
+from confab.sim.picture import DOWN, Camera, hide_vessels, picture, view_of
 from confab.sim.urdf import Array
 
 if TYPE_CHECKING:
@@ -37,6 +39,22 @@ NAMED = 480
 SPEED = 2.5
 """Ratio of simulated time to the film's time."""
 
+VIEWS = (
+    (0.0, DOWN),
+    *((around, DOWN) for around in (0.8, -0.8, 1.6, -1.6, 2.2, -2.2)),
+    *((around, 0.08) for around in (1.6, -1.6, 2.2, -2.2)),
+)
+"""Cameras of which the one that sees most participants shows a primitive: radians around the tables, and downwards as a tangent."""
+
+ABOVE = 0.01
+"""Metres above a place or an object's top of the point that has to be visible for its name to be written."""
+
+NEARLY = 0.97
+"""Share of the way to a point of a link from which on a ray has reached the handle, and not another side of the furniture."""
+
+STACKED = 3
+"""Number of rows of names, one above another, where they would overlap."""
+
 DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
 
 
@@ -52,7 +70,8 @@ class Film:
     titles : mapping of path to text
         Captions of steps by their position in the plan's tree. Steps above the primitives without a caption are left out.
     camera : Camera, optional
-        By default one that looks at the table, with pictures of `width` by `height` pixels (divisible by 16).
+        By default one that shows the table, with pictures of `width` by `height` pixels (divisible by 16); another one farther
+        around the table where something hides the objects and handles of a primitive.
     frames : int
         Frames per second of the film.
     speed : float
@@ -78,6 +97,8 @@ class Film:
     ) -> None:
         self.path, self.steps, self.titles = Path(path), steps, titles or {}
         self.camera, self.frames, self.speed = camera, frames, speed
+        self._chosen = camera is not None
+        self._views: list[Camera] = []
         self.width, self.height, self.names = width, height, names or {}
         self.stills = None if stills is None else Path(stills)
         self._part = self.path
@@ -111,14 +132,32 @@ class Film:
                 hide_vessels(world)
             self._keep()
             self._number = world.current
+            if not self._chosen:
+                self._turn_to_action(world)
         if world.steps % max(1, round(world.rate * self.speed / self.frames)) == 0:
             self._latest = self.frame(world)
             self._write(self._latest)
 
     def frame(self, world: Engine) -> Array:
         """Return the present picture with its caption."""
-        self.camera = self.camera or view_of(world.embodiment, self.width, self.height, BAR)
+        if self.camera is None:
+            self._turn_to_action(world)
+        assert self.camera is not None
         return self._caption(self._named(picture(world, self.camera), world), world.current)
+
+    def _turn_to_action(self, world: Engine) -> None:
+        """Choose the camera that sees most participants of the present primitive, the present one if none sees more."""
+        if not self._views:
+            size = self.width, self.height, BAR
+            self._views = [view_of(world.embodiment, *size, around, down) for around, down in VIEWS]
+        current = self.camera or self._views[0]
+        points: list[tuple[Array, str]] = []
+        if 0 <= world.current < len(self.steps):
+            step = self.steps[world.current]
+            points = [point for name in (*step.arguments, *step.bindings.values()) for point in _points(world, name)]
+        seen = {id(view): sum(_visible(world, view, point, name) for point, name in points) for view in self._views}
+        best = max(self._views, key=lambda view: seen[id(view)])
+        self.camera = best if seen[id(best)] > seen.get(id(current), 0) else current
 
     def close(self) -> None:
         """Finish the film and move it to its path."""
@@ -154,23 +193,29 @@ class Film:
         self._writer.append_data(image)
 
     def _named(self, image: Array, world: Engine) -> Array:
-        """Write the names of places below them, and of objects above them."""
+        """Write the names of visible places below them, and of visible objects above them, none over another."""
         if self.width < NAMED or self.camera is None:
             return image
         canvas = Image.fromarray(image)
         draw, font = ImageDraw.Draw(canvas, "RGBA"), ImageFont.load_default(12)
-        for place in world.embodiment.places.values():
-            x, y = self.camera.pixel(world.place(place.name))
-            draw.text(
-                (x, y + 8), self.names.get(place.name, place.name), fill=(60, 40, 20, 200), font=font, anchor="mt"
-            )
-        for name, thing in world.bodies.items():
-            turn, base = world.truth(name)
-            x, y = self.camera.pixel(base + turn[:, 2] * float(outline(thing.shape)[0][-1]))
-            words = self.names.get(name, name)
+        taken: list[tuple[float, float, float, float]] = []
+        for name in (*world.bodies, *world.embodiment.places):
+            points = _points(world, name)
+            if not any(_visible(world, self.camera, point, name) for point, _ in points):
+                continue
+            x, y = self.camera.pixel(points[0][0])
+            words, thing = self.names.get(name, name), name in world.bodies
             half = draw.textlength(words, font=font) / 2 + 4
-            draw.rounded_rectangle((x - half, y - 24, x + half, y - 8), 4, fill=(40, 50, 70, 190))
-            draw.text((x, y - 16), words, fill=(250, 251, 253, 255), font=font, anchor="mm")
+            rows = [y - 24 - 18 * row for row in range(STACKED)] if thing else [y + 8]
+            boxes = ((x - half, row, x + half, row + 16) for row in rows)
+            box = next((box for box in boxes if not _meets(box, taken)), None)
+            if box is None:
+                continue
+            taken.append(box)
+            if thing:
+                draw.rounded_rectangle(box, 4, fill=(40, 50, 70, 190))
+            color = (250, 251, 253, 255) if thing else (60, 40, 20, 200)
+            draw.text((x, (box[1] + box[3]) / 2), words, fill=color, font=font, anchor="mm")
         return np.asarray(canvas)
 
     def _caption(self, image: Array, number: int) -> Array:
@@ -198,6 +243,40 @@ class Film:
             color = DONE if i < number else DOING if i == number else TODO
             draw.rectangle((x, height - 13, x + unit - 2, height - 7), fill=color)
             x += unit
+
+
+def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
+    """Return points of a place, of an object's top, or of a link's features, each with the name; none of anything else."""
+    if name in world.embodiment.places:
+        return [(world.place(name) + np.array([0.0, 0.0, ABOVE]), name)]
+    if name in world.bodies:
+        turn, base = world.truth(name)
+        height = float(outline(world.bodies[name].shape)[0][-1])
+        return [(base + turn[:, 2] * (height + ABOVE), name), (base + turn[:, 2] * height / 2, name)]
+    if name in world.links:
+        mechanic = world.links[name]
+        link = next((one for one in mechanic.mechanism.links if one.name == name), None)
+        features = link.features.values() if link is not None else ()
+        return [(feature_frame(mechanic.frame(name), feature)[1], name) for feature in features]
+    return []
+
+
+def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
+    """Return whether nothing is between a camera and a point but the named thing itself, or what stands at the named place."""
+    hit = pybullet.rayTest(camera.eye, point.tolist(), physicsClientId=world.client)[0]
+    if hit[0] < 0:
+        return True
+    if name in world.links:
+        return bool(hit[0] == world.links[name].body and hit[2] > NEARLY)
+    met = world.name_of(hit[0], hit[1])
+    there = name in world.embodiment.places and met in world.bodies
+    return met == name or (there and float(np.linalg.norm(world.truth(met)[1] - world.place(name))) < NEAR_PLACE)
+
+
+def _meets(box: tuple[float, float, float, float], others: Sequence[tuple[float, float, float, float]]) -> bool:
+    """Return whether a rectangle overlaps another one."""
+    left, top, right, bottom = box
+    return any(left < r and right > x and top < b and bottom > y for x, y, r, b in others)
 
 
 def _write_row(draw: ImageDraw.ImageDraw, texts: Sequence[str], width: int, y: float) -> None:

@@ -34,6 +34,9 @@ SUN = np.array([0.45, 0.35, 0.82])
 FIELD = 40.0
 """Vertical field of view in degrees."""
 
+DOWN = 0.383
+"""Tangent of the angle by which a camera looks down."""
+
 MARGIN = 22
 """Width in pixels of the picture's empty border."""
 
@@ -104,7 +107,14 @@ class Camera:
         return (rows, columns) if rows.start < rows.stop and columns.start < columns.stop else None
 
 
-def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: int = 0) -> Camera:
+def view_of(
+    embodiment: Embodiment,
+    width: int = 960,
+    height: int = 544,
+    below: int = 0,
+    around: float = 0.0,
+    down: float = DOWN,
+) -> Camera:
     """Return the nearest camera on the side opposite the robots that shows robots and tables completely.
 
     Parameters
@@ -114,6 +124,10 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
         Pixels.
     below : int
         Pixels at the bottom that are reserved for a caption.
+    around : float
+        Radians by which the camera stands farther around the tables, counterclockwise from above.
+    down : float
+        Tangent of the angle by which the camera looks down.
     """
     places, _ = with_open_mechanisms(embodiment)
     middle = np.array([place.position for place in places.values()]).mean(0)
@@ -122,19 +136,20 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
     away = middle - base
     away[2] = 0.0
     away /= max(float(np.linalg.norm(away)), 1e-9)
+    away = rotated(0.0, 0.0, around) @ away
     side = np.array([-away[1], away[0], 0.0])
-    forward = -0.96 * away + 0.48 * side - 0.41 * np.array([0.0, 0.0, 1.0])
+    forward = -0.96 * away + 0.48 * side - 1.07 * down * np.array([0.0, 0.0, 1.0])
     look = Camera((0.0, 0.0, 0.0), _three(forward), FIELD, width, height)
     x, y, z = look.axes @ _seen(embodiment).T
     wide = (width / 2 - MARGIN) / look.focal
-    up, down = (height / 2 - MARGIN) / look.focal, (height / 2 - MARGIN - below) / look.focal
+    up, low = (height / 2 - MARGIN) / look.focal, (height / 2 - MARGIN - below) / look.focal
     # A point is in the picture if |x - eye| <= wide (z - eye) and so on: the nearest eye for which all are.
     depth = min(
         float((x + wide * z).min() - (x - wide * z).max()) / (2 * wide),
-        float((y + down * z).min() - (y - up * z).max()) / (up + down),
+        float((y + low * z).min() - (y - up * z).max()) / (up + low),
     )
     eye_x = ((x + wide * z).min() + (x - wide * z).max()) / 2
-    eye_y = ((y + down * z).min() - down * depth + (y - up * z).max() + up * depth) / 2
+    eye_y = ((y + low * z).min() - low * depth + (y - up * z).max() + up * depth) / 2
     eye = np.array([eye_x, eye_y, depth]) @ look.axes
     return Camera(_three(eye), _three(eye + look.axes[2]), FIELD, width, height)
 

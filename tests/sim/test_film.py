@@ -1,0 +1,44 @@
+"""What a film shows: names of visible things only, from a camera that sees the action."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import confab
+from confab.sim.film import BAR, Film, _points, _visible
+from confab.sim.picture import view_of
+from confab.sim.world import World
+
+SCENE = confab.load("spice-drawer")
+BLANK: Any = np.full((544, 960, 3), 255, np.uint8)
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with World(SCENE.embodiment, SCENE.problem.initial, beads=False) as world:
+        yield world
+
+
+def test_a_name_is_written_only_where_the_thing_is_seen(world: World) -> None:
+    film = Film("unwritten.mp4", SCENE.plan().plan.primitives)
+    film.camera = view_of(SCENE.embodiment, film.width, film.height, BAR)
+    named = film._named(BLANK, world)
+    assert (named != BLANK).any()
+    film.names = {"cup": "a cup with a name as long as half the picture"}  # it is in the shut cupboard
+    assert (film._named(BLANK, world) == named).all()
+    world.links["door"].set("door", True)
+    film.names = {"jar": "a jar with a name as long as half the picture"}  # it is seen
+    assert not (film._named(BLANK, world) == named).all()
+
+
+def test_the_camera_goes_where_the_handle_is_seen(world: World) -> None:
+    """From across the table the drawer's handle is behind its chest."""
+    film = Film("unwritten.mp4", [step for step in SCENE.plan().plan.primitives if "drawer" in step.arguments])
+    first, handle = view_of(SCENE.embodiment, film.width, film.height, BAR), _points(world, "drawer")[0][0]
+    world.current = 0
+    film._turn_to_action(world)
+    assert film.camera is not None
+    assert not _visible(world, first, handle, "drawer")
+    assert _visible(world, film.camera, handle, "drawer")
