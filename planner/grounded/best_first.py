@@ -11,7 +11,7 @@ shorter   what is found is made shorter (`confab.planner.grounded.plan_windows`)
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -127,42 +127,42 @@ def search(
             Status.UNSOLVABLE, (), Reason("the goal can't be reached even if nothing ever ceases to hold"), counts
         )
 
-    def gave_up(reason: Reason) -> Flat:
-        return Flat(Status.GAVE_UP, (), reason, counts, sum(spent))
+    total = 0
 
-    orders: list[Order] = [
-        Novelty(task, evaluate, begun.work, landmarks(task, deadline), counts),
-        Greedy(task, evaluate, ahead(task, deadline), counts),
-    ]
-    searches = [explore(task, order) for order in orders]
-    spent = [0, 0]
-    going = [0, 1]
+    def gave_up(reason: Reason) -> Flat:
+        return Flat(Status.GAVE_UP, (), reason, counts, total)
+
+    novelty = Novelty(task, evaluate, begun.work, landmarks(task, deadline), counts)
+    greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
+    going: dict[Order, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
+    spent: dict[Order, int] = dict.fromkeys(going, 0)
+    del novelty, greedy  # so that an order that runs out of memory leaves none of its states behind
     while True:
-        turn = min(going, key=spent.__getitem__)
+        order = min(going, key=spent.__getitem__)
         try:
-            spent[turn] += next(searches[turn])
+            work = next(going[order])
+            spent[order] += work
+            total += work
         except OutOfTimeError:
             return gave_up(Reason("the time limit came first"))
         except MemoryError:
-            going.remove(turn)
-            orders[turn].reached.clear()
+            del going[order], spent[order]
             if not going:
                 return gave_up(OUT_OF_MEMORY)
         except StopIteration:
             break
-        if sum(spent) >= most_work:
+        if total >= most_work:
             return gave_up(Reason("the limit of work came first"))
         if counts.expanded >= limits.expansions:
             return gave_up(Reason(f"the limit of {limits.expansions} expansions came first"))
         if deadline is not None and perf_counter() > deadline:
             return gave_up(Reason("the time limit came first"))
-    order = orders[turn]
     if order.best is None:
         reason = Reason("no plan exists: all states that can be reached were searched")
-        return Flat(Status.UNSOLVABLE, (), reason, counts, sum(spent))
+        return Flat(Status.UNSOLVABLE, (), reason, counts, total)
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:
         found(plan)
     with suppress(MemoryError):  # then it stays as it is
-        plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + sum(spent) // SHORTENING, deadline)
-    return Flat(Status.SOLVED, tuple(plan), None, counts, sum(spent))
+        plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING, deadline)
+    return Flat(Status.SOLVED, tuple(plan), None, counts, total)
