@@ -80,17 +80,17 @@ class World:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(seed: int) -> World:
-    """Return a random world; the same for the same seed."""
-    return drawn(seed)[0]
+def mixed(seed: int, aggregated: float = AGGREGATED) -> World:
+    """Return a random world; the same for the same seed and share of worlds with derived amounts."""
+    return drawn(seed, aggregated)[0]
 
 
-def drawn(seed: int) -> tuple[World, Interpreter]:
-    """Return the random world of a seed, and an interpreter of it."""
+def drawn(seed: int, aggregated: float = AGGREGATED) -> tuple[World, Interpreter]:
+    """Return the random world of a seed, and an interpreter of it; with `aggregated` 0 it has no derived amounts."""
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed).world()
+        world = _Draft(rng, seed, aggregated).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -230,9 +230,9 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 class _Draft(Vocabulary):
     """One draw of a world without its goal."""
 
-    def __init__(self, rng: Random, seed: int) -> None:
+    def __init__(self, rng: Random, seed: int, aggregated: float) -> None:
         super().__init__(rng)
-        self.seed = seed
+        self.seed, self.share = seed, aggregated
         self.levels = rng.choice((1, 1, 1, 2, 2, 3))
         self.owners: dict[str, tuple[str, ...]] = {}
         self.pairs: set[str] = set()
@@ -249,7 +249,7 @@ class _Draft(Vocabulary):
             self.situation(number)
         self.static()
         own = Random(f"aggregates {self.seed}")  # so that worlds without any are those of earlier versions
-        many = own.choice((1, 1, 2)) if own.random() < AGGREGATED else 0
+        many = own.choice((1, 1, 2)) if own.random() < self.share else 0
         first = own.random() < 0.5
         for number in range(many if first else 0):
             self.aggregated(number)
