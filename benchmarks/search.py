@@ -39,16 +39,13 @@ from confab.planner.experience.advice import Memory
 from confab.planner.experience.advice import plan as guided
 from confab.planner.experience.lessons import teach
 from confab.planner.grounded.best_first import plan_level
-from confab.planner.hierarchical import call as serialise
-from confab.planner.hierarchical.chains import Ground, Segments
 from confab.planner.hierarchical.planner import Compiled, compiled, plan
-from confab.planner.hierarchical.refinement import Template
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.validation import validate
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import LimitError
-from confab.reasoner.memory.experience import Experience
+from confab.reasoner.memory.experience import Experience, Method
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Domain, Problem
 from worlds.families import family as packed
@@ -116,7 +113,7 @@ def check(problem: Problem, outcome: Outcome, what: str, easy: bool = True) -> N
 
 
 def scale() -> None:
-    """Plan served tables of growing size, in process; each plan from templates learned in the same call."""
+    """Plan served tables of growing size, in process; each plan from methods learned in the same call."""
     python = peers_with_gtpyhop()
     print(
         "| n | read ms | compile ms | plan ms | improved ms | steps 1/2/3 | improved | expansions 1/2/3 | GTPyhop ms | its steps |"
@@ -342,19 +339,6 @@ def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
 # --------------------------------------------------------------------------------------------------------------- parts
 
 
-class Everything(Segments):
-    """Segments without relevance: whatever is applicable is tried, in the order of the IDs."""
-
-    def relevant(self, level: int, off: Any, depth: int) -> Iterator[Ground]:
-        """Yield every applicable behaviour."""
-        from confab.planner.paper.transitions import ground
-
-        cache = self.__dict__.setdefault("grounds", {})
-        if level not in cache:
-            cache[level] = [(g.behavior, g.arguments) for g in ground(self.program.problem, level)]
-        yield from (g for g in cache[level] if self.forward[g[0]](*g[1]) is not None)
-
-
 @contextmanager
 def budget(seconds: float) -> Iterator[None]:
     """Raise `LimitError`, which planners take for their own limit, after so many CPU seconds."""
@@ -380,10 +364,10 @@ def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
         return Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
 
 
-class Forgetful(dict[str, list[Template]]):
-    """Templates of which none is kept."""
+class Forgetful(dict[str, list[Method]]):
+    """Methods of which none is kept."""
 
-    def setdefault(self, behavior: str, default: list[Template]) -> list[Template]:
+    def setdefault(self, behavior: str, default: list[Method]) -> list[Method]:
         """Return the default, without keeping it."""
         return default
 
@@ -394,23 +378,14 @@ def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome
     only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
     flat = replace(problem, domain=Domain(problem.domain.situations, only, problem.domain.first_ids))
 
-    def without_relevance() -> Outcome:
-        kept = serialise.Segments  # type: ignore[attr-defined]
-        serialise.Segments = Everything  # type: ignore[attr-defined]
-        try:
-            return plan(problem, limits=limits, improve=0)
-        finally:
-            serialise.Segments = kept  # type: ignore[attr-defined]
-
-    def without_templates() -> Outcome:
+    def without_methods() -> Outcome:
         return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, Forgetful()))
 
     return {
         "nothing, memory leading": partial(guided, problem, memory, "leading", limits),
         "nothing, memory guarded": partial(guided, problem, memory, "guarded", limits),
         "memory": partial(plan, problem, limits=limits, improve=0),
-        "memory, cached refinements": without_templates,
-        "memory, relevance": without_relevance,
+        "memory, cached refinements": without_methods,
         "memory, levels": partial(plan, flat, limits=limits, improve=0),
         "memory, levels, goal order (flat h_FF)": partial(plan_level, problem, limits=limits),
     }

@@ -147,15 +147,15 @@ def explain(
     advisor = memory.advisor
     call = Call(problem, compiled(problem), None, 1)
     for step in steps[:number]:
-        done = call.segments.forward[step[0]](*step[1])
+        done = call.space.forward[step[0]](*step[1])
         if done is None:
             raise KnowledgeError(f"{_words(step)}: its preconditions don't hold there")
-        call.segments.apply(done[1])
+        call.space.apply(done[1])
     for asked_of, trouble in (
         (steps[number], "its preconditions don't hold there"),
         (against, "could not be done there"),
     ):
-        if asked_of is not None and call.segments.forward[asked_of[0]](*asked_of[1]) is None:
+        if asked_of is not None and call.space.forward[asked_of[0]](*asked_of[1]) is None:
             raise KnowledgeError(f"{_words(asked_of)}: {trouble}")
     say = Sayings(labels)
     guide = Guide(call, advisor.rules, advisor.orders)

@@ -241,8 +241,9 @@ class Outcome:
     `cost` is what the plan costs, where some behaviour has a price; `bound` what any plan costs at least on the lowest level,
     where that was proved; `engine` the other planner whose plan it is.
     `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
-    break that only the level above asks. `certificate` proves that a task is unsolvable; `confab.planner.solve` lets none of these
-    answers leave without one.
+    break that only the level above asks. `saving` is the number of primitives per second by which the plan still became shorter
+    in the end, None where it wasn't shortened. `certificate` proves that a task is unsolvable; `confab.planner.solve` lets none of
+    these answers leave without one.
     """
 
     status: Status
@@ -258,6 +259,7 @@ class Outcome:
     engine: str | None = None
     given_up: tuple[str, ...] = ()
     left: tuple[Left, ...] = ()
+    saving: float | None = None
     certificate: Certificate | None = None
 
 

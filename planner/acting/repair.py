@@ -21,7 +21,7 @@ from difflib import SequenceMatcher
 from confab.planner.certified import certified
 from confab.planner.hierarchical.agenda import Agenda, order
 from confab.planner.hierarchical.call import Call, Compiled, compiled, settle
-from confab.planner.hierarchical.chains import ONE_STEP
+from confab.planner.hierarchical.effort import ONE_STEP
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.unsolvability import impossible
@@ -257,7 +257,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
         for step in pending:
-            call.segments.check_time()
+            call.space.check_time()
             if not waiting.isdisjoint(step.arguments):
                 put_off.append(step)
                 continue
@@ -286,12 +286,12 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     Of a step that was `begun` before, only its primitives count; any other must be applicable, and do what it promises.
     """
     mark = len(call.table.trail)
-    applicable = call.segments.forward[step.behavior](*step.arguments)
+    applicable = call.space.forward[step.behavior](*step.arguments)
     if applicable is None and not (begun and step.steps):
         return None
     if not step.steps:
         assert applicable is not None
-        call.segments.apply(applicable[1])
+        call.space.apply(applicable[1])
         return RefinedStep(step.level, step.behavior, step.arguments, applicable[0], ())
     below = []
     for child in step.steps:

@@ -24,7 +24,7 @@ from confab.planner.experience.leading import Guide, rules_in, usable
 from confab.planner.experience.matching import Bind
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled
-from confab.planner.hierarchical.refinement import Roles, Template
+from confab.planner.hierarchical.methods import Roles
 from confab.planner.plan import Limits, Outcome, paused_collection
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
@@ -100,8 +100,7 @@ class Memory:
         def score(c: Candidate) -> float:
             return self.judge.told(view(), c.rule, c.roles)
 
-        def ranked(behavior: str, template: Template, ways: list[Roles]) -> list[Roles]:
-            method = Method(behavior, len(ways[0]) - len(template.open), template.steps, template.open)
+        def ranked(method: Method, ways: list[Roles]) -> list[Roles]:
             if method.name not in self.judge.preferred:
                 return ways
             facts = (fillers(method, way, call.problem) for way in ways)
@@ -114,16 +113,15 @@ class Memory:
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
-        templates = {name: list(known) for name, known in using.templates.items()}
+        methods = {name: list(known) for name, known in using.methods.items()}
         for name, one in sorted(self.experience.said.items()):
             if isinstance(one, Method) and name not in self.experience.disabled and self._fits(one, using):
                 tally = self.totals.get(name, {}).get(ITSELF, Tally())
-                template = Template(one.steps, one.open)
-                known = templates.setdefault(one.behavior, [])
-                if tally.failed <= tally.chosen and template not in known:
-                    known.append(template)
-                    known.sort(key=lambda template: len(template.steps))
-        return replace(using, templates=templates)
+                known = methods.setdefault(one.behavior, [])
+                if tally.failed <= tally.chosen and one not in known:
+                    known.append(one)
+                    known.sort(key=lambda method: len(method.steps))
+        return replace(using, methods=methods)
 
     def _fits(self, method: Method, using: Compiled) -> bool:
         """Whether a domain has the behaviours of a method, with as many roles."""

@@ -173,7 +173,7 @@ class Chains:
         found, which = self.picked.get((id(candidates), situation)), id(candidates)
         if found is None:
             self.spent += len(candidates)
-            table, alike, wanted = self.call.table, self.call.program.alike, self.call.segments.wants.wanted
+            table, alike, wanted = self.call.table, self.call.program.alike, self.call.space.wants.wanted
             found = free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
             if len(free) > FEW:
                 if which not in self.cells:
@@ -206,7 +206,7 @@ class Chains:
             key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
             if key in self.call.table.now[asked.situation]:
                 return [((asked.situation, key), env.get(asked.value, asked.value))]
-        wants = self.call.segments.wants.of(achiever, asked, env, level)
+        wants = self.call.space.wants.of(achiever, asked, env, level)
         return [((situation, key), value) for situation, key, values in wants for value in values]
 
     # --------------------------------------------------------------------------------------------------------- distance
@@ -303,7 +303,7 @@ class Chains:
             wants = (self.lacks(level, way, n) for n in way.unmet)
             changes = [lacks[0] for lacks in wants if len(lacks) == 1]
         else:
-            done = self.call.segments.forward[way.ground[0]](*way.ground[1])
+            done = self.call.space.forward[way.ground[0]](*way.ground[1])
             changes = [((situation, key), value) for situation, key, value in done[1]] if done is not None else []
         situations, asked = self.call.program.domain.situations, (self.call.kept, *self.needed)
         return sum(
@@ -349,7 +349,7 @@ class Chains:
         """Return by how much an amount isn't as wanted, or in how many respects what is defined isn't; nothing of others."""
         (situation, key), value = goal
         if situation in self.call.program.rules:
-            return len(self.call.segments.wants.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
+            return len(self.call.space.wants.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
         if self.call.program.domain.situations[situation].quantity is None:
             return 0.0
         now = float(number(self.call.table.now[situation].get(key)))
@@ -383,14 +383,14 @@ class Chains:
                 return steps
             way = same
         ground = way.ground
-        if budget.left <= 0 or call.segments.forward[ground[0]](*ground[1]) is None:
+        if budget.left <= 0 or call.space.forward[ground[0]](*ground[1]) is None:
             return None
         budget.left -= 1
-        call.segments.expand(level)
-        effort = call.segments.effort
+        call.space.expand(level)
+        effort = call.space.effort
         step = call.refiner.do(level, *ground)
         # A refinement that was searched in vain counts.
-        self.spend(DONE if step is not None else call.segments.effort - effort)
+        self.spend(DONE if step is not None else call.space.effort - effort)
         return None if step is None else [*steps, step]
 
     def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
@@ -411,11 +411,11 @@ class Chains:
             self.take(frozenset())
         lacks = (self.lacks(level, way, n) for _, way in ways for n in way.unmet)
         wants = list(dict.fromkeys(its[0] for its in lacks if its))
-        effort = self.call.segments.effort
+        effort = self.call.space.effort
         while wants:
             done = self.first(level, wants)
-            self.spend(self.call.segments.effort - effort)  # refinements that are searched count, too
-            effort = self.call.segments.effort
+            self.spend(self.call.space.effort - effort)  # refinements that are searched count, too
+            effort = self.call.space.effort
             if done is None:
                 return None
             steps += done
@@ -519,7 +519,7 @@ class Chains:
             return True
         mark, fresh = len(table.trail), self.age == table.age
         table.put(*goal[0], goal[1])
-        holds = self.call.segments.wants.holds(achiever, achiever.soft[number], way.named)
+        holds = self.call.space.wants.holds(achiever, achiever.soft[number], way.named)
         table.undo(mark)
         if fresh:
             self.age = table.age  # all is as it was

@@ -20,9 +20,10 @@ from typing import TypeAlias, TypeVar
 from confab.planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
 from confab.planner.experience.matching import Bind, known
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.chains import Keep
+from confab.planner.hierarchical.methods import Ranked, as_they_come
 from confab.planner.hierarchical.operators import Program
-from confab.planner.hierarchical.refinement import RefinedStep, Roles, Template
+from confab.planner.hierarchical.refinement import RefinedStep
+from confab.planner.hierarchical.workspace import Keep
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
@@ -40,7 +41,6 @@ TWICE = 2
 """So many times something is brought about in the end: what was shut is opened once more for what belongs into it."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
-Ranked: TypeAlias = "Callable[[str, Template, list[Roles]], list[Roles]]"
 Found = TypeVar("Found")
 
 
@@ -56,8 +56,8 @@ class Guide:
         The greater, the sooner tried.
     joins : dict, optional
         What was compiled of rules for other calls over the same program; grows.
-    ranked : function of a behaviour, its template and ways to fill the roles of that, optional
-        Returns them so that who proved good comes first.
+    ranked : function of a method and ways to fill its roles, optional
+        Returns these, the best first.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Guide:
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
-        ranked: Ranked = lambda _, __, ways: ways,
+        ranked: Ranked = as_they_come,
     ) -> None:
         self.call, self.ranked = call, ranked
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
@@ -114,11 +114,11 @@ class Guide:
 
     def allowed(self) -> float:
         """Return how much more may come to nothing."""
-        return (self.call.segments.effort + self.chains.spent + FREE) / WASTE - self.vain
+        return (self.call.space.effort + self.chains.spent + FREE) / WASTE - self.vain
 
     def ready(self) -> bool:
         """Whether more may come to nothing."""
-        return self.wasted * WASTE <= self.call.segments.expanded and self.allowed() > 0
+        return self.wasted * WASTE <= self.call.space.expanded and self.allowed() > 0
 
     def bounded(self, level: int, ask: Callable[[], Found | None]) -> Found | None:
         """Return what rules answer, None if they have none or asking them takes more than what may come to nothing."""
@@ -154,8 +154,8 @@ class Guide:
         """Do the same, however much comes to nothing."""
         call = self.call
         start, vain = len(call.table.trail), self.vain
-        expanded = call.segments.expanded
-        began = call.segments.effort + self.chains.spent
+        expanded = call.space.expanded
+        began = call.space.effort + self.chains.spent
         outer, self.off = self.off, {}
         other = self.another(targets) if level == self.first and self.serial else None
         try:
@@ -173,10 +173,10 @@ class Guide:
         if steps is not None and call.refiner.left_wrong(start, targets, keep) is None:
             if level == self.first:
                 return steps  # made shorter in the end
-            return list(call.refiner.lean(tuple(steps), start, targets, keep))
+            return list(call.refiner.pruned(steps, start, targets, keep))
         if level == self.first:
-            self.wasted += call.segments.expanded - expanded
-        self.vain = max(self.vain, vain + call.segments.effort + self.chains.spent - began)
+            self.wasted += call.space.expanded - expanded
+        self.vain = max(self.vain, vain + call.space.effort + self.chains.spent - began)
         call.table.undo(start)
         return None
 
@@ -195,7 +195,7 @@ class Guide:
 
     def led(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps until nothing is off; None where no rule leads on."""
-        table, segments, off = self.call.table, self.call.segments, self.off
+        table, space, off = self.call.table, self.call.space, self.off
         mark = len(table.trail)
         origin: dict[Cell, str] = {}
         for cell, value in targets.items():
@@ -221,7 +221,7 @@ class Guide:
             for situation, key, old in table.trail[mark:]:
                 first = origin.setdefault((situation, key), old)
                 self._look((situation, key), targets.get((situation, key)) or keep((situation, key), first))
-            for cell in segments.defined:
+            for cell in space.defined:
                 self._look(cell, targets.get(cell) or keep(cell, ""))
             mark = len(table.trail)
         return steps
@@ -241,7 +241,7 @@ def by_rules(guide: Guide) -> None:
         reached = False
         for cell, value in sorted(guide.open().items(), key=lambda item: guide.waits(item[0])):
             if not call.met(cell):
-                steps = guide.tried(level, {cell: value}, call.segments.keeping(call.kept))
+                steps = guide.tried(level, {cell: value}, call.space.keeping(call.kept))
                 if steps is not None:
                     call.steps += steps
                     call.kept[cell] = value

@@ -20,8 +20,8 @@ from confab.planner.experience.leading import by_rules, rules_in
 from confab.planner.experience.regression import Course
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled, compiled
-from confab.planner.hierarchical.chains import Keep
-from confab.planner.hierarchical.refinement import Refiner, Roles, Template
+from confab.planner.hierarchical.methods import Methods, Roles
+from confab.planner.hierarchical.workspace import Keep
 from confab.planner.paper.learning import LearningError
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.transitions import Cell, Change, arguments_of
@@ -123,7 +123,7 @@ def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Chang
     LearningError
         Its preconditions don't hold.
     """
-    done = call.segments.forward[ground[0]](*ground[1])
+    done = call.space.forward[ground[0]](*ground[1])
     if done is None:
         raise LearningError(f"{' '.join((ground[0], *ground[1]))}: its preconditions don't hold there")
     return done
@@ -143,7 +143,7 @@ def carry_out(call: Call, step: Step) -> None:
     for inner in step.steps:
         carry_out(call, inner)
     if not step.steps:
-        call.segments.apply(changes(call, (step.behavior, step.arguments))[1])
+        call.space.apply(changes(call, (step.behavior, step.arguments))[1])
 
 
 def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
@@ -215,15 +215,15 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
         mark = len(call.table.trail)
         bindings, made = changes(call, (step.behavior, step.arguments))
         if not step.steps:
-            call.segments.apply(made)
+            call.space.apply(made)
             continue
         targets = call.refiner.targets(made)
-        method, roles = method_of(call.refiner, step, (*step.arguments, *bindings))
+        method, roles = method_of(call.refiner.methods, step, (*step.arguments, *bindings))
         lesson.counted.append((method, ITSELF, CHOSEN))
         lesson.personal += taken(call, method, roles)
         lesson += refined(call, step.steps)
         if len({inner.level for inner in step.steps}) == 1:
-            keep = call.segments.refining(step.level)
+            keep = call.space.refining(step.level)
             rules = list(course(call, mark, targets, keep, grounds(step.steps)).rules_of())
             lesson.said += rules
             lesson.counted += [(rule, ITSELF, CHOSEN) for rule in rules]
@@ -237,18 +237,18 @@ def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fa
     for place, role in enumerate(method.open, method.roles) if own else ():
         for other in call.problem.classes[role.kind] if role.source is None else ():
             instead = (*roles[:place], other, *roles[place + 1 :])
-            if possible(call, Template(method.steps, method.open), instead):
+            if possible(call, method, instead):
                 yield from ((method, f, PASSED) for f in fillers(method, instead, call.problem) if f not in own)
 
 
-def possible(call: Call, template: Template, roles: Roles) -> bool:
-    """Whether the steps of a template could be done now, however they are refined."""
-    mark, left = len(call.table.trail), len(template.steps)
-    for name, arguments in call.refiner.filled(template, roles):
-        done = call.segments.forward[name](*arguments)
+def possible(call: Call, method: Method, roles: Roles) -> bool:
+    """Return whether the steps of a method could be done now, however they are refined."""
+    mark, left = len(call.table.trail), len(method.steps)
+    for name, arguments in call.refiner.methods.filled(method, roles):
+        done = call.space.forward[name](*arguments)
         if done is None:
             break
-        call.segments.apply(done[1])
+        call.space.apply(done[1])
         left -= 1
     call.table.undo(mark)
     return not left
@@ -269,10 +269,9 @@ def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done:
     return Course(replace(call.problem, initial=state, goal=goal), done)
 
 
-def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
-    """Return a step's refinement over roles, and who was in these, None for whom the table told."""
-    template = refiner.template(grounds(step.steps), own)
-    method = Method(step.behavior, len(own), template.steps, template.open)
+def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
+    """Return a step's refinement over roles, and the individuals in these, None where the table told."""
+    method = methods.lifted(step.behavior, grounds(step.steps), own)
     who = dict(zip(range(len(own)), own, strict=True))
     for (_, places), inner in zip(method.steps, step.steps, strict=True):
         who.update(zip(places, inner.arguments, strict=True))
@@ -353,10 +352,10 @@ def in_vain(
             lesson.counted += judged(view, c, FAILED)
             lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
     for number in (*path, 0):
-        done = call.segments.forward[step.behavior](*step.arguments)
+        done = call.space.forward[step.behavior](*step.arguments)
         if done is None or number >= len(step.steps):
             break
-        method, roles = method_of(call.refiner, step, (*step.arguments, *done[0]))
+        method, roles = method_of(call.refiner.methods, step, (*step.arguments, *done[0]))
         who = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
         lesson.personal += who
         lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # others might have done it in the same way

@@ -1,12 +1,12 @@
-"""The agenda: goals one after the other on one table, the easiest first, and what was achieved before is kept.
+"""The agenda: goals one after the other on one table, and what was achieved before is kept.
 
 open     goals to try in one step of the most abstract level
 asleep   goals that something stands in the way of; they wake when a symbol that they wait for changes
 kept     goals that are achieved: later steps may undo them, but must restore them
 before   goals after which others could no longer be achieved (a full cup isn't moved) wait for those
 
-Where no goal is achieved in one step, more effort is spent, each attempt dearer than the one before, on each level from the top;
-one that nothing has changed for isn't made again. Steps are refined and done as soon as they are found.
+Where no goal is achieved in one step, more effort is spent, each rung of the ladder dearer than the one before, on each level from
+the top; what nothing has changed for isn't tried again. Steps are refined and done as soon as they are found.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.call import ADVISED, Attempt, Call
-from confab.planner.hierarchical.chains import CHAIN, ONE_STEP, Effort
+from confab.planner.hierarchical.call import ADVISED, Call, settle
+from confab.planner.hierarchical.effort import FEW_STEPS, MOST_OPERATORS, ONE_STEP, WHOLE, WIDER, Effort, scopes
 from confab.planner.hierarchical.operators import Achiever
-from confab.planner.hierarchical.refinement import MOST_OPERATORS, WHOLE, WIDER
+from confab.planner.hierarchical.relevance import waits_for
 from confab.planner.hierarchical.unsolvability import PAIRS, TEST, impossible, looked_at, proved
 from confab.planner.plan import Reason
 from confab.planner.transitions import Cell, arguments_of
@@ -29,10 +28,8 @@ from confab.reasoner.symbols import Condition
 if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
-ALL, RESTART = (WHOLE,), Effort(depth=0)
-"""All goals at once in the whole world: from where the steps so far end, and from the beginning."""
 FEW = 1_000
-"""States of the lowest level, at least, that are worth looking at for a proof: proofs of small tasks against time to search."""
+"""Minimum number of states of the lowest level that are looked at for a proof: proofs of small tasks against time to search."""
 
 
 @dataclass
@@ -43,9 +40,9 @@ class Agenda:
     ----------
     call : Call
     levels : tuple of int, optional
-        The levels whose steps may be done; all if left out.
-    attempts : int, optional
-        How many of the attempts on each level are made; all if left out.
+        The levels whose steps may be done; all if left out. Goals that the first level doesn't see may have steps of any level.
+    quickly : bool
+        Whether only relevant steps and small scopes are tried.
     solvable : bool
         Whether it is known that there is a plan, so that nothing is to be proved.
     forward : bool
@@ -54,17 +51,17 @@ class Agenda:
 
     call: Call
     levels: tuple[int, ...] | None = None
-    attempts: int | None = None
+    quickly: bool = False
     solvable: bool = False
     forward: bool = False
+    _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
+    _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
     _doubted: bool = False
     _lowest: Task | Reason | None = None
     _looked: int = 0
     _tested: int = 1
-    _finished: int = 0
-    _restarts: int = 0
     _tried: dict[int, int] = field(default_factory=dict)
 
     @property
@@ -75,124 +72,131 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------- one after the other
 
     def achieve_all(self) -> bool:
-        """Achieve the goals one after the other, with more effort where these get stuck; whether all are."""
-        call, segments = self.call, self.call.segments
+        """Achieve the goals one after the other, with more effort where these get stuck; return whether all are."""
+        call = self.call
         if not self.solvable:
-            segments.doubt = self.doubt
-        first = call.program.levels[0]
-        waiting: dict[Cell, list[Cell]] = {}
-        before, asleep = self._before, self._asleep = order(call), dict[Cell, None]()
-        # What level 1 doesn't see may have been undone where all goals were planned at once.
-        call.kept = {cell: value for cell, value in call.kept.items() if call.met(cell)}
-        open_ = deque(cell for cell in call.goal if cell not in call.kept)
-
-        def sleep(cell: Cell, until: Sequence[Cell]) -> None:
-            asleep[cell] = None
-            for other in until:
-                waiting.setdefault(other, []).append(cell)
-
-        def wake(mark: int) -> None:
-            for situation, key, _ in call.table.trail[mark:]:
-                for cell in waiting.pop((situation, key), ()):
-                    if cell in asleep:
-                        del asleep[cell]
-                        open_.append(cell)
-                        call.failed.pop(cell, None)
-                cell = situation, key
-                if cell in call.kept:
-                    asleep.pop(cell, None)
-                    if not call.met(cell):
-                        del call.kept[cell]
-                        open_.append(cell)
-                elif cell in asleep:
-                    del asleep[cell]
-                    open_.append(cell)
-            for cell in segments.defined:
-                if cell in call.kept and not call.met(cell):
-                    del call.kept[cell]
-                    open_.append(cell)
-                elif cell in asleep and call.met(cell):
-                    del asleep[cell]
-                    open_.append(cell)
-
-        while open_ or asleep:
+            call.space.doubt = self.doubt
+        self.begin()
+        while self._open or self._asleep:
             mark = len(call.table.trail)
-            while open_:
-                cell = open_.popleft()
-                segments.check_time()
+            while self._open:
+                cell = self._open.popleft()
+                call.space.check_time()
                 if call.met(cell):
                     call.kept[cell] = call.goal[cell]
-                    continue
-                unmet = [other for other in before.get(cell, ()) if other not in call.kept]
-                promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
-                if unmet:
-                    sleep(cell, unmet)
-                elif (promised == 1 and call.achieve(first, cell, ADVISED)) or (
-                    promised < 2 and call.achieve(first, cell, ONE_STEP)
-                ):
-                    wake(mark)
+                elif self.at_once(cell):
+                    self.wake(mark)
                     mark = len(call.table.trail)
-                else:
-                    sleep(cell, segments.waits_for(first, cell, call.goal[cell]))
-            restarts, redone, steps = self._restarts, call.redone, len(call.steps)
-            if asleep and not self.harder():
+            redone, steps = call.redone, len(call.steps)
+            if self._asleep and not self.harder():
                 return False
-            if self._restarts > restarts:
-                return self.achieve_all()
-            wake(mark if call.redone == redone else 0)
+            self.wake(mark if call.redone == redone else 0)
             # Where no step was done, a pass has to leave fewer goals asleep: so the loop ends.
-            if asleep and not open_ and len(call.steps) == steps:
-                there = [cell for cell in asleep if call.met(cell)]
+            if self._asleep and not self._open and len(call.steps) == steps:
+                there = [cell for cell in self._asleep if call.met(cell)]
                 if not there:
                     return False
                 for cell in there:
-                    del asleep[cell]
+                    del self._asleep[cell]
                     call.kept[cell] = call.goal[cell]
         self.solvable = True
         return True
 
+    def begin(self) -> None:
+        """Open all goals that don't hold."""
+        call = self.call
+        self._before, self._asleep, self._waiting = order(call), {}, {}
+        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        call.refiner.hasty = self.settles()
+        self._open = deque(cell for cell in call.goal if cell not in call.kept)
+
+    def at_once(self, cell: Cell) -> bool:
+        """Achieve a goal by advice or one step of the most abstract level; else put it to sleep, and return False."""
+        call, first = self.call, self.call.program.levels[0]
+        unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
+        promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
+        if not unmet and promised == 1 and call.achieve(first, cell, ADVISED):
+            return True
+        if not unmet and promised < 2 and call.achieve(first, cell, ONE_STEP):
+            return True
+        self._asleep[cell] = None
+        for other in unmet or waits_for(call.space, call.program.levels[0], cell, call.goal[cell]):
+            self._waiting.setdefault(other, []).append(cell)
+        return False
+
+    def wake(self, mark: int) -> None:
+        """Open the goals that what was done since a mark concerns: those that waited for it, and those that it undid."""
+        call, asleep = self.call, self._asleep
+
+        def opened(cell: Cell) -> None:
+            asleep.pop(cell, None)
+            self._open.append(cell)
+
+        for situation, key, _ in call.table.trail[mark:]:
+            cell = situation, key
+            for waiting in self._waiting.pop(cell, ()):
+                if waiting in asleep:
+                    opened(waiting)
+                    call.failed.pop(waiting, None)
+            if cell in call.kept:
+                asleep.pop(cell, None)
+                if not call.met(cell):
+                    del call.kept[cell]
+                    opened(cell)
+            elif cell in asleep:
+                opened(cell)
+        for cell in call.space.defined:
+            if cell in call.kept and not call.met(cell):
+                del call.kept[cell]
+                opened(cell)
+            elif cell in asleep and call.met(cell):
+                opened(cell)
+
     # ------------------------------------------------------------------------------------------------------- more effort
 
-    @cached_property
-    def ladder(self) -> list[tuple[int, Attempt]]:
-        """The attempts, each with its level."""
-        found: list[tuple[int, Attempt]] = []
-        if self.call.advice is not None:
-            found.append((self.call.program.levels[0], ADVISED))
-        for level in self.call.program.levels if self.levels is None else self.levels:
-            *small, large = self.call.refiner.scopes(level)
-            found += [(level, attempt) for attempt in (CHAIN, (*small,), RESTART, (large,), ALL)[: self.attempts]]
-        return found
-
     def harder(self) -> bool:
-        """Achieve one of the sleeping goals by more effort, or on a lower level; whether that succeeded."""
+        """Achieve one of the sleeping goals by more effort, or on a lower level; return whether that succeeded."""
         call = self.call
         if not self.solvable:
             self._doubt()
-        if call.unseen.keys() >= self._asleep.keys() and self.finish():
-            self._restarts += 1
+        if call.advice is not None and self.singly(call.program.levels[0], ADVISED):
             return True
-        for level, attempt in self.ladder:
-            if attempt is RESTART or attempt is ALL:
-                if self.restart(level) if attempt is RESTART else self.together(level):
-                    return True
-                if attempt is ALL and not self.solvable:
-                    self._prove()
+        for level in call.program.levels:
+            *small, large = scopes(call.program.size(level))
+            if self.singly(level, FEW_STEPS) or self.singly(level, *small) or self.settle():
+                return True
+            if self.quickly:
                 continue
-            for cell in self._ready():
-                if self.advised(cell):
-                    return True
-                if attempt is ADVISED or (level, attempt) in call.failed.get(cell, ()):
-                    continue
-                if call.achieve(level, cell, attempt):
-                    return True
-                call.failed.setdefault(cell, set()).add((level, attempt))
-                if not isinstance(attempt, Effort) and not self.solvable:
-                    self._prove()
+            if self.restart(level) or self.singly(level, large) or self.together(level):
+                return True
+            if not self.solvable and self.allowed(level):
+                self._prove()
         if call.progressed:  # something was done since some of these attempts failed
             call.failed.clear()
             call.progressed = False
             return self.harder()
+        return False
+
+    def allowed(self, level: int, cell: Cell | None = None) -> bool:
+        """Return whether steps of a level may be done for a goal."""
+        return self.levels is None or level in self.levels or cell in self.call.unseen
+
+    def singly(self, level: int, *efforts: Effort) -> bool:
+        """Achieve one of the sleeping goals with some efforts on a level; return whether that succeeded."""
+        call = self.call
+        last = call.unseen.issuperset(self._asleep)
+        for cell in self._ready():
+            if self.advised(cell):
+                return True
+            if not self.allowed(level, cell) or (cell in call.unseen and not last):
+                continue
+            if efforts == (ADVISED,) or (level, *efforts) in call.failed.get(cell, ()):
+                continue
+            if call.achieve(level, cell, *efforts):
+                return True
+            call.failed.setdefault(cell, set()).add((level, *efforts))
+            if not efforts[0].steps and not self.solvable:
+                self._prove()
         return False
 
     def _ready(self) -> Iterator[Cell]:
@@ -202,30 +206,33 @@ class Agenda:
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
 
     def advised(self, cell: Cell) -> bool:
-        """Achieve a goal as advised, if there is advice now that wasn't tried; whether that succeeded."""
+        """Achieve a goal as advised, if there is advice now that wasn't tried; return whether that succeeded."""
         call, attempt = self.call, (self.call.program.levels[0], ADVISED)
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
         call.failed.setdefault(cell, set()).add(attempt)
         return call.achieve(attempt[0], cell, ADVISED)
 
-    def finish(self) -> bool:
-        """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""
+    def settles(self) -> bool:
+        """Return whether something isn't at rest that steps of lower levels haven't tried to bring to rest."""
         call = self.call
-        steps = call.steps
-        if not steps or steps[-1].level != call.program.levels[0] or self._finished > len(call.goal):
+        return (
+            not (call.settled or call.at_rest())
+            and len(call.program.levels) > 1
+            and self.allowed(call.program.levels[-1])
+        )
+
+    def settle(self) -> bool:
+        """Bring to rest what isn't, so that steps of the first level can begin; return whether there were steps for that."""
+        call = self.call
+        if not self.settles():
             return False
-        self._finished += 1  # what is done after that may undo it, but not for ever
-        call.redo(steps[:-1])
-        call.refiner.besides = call.unseen
-        last = call.refiner.do(*steps[-1][:3])
-        call.refiner.besides = {}
-        if last is None:
-            call.redo(steps)
-            return False
-        call.steps = [*steps[:-1], last]
-        call.kept.update(call.unseen)
-        return True
+        call.settled, call.refiner.hasty, steps = True, False, len(call.steps)
+        settle(call)
+        if len(call.steps) > steps:
+            call.given_up.append("steps of a lower level bring to rest what isn't in the beginning")
+            return True
+        return False
 
     def restart(self, level: int) -> bool:
         """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was.
@@ -242,7 +249,7 @@ class Agenda:
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         refiner.careful = True
         if self.together(level):
-            self._restarts += 1
+            self.begin()
             return True
         refiner.careful = False
         call.redo(steps)
@@ -250,12 +257,17 @@ class Agenda:
         return False
 
     def together(self, level: int) -> bool:
-        """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
+        """Achieve all goals at once on a level, from here; return whether that succeeded. It isn't tried twice from one state."""
         call = self.call
-        if call.program.size(level) > MOST_OPERATORS or self._tried.get(level) == len(call.steps):
+        if (
+            not self.allowed(level)
+            or call.program.size(level) > MOST_OPERATORS
+            or self._tried.get(level) == len(call.steps)
+        ):
             return False
         self._tried[level] = len(call.steps)
-        return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, ALL)
+        open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
+        return bool(open_) and call.reach(level, open_, WHOLE)
 
     # ------------------------------------------------------------------------------------------------------------ proofs
 
@@ -263,13 +275,13 @@ class Agenda:
         """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
         if not self._doubted:
             self._doubted = True
-            if proof := impossible(self.call.problem, deadline=self.call.segments.deadline):
+            if proof := impossible(self.call.problem, deadline=self.call.space.deadline):
                 raise proof
 
     def doubt(self) -> None:
         """Raise `UnsolvableError` if there is no plan and the lowest level is so small that looking at its states is no work."""
         call = self.call
-        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.segments.effort:
+        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
             self._prove()
 
     def _prove(self) -> None:
@@ -278,17 +290,17 @@ class Agenda:
         What is expected is searched first, with as much work as one small world may cost.
         """
         call = self.call
-        if call.advice is not None and call.advice.expects and call.segments.worked < WIDER.work:
+        if call.advice is not None and call.advice.expects and call.space.worked < WIDER.work:
             return
-        tests = min(call.segments.effort // TEST, PAIRS)
+        tests = min(call.space.effort // TEST, PAIRS)
         if tests >= 2 * self._tested:
             self._tested = tests
-            if proof := impossible(call.problem, tests, call.segments.deadline):
+            if proof := impossible(call.problem, tests, call.space.deadline):
                 raise proof
         if self._lowest is None:
-            self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline)
+            self._lowest = proved(call.problem, call.program.levels[-1], call.space.deadline)
         if not isinstance(self._lowest, Reason):
-            self._looked = looked_at(self._lowest, call.segments, self._looked)
+            self._looked = looked_at(self._lowest, call.space, self._looked)
 
 
 # ------------------------------------------------------------------------------------------------------- order of goals
@@ -306,7 +318,7 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
     known: dict[tuple[str, str, int], bool] = {}
     for cells in by_individual.values():
         for cell in cells:
-            call.segments.check_time()
+            call.space.check_time()
             for other in cells:
                 if cell is not other:
                     pattern = cell[0], other[0], call.program.alike.sort.get(arguments_of(cell[1])[0], -1)
@@ -318,14 +330,14 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
 
 
 def rules_out(call: Call, first: Cell, then: Cell) -> bool:
-    """Whether with goal `first` achieved, no behaviour of the first level could achieve goal `then` any more."""
+    """Return whether, with goal `first` achieved, no behaviour of the first level could achieve goal `then` any more."""
     level = call.program.levels[0]
     mark = len(call.table.trail)
     call.table.put(*first, call.goal[first])
     try:
         dead = False
         for achiever in call.program.achievers.get((level, then[0]), ()):
-            achieve = call.segments.achieve[achiever.behavior, achiever.effect]
+            achieve = call.space.achieve[achiever.behavior, achiever.effect]
             for _, unmet, env in achieve(*arguments_of(then[1]), call.goal[then]):
                 if all(attainable(call, level, achiever.soft[number], achiever, env) for number in unmet):
                     return False
@@ -336,11 +348,11 @@ def rules_out(call: Call, first: Cell, then: Cell) -> bool:
 
 
 def attainable(call: Call, level: int, condition: Condition, achiever: Achiever, env: Mapping[str, str | None]) -> bool:
-    """Whether some behaviour of a level has an effect that could bring an unmet condition about."""
-    for situation, key, values in call.segments.wants.of(achiever, condition, env, level):
+    """Return whether some behaviour of a level has an effect that could bring an unmet condition about."""
+    for situation, key, values in call.space.wants.of(achiever, condition, env, level):
         for other in call.program.achievers.get((level, situation), ()):
             for value in values:
-                achieve = call.segments.achieve[other.behavior, other.effect]
+                achieve = call.space.achieve[other.behavior, other.effect]
                 if next(achieve(*arguments_of(key), value), None) is not None:
                     return True
     return False

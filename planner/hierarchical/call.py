@@ -1,27 +1,27 @@
-"""One planning call: the table of what holds now, the goals, and the steps done so far.
+"""One planning call: the workspace, the goals, and the steps done so far.
 
 A goal is achieved by steps of a level, which are refined and done on the table at once (`Call.achieve`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
-from confab.planner.hierarchical.chains import REFINING, Effort, Segments
+from confab.planner.hierarchical.effort import REFINING, Effort
+from confab.planner.hierarchical.methods import Ranked
 from confab.planner.hierarchical.operators import Program
-from confab.planner.hierarchical.refinement import Advice, RefinedStep, Refiner, Template
-from confab.planner.hierarchical.scope import Width
+from confab.planner.hierarchical.refinement import Advice, RefinedStep, Refiner
+from confab.planner.hierarchical.workspace import Workspace
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell, Table, arguments_of, key_of
 from confab.reasoner.amounts import meets
+from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
-ADVISED = Effort(depth=0)
+ADVISED = Effort(steps=0, questions=0)
 """By advice alone."""
-Attempt: TypeAlias = "Effort | Sequence[Width]"
-"""How hard one goal is tried: by relevant steps, or in parts of the world of growing width."""
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Compiled:
     """What can be kept between calls on problems with the same domain, individuals and static facts."""
 
     program: Program
-    templates: dict[str, list[Template]] = field(default_factory=dict)
+    methods: dict[str, list[Method]] = field(default_factory=dict)
 
 
 def compiled(problem: Problem) -> Compiled:
@@ -38,23 +38,25 @@ def compiled(problem: Problem) -> Compiled:
 
 
 class GoalAdvice(Advice, Protocol):
-    """What may know steps to goals, too."""
+    """Steps that experience proposes for goals, too."""
 
+    ranked: Ranked
+    """Returns ways to fill the roles of a method, the best first."""
     expects: bool
     """Whether all goals are of kinds that were reached before."""
 
     def ready(self) -> bool:
-        """Whether advice is to be taken now."""
+        """Return whether advice is to be taken now."""
 
     def rank(self, cell: Cell) -> int:
         """Return 1 if a goal is promised by one step, 2 if by more, 0 if nothing is promised."""
 
     def waits(self, cell: Cell) -> bool:
-        """Whether another open goal should come first."""
+        """Return whether another open goal should come first."""
 
 
 class Call:
-    """One planning call: the table, what is achieved, and the steps done so far."""
+    """One planning call: the workspace, the goals that are achieved, and the steps done so far."""
 
     def __init__(self, problem: Problem, using: Compiled, deadline: float | None, most: int) -> None:
         self.problem = problem
@@ -62,32 +64,34 @@ class Call:
         self.program = using.program
         self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
         self.table = Table(problem.domain.situations, problem.initial)
-        self.segments = Segments(self.program, self.table, self.goal, deadline, most)
-        self.refiner = Refiner(self.segments, using.templates)
+        self.space = Workspace(self.program, self.table, self.goal, deadline, most)
+        self.refiner = Refiner(self.space, using.methods)
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
-        first = self.program.levels[0]
-        rests = {s.name: s.rest for s in problem.domain.situations.values()}
+        first, rest = self.program.levels[0], self.space.rest
         self.unseen = {
-            cell: value
+            cell
             for cell, value in self.goal.items()
-            if not self.segments.visible(first, cell) and rests[cell[0]] in (None, value)
+            if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals unknown to the most abstract level, and free of rest values: its last step brings them about."""
+        """Goals that the most abstract level doesn't see: its last step is refined so that it brings them about."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.aim: dict[Cell, str] = {}
         """The goals that were aimed at last."""
-        self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
+        self.failed: dict[Cell, set[tuple[int | Effort, ...]]] = {}
         self.progressed = False
         self.redone = 0
-        """How often steps were done from the beginning."""
+        """Number of times that steps were done from the beginning."""
+        self.saving: float | None = None
+        """Number of primitives per second that the last round of shortening saved."""
         self.settled = False
-        """Whether the first steps bring to rest what isn't in the beginning."""
+        """Whether steps of lower levels bring to rest what isn't in the beginning."""
 
     def advise(self, advice: GoalAdvice) -> None:
         """Take advice before any search, for goals and for refinements."""
         self.advice = self.refiner.advice = advice
+        self.refiner.methods.ranked = advice.ranked
 
     def redo(self, steps: Sequence[RefinedStep]) -> None:
         """Do steps from the beginning in place of those done so far; marks of the trail from before are void then."""
@@ -96,44 +100,53 @@ class Call:
         for step in steps:
             self.refiner.again(step)
 
-    def achieve(self, level: int, cell: Cell, attempt: Attempt) -> bool:
-        """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
-        return self.reach(level, {cell: self.goal[cell]}, attempt)
+    def achieve(self, level: int, cell: Cell, *efforts: Effort) -> bool:
+        """Achieve one goal and keep the others, by steps of a level that are refined and done; return whether that succeeded."""
+        return self.reach(level, {cell: self.goal[cell]}, *efforts)
 
-    def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
-        """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
-        first = level == self.program.levels[0]
+    def reach(self, level: int, targets: dict[Cell, str], *efforts: Effort) -> bool:
+        """Do refined steps of a level after which the targets and all goals reached before hold; return whether there are some."""
+        first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
-        hidden = self.unseen if first else {}  # seldom any: no copy of all goals for each of them
-        kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
-        keep = self.segments.keeping(kept)
-        if attempt is ADVISED:
-            steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
+        kept: Mapping[Cell, str] = self.kept
+        if level == first and self.unseen:  # its steps needn't keep what it doesn't see
+            kept = {cell: value for cell, value in kept.items() if cell not in self.unseen}
+        keep = self.space.keeping(kept)
+        last = self.steps[-1] if self.unseen.issuperset(targets) and self.steps else None
+        inside = last is not None and last.level == first and last.steps[0].level == level
+        if inside:
+            above = self.space.refining(first)
+            keep = lambda cell, value: kept.get(cell) or above(cell, value)  # noqa: E731
+        if efforts == (ADVISED,):
+            steps: Sequence[RefinedStep] | None = self.advice.follow(level, targets, keep) if self.advice else None
         else:
-            steps = self.refiner.achieve(level, targets, keep, attempt)
+            steps = self.refiner.achieve(level, targets, keep, efforts)
         if steps is None:
             return False
-        self.steps.extend(steps)
+        if inside and last is not None:
+            self.steps[-1] = last._replace(steps=(*last.steps, *steps))
+        else:
+            self.steps.extend(steps)
         self.progressed = True
         self.kept.update(targets)
-        if not first:
+        if level != first and not inside:
             goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())
             self.given_up.append(
-                f"level {self.program.levels[0]} was given up for {goals}: no steps of it were found that can be refined; "
+                f"level {first} was given up for {goals}: no steps of it were found that can be refined; "
                 f"steps of level {level} stand there"
             )
         return True
 
     def met(self, cell: Cell) -> bool:
-        """Whether a goal holds now."""
+        """Return whether a goal holds now."""
         return meets(self.table.now[cell[0]].get(cell[1], FALSE), self.goal[cell])
 
     def at_rest(self) -> bool:
-        """Whether everything that the uppermost level doesn't know of rests."""
+        """Return whether everything that the uppermost level doesn't see is at rest."""
         return not any(self.restless(level) for level in self.program.levels[1:])
 
     def restless(self, level: int) -> dict[Cell, str]:
-        """Return the values of rest of what a level knows of and what doesn't rest."""
+        """Return the rest values of the symbols of a level that aren't at rest."""
         return {
             (name, key): situation.rest
             for name, situation in self.problem.domain.situations.items()
@@ -145,7 +158,7 @@ class Call:
     def count(self, other: Outcome) -> None:
         """Count what another search did."""
         for level, counts in other.search.items():
-            self.segments.counts[level].add(counts)
+            self.space.counts[level].add(counts)
 
     def outcome(self, status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         """Return how the call ended, with what it counted."""
@@ -154,11 +167,12 @@ class Call:
             status,
             plan,
             reason,
-            self.segments.counts,
+            self.space.counts,
             len(given_up),
             hits=cache.hits,
             misses=cache.misses,
             given_up=given_up,
+            saving=self.saving,
         )
 
     def tree(self) -> Plan:
@@ -174,23 +188,17 @@ class Call:
         return Plan(tuple([step(done, (i,)) for i, done in enumerate(self.steps)]))
 
 
-def fresh_call(call: Call, problem: Problem, settled: bool = False) -> Call:
-    """Return a call from the beginning once more, that knows which refinements were found and which weren't.
-
-    If `settled`, what isn't at rest is brought to rest first.
-    """
-    other = Call(problem, call.using, call.segments.deadline, call.segments.most)
-    other.refiner.found, other.refiner.failed = call.refiner.found, call.refiner.failed
-    if settled:
-        settle(other)
-        other.settled = bool(other.steps)
+def fresh_call(call: Call, problem: Problem) -> Call:
+    """Return a call from the beginning once more, that knows which refinements were found and which weren't."""
+    other = Call(problem, call.using, call.space.deadline, call.space.most)
+    other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
     return other
 
 
 def settle(call: Call) -> bool:
-    """Bring everything that the upper levels don't know of to rest, the lowest level first; whether that succeeded.
+    """Bring everything that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
 
-    What a hand holds goes where it is wanted if that takes no longer, else to any place.
+    An object that is held goes where it is wanted if that takes no longer, else to any place.
     """
     for level in reversed(call.program.levels[1:]):
         targets = call.restless(level)
@@ -202,9 +210,9 @@ def settle(call: Call) -> bool:
             for key, value in cells.items()
             if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
         }
-        keep = call.segments.keeping({})
+        keep = call.space.keeping(call.kept)
         for wanted in ({**targets, **hidden}, targets):
-            steps = call.refiner.achieve(level, wanted, keep, REFINING)
+            steps = call.refiner.achieve(level, wanted, keep, (REFINING,))
             if steps is not None:
                 call.steps.extend(steps)
                 break

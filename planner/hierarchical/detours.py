@@ -76,7 +76,7 @@ def _lasting(
     done: list[_Done] = []
     latest: dict[Cell, list[_Done]] = {}
     for number, step in steps.items():
-        refiner.segments.check_time()
+        refiner.space.check_time()
         mark = len(table.trail)
         refiner.again(step)
         one = _Done(number, step, table.changes(mark), mark)
@@ -148,10 +148,10 @@ class _Assembly:
 
     def one(self, step: RefinedStep) -> list[RefinedStep]:
         """Return a step, or what is left of its steps."""
-        table, segments = self.refiner.table, self.refiner.segments
+        table, space = self.refiner.table, self.refiner.space
         begin, end = self.number, self.number + len(list(parts(step, self.level)))
         mark = len(table.trail)
-        situations = segments.program.domain.situations
+        situations = space.program.domain.situations
         part = step.level >= self.level or not step.steps
         at_rest = not any(situations[cell[0]].level > step.level for cell in self.restless)
         if part or (at_rest and all(number in self.kept for number in range(begin, end))):
@@ -160,8 +160,8 @@ class _Assembly:
             if again is not None or gone:
                 self.number = end
                 for situation, key, _ in table.trail[mark:]:
-                    if situation in segments.rest:
-                        rests = table.now[situation][key] == segments.rest[situation]
+                    if situation in space.rest:
+                        rests = table.now[situation][key] == space.rest[situation]
                         (self.restless.discard if rests else self.restless.add)((situation, key))
                 return [] if again is None else [again]
         return self.of(step.steps)

@@ -23,8 +23,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, Compiled, compiled, fresh_call
-from confab.planner.hierarchical.refinement import MUCH
+from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.windows import regroupings
@@ -98,7 +97,7 @@ def _plan(
         if flat.status is Status.SOLVED:
             return flat
     call = Call(problem, using or compiled(problem), deadline, limits.expansions)
-    call.segments.enough = limits.work
+    call.space.most_work = limits.work
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     agenda = Agenda(call, levels)
@@ -109,17 +108,9 @@ def _plan(
             call.count(flat)
             if flat.status is not Status.GAVE_UP:
                 return call.outcome(flat.status, flat.plan, flat.reason)
-        settles = len(levels) > 1 and not call.at_rest()  # by steps of lower levels
-        if not done and (one_level or (settles and not (done := soon(agenda)))):
-            call = rested(call, advised)
-            agenda = Agenda(call, levels)
         if done or agenda.achieve_all():
-            call.segments.enough = math.inf
+            call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
-            if call.settled and plan.steps and plan.steps[0].level != levels[0]:
-                call.given_up.insert(
-                    0, "steps of a lower level come first: they bring to rest what isn't in the beginning"
-                )
             return call.outcome(Status.SOLVED, plan)
         return last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
@@ -180,7 +171,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
     from confab.planner.grounded.best_first import plan_level
 
-    problem, deadline, lowest = call.problem, call.segments.deadline, call.program.levels[-1]
+    problem, deadline, lowest = call.problem, call.space.deadline, call.program.levels[-1]
     call.table.undo(0)
     restless = {cell: value for level in call.program.levels[1:] for cell, value in call.restless(level).items()}
     rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
@@ -198,29 +189,3 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
             flat, status=Status.GAVE_UP, reason=Reason("plans were found that leave what they touch not at rest")
         )
     return flat
-
-
-def soon(agenda: Agenda) -> bool:
-    """Do steps after which all goals hold by no more work than one large scope; whether there are some."""
-    segments = agenda.call.segments
-    segments.most_work = MUCH
-    try:
-        return agenda.achieve_all()
-    except LimitError:
-        return False
-    finally:
-        segments.most_work = math.inf
-
-
-def rested(call: Call, advised: Callable[[Call], None]) -> Call:
-    """Return a call from the beginning once more that first brings to rest what isn't.
-
-    An object in a hand is at no place that the first level knows, so that none of its steps may begin there.
-    """
-    other = fresh_call(call, call.problem, settled=True)
-    other.segments.expanded += call.segments.expanded
-    other.segments.enough = call.segments.enough
-    other.aim, other.refiner.at = call.aim, call.refiner.at
-    other.segments.counts = call.segments.counts
-    advised(other)
-    return other

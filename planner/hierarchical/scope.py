@@ -7,21 +7,22 @@ targets    the symbols that shall get a value; what is kept besides is said by a
 `confab.planner.hierarchical.chains`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
-proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be. The room that grounds
+proves nothing. Everything is done on one level; the caller refines the steps and bars those that can't be. The room that grounds
 and searches is imported where a scope is searched: numpy alone takes longer to import than a small task to plan.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.chains import Ground, Keep, Segments
+from confab.planner.hierarchical.effort import Effort
+from confab.planner.hierarchical.relevance import chains
+from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.plan import Counts, Limits, Reason, Status, UngroundableError
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets
@@ -32,6 +33,7 @@ from confab.reasoner.symbols import (
     Parameter,
     Problem,
     RelationCondition,
+    State,
     Symbol,
     ValueCondition,
     Witness,
@@ -50,68 +52,55 @@ LEAST, MAKING = 300, 100
 making it as much as looking at so many states. A scope of which not a fifth as many could be looked at isn't grounded."""
 
 
-@dataclass(frozen=True)
-class Width:
-    """How much of the world is looked at, and how long.
-
-    `questions` is the most values that chains towards one target may lead through, None takes the whole world; `spares` how many
-    values there are beside these of each sort that they belong to.
-    `work` bounds one search, in states times operators.
-    """
-
-    questions: int | None
-    spares: int = 1
-    work: int = 200_000
-
-
-class Subproblem:
+class Scope:
     """A scope on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
 
-    def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
-        self.segments, self.level, self.width = segments, level, width
+    def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> None:
+        self.space, self.level, self.effort = space, level, effort
         self.plan: tuple[int, ...] = ()
         self.task: Task | None = None
+        self.held: State = {}
         with suppress(UngroundableError, OutOfTimeError, MemoryError):
-            task = self._grounded(targets, keep, width)
+            task = self._grounded(targets, keep, effort)
             self.task = None if isinstance(task, Reason) else task
-        segments.check_time()
+        space.check_time()
 
-    def _grounded(self, targets: Mapping[Cell, str], keep: Keep, width: Width) -> Task | Reason:
+    def _grounded(self, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> Task | Reason:
         from confab.planner.grounded.grounding import ground
 
-        segments, level = self.segments, self.level
-        inside = focus(segments, level, targets, width)
-        small = problem_of(segments, level, inside, with_frozen(segments, level, inside) if inside else frozenset())
+        space, level = self.space, self.level
+        inside = focus(space, level, targets, effort)
+        small = problem_of(space, level, inside, with_frozen(space, level, inside) if inside else frozenset())
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
             # What isn't at rest may stay so; who touches it is found out by the caller.
             if wanted is not None and meets(value, wanted):
                 goal.setdefault(symbol, wanted)
-        for cell in segments.defined:
+        for cell in space.defined:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
-        most, deadline, needed = 5 * width.work // MAKING, segments.deadline, segments.most_work == math.inf
-        return ground(small, level, goal=goal, most=most, deadline=deadline, apart=needed)
+        self.held = small.initial
+        return ground(small, level, goal=goal, most=5 * effort.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `forbid` takes one of them back."""
+        """Return steps, or None if none were found; `bar` takes one of them back."""
         from confab.planner.grounded.best_first import search
 
         if self.task is None:
-            self.segments.spend(self.level, Counts(), MAKING * LEAST)
+            self.space.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
-        limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
-        found = search(self.task, limits, self.segments.deadline, most_work=most)
+        limits, most = Limits(self.effort.work // LEAST), BITS * self.effort.work
+        found = search(self.task, limits, self.space.deadline, most_work=most)
         work = max(LEAST * found.counts.expanded, found.work // BITS)
-        self.segments.spend(self.level, found.counts, MAKING * size + work)
+        self.space.spend(self.level, found.counts, MAKING * size + work)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
             return None
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
-    def forbid(self, position: int) -> None:
+    def bar(self, position: int) -> None:
         """Take back the plan that was found last because of one of its steps, which can't be refined where it stands."""
         assert self.task is not None
         state = self.task.initial
@@ -121,21 +110,21 @@ class Subproblem:
         self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 
 
-def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str] | None:
+def focus(space: Workspace, level: int, targets: Mapping[Cell, str], effort: Effort) -> set[str] | None:
     """Return the individuals that acting towards the targets may concern; None are all."""
-    if width.questions is None:
+    if effort.questions is None:
         return None
-    program, table = segments.program, segments.table
+    program, table = space.program, space.table
     met: dict[str, None] = dict.fromkeys(program.named)
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
     for cell, value in targets.items():
-        for _ in segments.chains(level, cell, value, width.questions, met):
+        for _ in chains(space, level, cell, value, effort.questions, met):
             pass
     for members in program.problem.classes.values():
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
-    met.update(dict.fromkeys(segments.wants.spare(met, level, width.spares)))
+    met.update(dict.fromkeys(space.wants.spare(met, level, effort.spares)))
     for individual in tuple(met):  # what these have, and who has what these are, as far as these are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
@@ -150,10 +139,10 @@ def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Wi
 
 
 def problem_of(
-    segments: Segments, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
+    space: Workspace, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
 ) -> Problem:
     """Return one level of the problem as it is now, without a goal, of the individuals inside alone, or of all."""
-    program, table = segments.program, segments.table
+    program, table = space.program, space.table
     problem = program.problem
     situations = problem.domain.situations
     if inside is None:
@@ -185,13 +174,13 @@ def problem_of(
     return replace(problem, domain=domain, classes=classes, relations=relations, initial=initial, goal={})
 
 
-def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set[str]:
+def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
     """Return individuals with those on whom it depends what they can do, though these don't take part.
 
     These are the values that they have, the values of these and so on; and where a behaviour asks whether there is an individual
     such that …, those who have one of them as a value, and those in a static relation to them.
     """
-    program, table = segments.program, segments.table
+    program, table = space.program, space.table
     behaviors = program.domain.at_level(level)
     behaviors += tuple(rule.behavior for its in program.domain.rules.values() for rule in its)
     witnesses = [inner for b in behaviors for c in b.conditions for inner in walk(c) if isinstance(inner, Witness)]

@@ -11,10 +11,11 @@ for, are given up only where that saves enough.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from random import Random
+from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
@@ -22,13 +23,15 @@ from confab.planner.hierarchical.detours import without_detours
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.windows import abstract, broken, length, windowed, worth
 from confab.planner.plan import Plan
-from confab.planner.transitions import Cell, key_of
+from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
 ORDERS = 8
-"""Other orders of the goals that are tried by default: length against CPU time."""
-LEAST_EFFORT = 200_000
+"""The default share of work for shortening, in sixteenths of the effort of the first plan: length against CPU time."""
+SHUFFLES = 3
+"""Number of random orders of the goals before the best one is changed a little at a time."""
+LEAST_EFFORT = 400_000
 """The least effort that a first plan counts as, in states times operators: length of plans found at once, against CPU time."""
 DOING = 20
 """The effort of doing a primitive once more, in states times operators."""
@@ -49,29 +52,41 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
-    """Make the steps of a call shorter."""
+    """Make the steps of a call shorter in rounds: one without a time limit, else as long as they pay."""
+    work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
+    rounds = useful = 0
+    while rounds <= 2 * useful + 2:
+        before, begin = length(call.steps), perf_counter()
+        shorten_once(call, work, leave_levels, advised, random)
+        rounds, saved = rounds + 1, before - length(call.steps)
+        call.saving = saved / max(perf_counter() - begin, 1e-6)
+        useful = rounds if saved else useful
+        if call.space.deadline is None or not useful:
+            break
+
+
+def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:
+    """Try other orders of the goals, windows of each level and steps without detours, each by bounded work."""
     levels = call.program.levels
-    work = max(call.segments.effort, LEAST_EFFORT) * improve // (2 * ORDERS)
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
-        reordered(call, improve, work, advised)
+        reordered(call, work, advised, random)
         windowed(call, levels[0], work)
-    if aside:
-        for level in levels[1:-1] if leave_levels else ():
+    if aside and leave_levels:
+        for level in levels[1:-1]:
             windowed(call, level, work)
-        if leave_levels:
-            drop_detours(call, levels[-2])
-    if leave_levels and (drop_detours(call, levels[-1], KEPT) or call.given_up or len(levels) == 1):
+        drop_detours(call, levels[-2])
+    if leave_levels and (drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1):
         windowed(call, levels[-1], work)
 
 
 def puts_aside(call: Call) -> bool:
-    """Whether a step overwrites a value that no step before has asked for: else there is hardly a step too many."""
+    """Return whether a step overwrites a value that no step before has asked for: else hardly a step is needless."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
     for level, name, arguments, bindings, below in call.steps:
-        call.segments.check_time()
+        call.space.check_time()
         mark = len(table.trail)
         call.refiner.redo(RefinedStep(level, name, arguments, bindings, below))
         touched = {
@@ -93,36 +108,45 @@ def puts_aside(call: Call) -> bool:
     return False
 
 
-def orders(goal: Mapping[Symbol, str], number: int) -> Iterator[dict[Symbol, str]]:
-    """Yield other orders of the goals: the reverse one, then shuffled ones."""
-    goals = list(goal.items())
-    goals.reverse()
-    for seed in range(number):
-        yield dict(goals)
-        Random(seed).shuffle(goals)
-
-
-def reordered(call: Call, number: int, work: int, advised: Callable[[Call], None]) -> None:
-    """Achieve the goals in other orders, by bounded work in all; keep the shortest.
+def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Random) -> None:
+    """Achieve the goals in other orders, by bounded work; keep the shortest steps, and go on from their order.
 
     Only steps of the most abstract level are tried; advice is taken for refinements: for goals it would lead to the same steps.
     """
-    for goal in orders(call.problem.goal, number) if len(call.goal) > 1 else ():
-        other = fresh_call(call, replace(call.problem, goal=goal), call.settled)
-        other.segments.most_work = work
+    order = list(call.kept)
+    for other_order in neighbours(order, random) if len(order) > 1 else ():
+        goal = {Symbol(cell[0], arguments_of(cell[1])): call.goal[cell] for cell in other_order}
+        other = fresh_call(call, replace(call.problem, goal=goal))
+        other.space.most_work = work
         advised(other)
         other.advice = None
-        agenda = Agenda(other, levels=call.program.levels[:1], attempts=2, solvable=True, forward=True)
+        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, solvable=True, forward=True)
         with suppress(LimitError):
-            if agenda.achieve_all() and length(other.steps) < length(call.steps):
-                call.steps = other.steps
-        work -= other.segments.effort + DOING * length(other.steps)
+            if agenda.achieve_all() and length(other.steps) <= length(call.steps):
+                order[:] = other.kept
+                call.steps = other.steps if length(other.steps) < length(call.steps) else call.steps
+        work -= other.space.effort + DOING * length(other.steps)
         if work <= 0:
             break
 
 
-def drop_detours(call: Call, level: int, price: float = 1.0) -> bool:
-    """Leave out steps of a level that come to nothing, if that breaks no more of what levels above ask; whether some were.
+def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
+    """Yield an order reversed, some random ones, then for ever the order, as it has become, with a few goals moved elsewhere."""
+    yield order[::-1]
+    for _ in range(SHUFFLES):
+        yield random.sample(order, len(order))
+    while True:
+        other = list(order)
+        begin, many = random.randrange(len(other)), random.choice((1, 1, 2, 3))
+        moved = other[begin : begin + many]
+        del other[begin : begin + many]
+        to = random.randrange(len(other) + 1)
+        other[to:to] = moved
+        yield other
+
+
+def drop_detours(call: Call, level: int) -> bool:
+    """Leave out steps of a level that come to nothing, if that breaks no more of what levels above ask; return whether some were.
 
     Steps of the most abstract level are given up for that only if the plan is longer than without by more than a factor.
     """
@@ -130,7 +154,8 @@ def drop_detours(call: Call, level: int, price: float = 1.0) -> bool:
     call.steps = without_detours(call.refiner, steps, level)
     new = call.tree()
     lost = abstract(call.problem, old) - abstract(call.problem, new)
-    saved = len(old.primitives) > (price if lost > 0 else 1.0) * len(new.primitives)
+    dear = lost > 0 and (level == call.program.levels[-1] or 2 * lost > abstract(call.problem, old))
+    saved = len(old.primitives) > (KEPT if dear else 1.0) * len(new.primitives)
     if (
         saved
         and worth(len(old.primitives) - len(new.primitives), lost)

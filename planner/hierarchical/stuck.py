@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.chains import Asked
+from confab.planner.hierarchical.relevance import Asked, chains
 from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import bounds_written
@@ -37,19 +37,19 @@ def gave_up(call: Call, why: str) -> Reason:
 
 def lacking(call: Call) -> Iterator[str]:
     """Yield the amounts that behaviours towards the first goal that was aimed at ask for, where the steps so far end."""
-    segments, situations = call.segments, call.problem.domain.situations
+    space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):
         return
-    segments.deadline, segments.most_looked = (
+    space.deadline, space.most_looked = (
         Limits().end(),
-        segments.looked + LOOKED,
+        space.looked + LOOKED,
     )  # the search's own limits may be reached
     call.redo(call.steps)
     told: dict[Cell, str] = {}
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:
         asked: Asked = set()
         with suppress(LimitError):
-            for _ in segments.chains(level, cell, value, QUESTIONS, asked=asked):
+            for _ in chains(space, level, cell, value, QUESTIONS, asked=asked):
                 pass
         told.update(
             {

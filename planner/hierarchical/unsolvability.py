@@ -11,8 +11,8 @@ import math
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.chains import Segments
 from confab.planner.hierarchical.scope import LEAST
+from confab.planner.hierarchical.workspace import Workspace
 from confab.planner.plan import OUT_OF_MEMORY, Reason, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State
@@ -95,16 +95,16 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
     return task
 
 
-def looked_at(task: Task, segments: Segments, before: int) -> int:
+def looked_at(task: Task, space: Workspace, before: int) -> int:
     """Raise `UnsolvableError` if none of all states that can be reached fulfils the goal; return how many were looked at.
 
     That may cost as much as the searches have up to now. Nothing is done if these aren't twice as many as were looked at `before`.
     """
     state = max(len(task.owners), LEAST)
-    most = max(LOOKING, segments.worked) // state
+    most = max(LOOKING, space.worked) // state
     if most < 2 * before:
         return before
-    if reason := exhausted(task, most, segments.deadline):
+    if reason := exhausted(task, most, space.deadline):
         raise UnsolvableError(reason)
     return most
 

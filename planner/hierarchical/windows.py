@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
-from confab.planner.hierarchical.chains import Ground
 from confab.planner.hierarchical.detours import parts
 from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement import RefinedStep
+from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, Step, UngroundableError
 from confab.planner.validation import validate
@@ -42,7 +42,7 @@ def windowed(call: Call, level: int, work: int) -> None:
             return
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # what the level doesn't see
-        Agenda(other, solvable=True).finish()
+        Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level):
         lost = abstract(problem, old) - abstract(problem, plan)
@@ -61,11 +61,11 @@ def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
 
     between = level not in (call.program.levels[0], call.program.levels[-1])
     problem = replace(call.problem, domain=binding(call.problem, level)) if between else call.problem
-    task = small(problem, level, call.segments.deadline, OF_A_STEP * len(steps))
+    task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
     operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
     if task is None or operators is None:
         return None
-    found = shorter(task, operators, work, call.segments.deadline)
+    found = shorter(task, operators, work, call.space.deadline)
     return [task.describe(operator)[:2] for operator in found] if len(found) < len(operators) else None
 
 

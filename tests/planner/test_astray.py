@@ -130,11 +130,11 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     first, second = (call.refiner.do(1, "SEND", (item,)) for item in ("item0", "item1"))
     assert first is not None
     assert second is None  # one rode down
-    call.using.templates.clear()
+    call.using.methods.clear()
     other = fresh_call(call, problem)
     assert other.refiner.do(1, "SEND", ("item0",)) == first
     assert other.refiner.do(1, "SEND", ("item1",)) is None
-    assert other.refiner.misses == 0
+    assert other.space.worked == 0
 
 
 def test_what_level_1_does_not_see_and_all_goals_at_once_undid_is_a_goal_again() -> None:

@@ -189,7 +189,7 @@ def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
     ).problem
     task = ground(problem)
     assert isinstance(task, Task)
-    segments = Call(problem, compiled(problem), None, 1).segments
+    segments = Call(problem, compiled(problem), None, 1).space
     most = looked_at(task, segments, 0)
     assert looked_at(task, segments, most) == most  # what was done isn't done again for fewer than twice as many
     segments.worked = 20_000 * LEAST
@@ -214,7 +214,7 @@ def test_a_refinement_that_was_found_in_a_state_is_not_searched_there_again() ->
     call.table.undo(0)
     step, searched = refiner.do(first, behavior.name, arguments), refiner.misses
     call.table.undo(0)
-    refiner.templates.clear()
+    refiner.methods.known.clear()
     assert refiner.do(first, behavior.name, arguments) == step
     assert refiner.misses == searched
 

@@ -401,7 +401,7 @@ def test_all_states_are_looked_at_only_within_bounds_and_never_twice() -> None:
     assert found.text == "none of all 54 states of level 1 that can be reached fulfils the goal"
     assert exhausted(impossible_goal, 53) is None
     assert exhausted(impossible_goal, 54) == found
-    segments = Call(problem, compiled(problem), None, 1).segments
+    segments = Call(problem, compiled(problem), None, 1).space
     with pytest.raises(UnsolvableError, match="none of all 54 states"):
         looked_at(impossible_goal, segments, 0)
     most = LOOKING // max(len(task.owners), LEAST)

@@ -20,8 +20,8 @@ from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import agenda
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled, compiled
-from confab.planner.hierarchical.chains import EXPANSION
 from confab.planner.hierarchical.operators import Program
+from confab.planner.hierarchical.workspace import EXPANSION
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell
 from confab.planner.validation import validate
@@ -484,12 +484,12 @@ def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_ha
     guide = Guide(call, wrong)
     level, before = call.program.levels[0], call.table.state()
     for cell, value in guide.open().items():
-        if not guide.vain and guide.follow(level, {cell: value}, call.segments.keeping(call.kept)) is None:
+        if not guide.vain and guide.follow(level, {cell: value}, call.space.keeping(call.kept)) is None:
             assert call.table.state() == before
     assert guide.wasted > 0
     assert guide.vain > EXPANSION * guide.wasted
     assert not guide.ready()
-    call.segments.expanded = 10 * guide.wasted
+    call.space.expanded = 10 * guide.wasted
     assert guide.ready()
 
 
@@ -498,7 +498,7 @@ def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_to
     call = Call(within, compiled(within), None, 100_000)
     guide = Guide(call, taught().rules)
     level, (cell, value) = call.program.levels[0], next(iter(guide.open().items()))
-    targets, keep = {cell: value}, call.segments.keeping(call.kept)
+    targets, keep = {cell: value}, call.space.keeping(call.kept)
     before = call.table.state()
     guide.vain = guide.allowed() - 1
     assert guide.ready()
@@ -506,7 +506,7 @@ def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_to
     assert call.table.state() == before
     assert not guide.ready()
     assert not guide.rank(cell)
-    call.segments.worked = 10 * FREE
+    call.space.worked = 10 * FREE
     assert guide.rank(cell)
     assert guide.follow(level, targets, keep)
 

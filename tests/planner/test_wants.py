@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from confab.planner.hierarchical.call import Call, Compiled
+from confab.planner.hierarchical.effort import WIDER
 from confab.planner.hierarchical.operators import Achiever, Program
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.refinement import WIDER
+from confab.planner.hierarchical.relevance import relevant
 from confab.planner.hierarchical.scope import focus
 from confab.planner.hierarchical.subgoals import Env, Wants
 from confab.planner.plan import Limits, Status
@@ -41,29 +42,29 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
     program = Program(problem)
     for level in problem.domain.levels:
         kept, fresh = (Call(problem, Compiled(program), None, 100_000) for _ in range(2))
-        ask_anew(fresh.segments.wants, monkeypatch)
+        ask_anew(fresh.space.wants, monkeypatch)
         for _ in range(12):
             for (at, situation), achievers in program.achievers.items():
                 cells = [cell for cell in kept.goal.items() if cell[0][0] == situation]
                 for achiever in achievers if at == level else ():
                     for (_, key), value in cells:
                         arguments = (key,) if isinstance(key, str) else key
-                        achieve = kept.segments.achieve[achiever.behavior, achiever.effect]
+                        achieve = kept.space.achieve[achiever.behavior, achiever.effect]
                         for _, unmet, env in achieve(*arguments, value):
                             for number in unmet:
-                                anew = list(fresh.segments.wants.of(achiever, achiever.soft[number], env, level))
-                                assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
-                                assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
+                                anew = list(fresh.space.wants.of(achiever, achiever.soft[number], env, level))
+                                assert list(kept.space.wants.towards(achiever, number, env, level)) == anew
+                                assert list(kept.space.wants.towards(achiever, number, env, level)) == anew
                                 asked += 1
             off = {cell: value for cell, value in kept.goal.items() if not kept.met(cell)}
-            found = list(kept.segments.relevant(level, off, 3))
+            found = list(relevant(kept.space, level, off, 3))
             if not found:
                 break
             ground = rng.choice(found)
             for field in (kept, fresh):
-                done = field.segments.forward[ground[0]](*ground[1])
+                done = field.space.forward[ground[0]](*ground[1])
                 assert done is not None
-                field.segments.apply(done[1])
+                field.space.apply(done[1])
     assert asked or not problem.goal
 
 
@@ -89,7 +90,7 @@ def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeyp
 
     monkeypatch.setattr(Program, "_picked", counted)
     call = Call(problem, Compiled(Program(problem)), None, 100)
-    found = list(call.segments.achieve["TURN", 0]("piece", spots[9]))
+    found = list(call.space.achieve["TURN", 0]("piece", spots[9]))
     assert [arguments for arguments, _, _ in found] == [("piece", "table2", *spots[8:12])]
     assert len(asked) < len(spots)
 
@@ -134,7 +135,7 @@ def test_whoever_stands_in_the_wrong_room_wants_the_next_one_though_its_door_is_
     call = Call(problem, Compiled(Program(problem)), None, 10_000)
     target: dict[Cell, str] = {("CRATE_AT", "crate"): "room8"}
     assert {f"room{i}" for i in range(4, 9)} | {f"door{i}" for i in range(4, 8)} <= (
-        focus(call.segments, 2, target, WIDER) or set()
+        focus(call.space, 2, target, WIDER) or set()
     )
 
 

@@ -1,0 +1,125 @@
+"""Methods: refinements that were found, their individuals replaced by roles: a PICK refined once is refined for all hands.
+
+The individuals of the refined step are the first roles of a method. A role that they don't fill is read off the table where a
+condition determines it (the place where the van is), else one individual of each symmetry class is tried. Each replayed step is
+checked (`confab.planner.hierarchical.refinement`): a method may be useless in a state, but never wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice, product
+from typing import TypeAlias
+
+from confab.planner.hierarchical.workspace import Ground, Workspace
+from confab.planner.transitions import key_of
+from confab.reasoner.memory.experience import Method, OpenRole
+from confab.reasoner.symbols import Behavior, ValueCondition
+
+METHODS, CHOICES = 6, 24
+"""Maximum number of methods kept of a behaviour, and of ways to fill the open roles of one."""
+
+Roles: TypeAlias = "tuple[str | None, ...]"
+"""The individuals in the roles of a method; None where the table will tell."""
+Ranked: TypeAlias = "Callable[[Method, list[Roles]], list[Roles]]"
+
+
+def as_they_come(method: Method, ways: list[Roles]) -> list[Roles]:
+    """Return ways to fill the roles of a method in their order."""
+    return ways
+
+
+class Methods:
+    """The methods of each behaviour, and the individuals for their roles.
+
+    Parameters
+    ----------
+    space : Workspace
+    known : dict
+        From earlier calls over the same program; grows.
+    """
+
+    def __init__(self, space: Workspace, known: dict[str, list[Method]]) -> None:
+        self.space, self.known = space, known
+        self.ranked: Ranked = as_they_come
+        """Returns ways to fill the roles of a method, the best first."""
+
+    def of(self, behavior: str, individuals: tuple[str, ...]) -> Iterator[tuple[Method, Roles]]:
+        """Yield the methods of a step, the shortest first, each with the ways to fill its roles."""
+        for method in tuple(self.known.get(behavior, ())):
+            for roles in self.ways(method, individuals):
+                yield method, roles
+
+    def ways(self, method: Method, individuals: tuple[str, ...]) -> Iterable[Roles]:
+        """Return ways to fill the roles of a method: the step's own individuals, None where the table will tell, others."""
+        wants = self.space.wants
+        choices: list[Sequence[str | None]] = []
+        for role in method.open:
+            if role.source is not None:
+                choices.append((None,))
+            elif role.becomes is not None:
+                choices.append(wants.candidates(role.becomes, "", role.kind))
+            else:
+                choices.append(wants.one_of_each(role.kind))
+        ways: list[Roles] = [individuals + chosen for chosen in islice(product(*choices), CHOICES)]
+        return self.ranked(method, ways) if len(ways) > 1 else ways
+
+    def filled(self, method: Method, roles: Roles) -> Iterator[Ground]:
+        """Yield the steps of a method, each as the table tells when those before are done; it ends where the table doesn't tell."""
+        filled = list(roles)
+        first = len(roles) - len(method.open)
+        for name, places in method.steps:
+            for place in places:
+                if filled[place] is None:
+                    situation, arguments = method.open[place - first].source  # type: ignore[misc]
+                    key = key_of(tuple(filled[i] or "" for i in arguments))
+                    filled[place] = self.space.table.now[situation].get(key)
+            individuals = tuple([found for place in places if (found := filled[place]) is not None])
+            if len(individuals) < len(places):
+                return
+            yield name, individuals
+
+    def prefer(self, method: Method) -> None:
+        """Try a method that was just replayed before others of its behaviour that aren't shorter."""
+        known = self.known[method.behavior]
+        if known[0] is not method and len(known[0].steps) >= len(method.steps):
+            known.remove(method)
+            known.insert(0, method)
+
+    def learn(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> None:
+        """Keep the steps that refined a behaviour of some individuals."""
+        known = self.known.setdefault(behavior, [])
+        known.append(self.lifted(behavior, steps, individuals))
+        known.sort(key=lambda method: len(method.steps))
+        del known[METHODS:]
+
+    def lifted(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Method:
+        """Return the steps that refined a behaviour as a method: its individuals are the first roles, other ones open roles."""
+        behaviors = self.space.program.domain.behaviors
+        places: dict[str, int] = {}
+        for place, individual in enumerate(individuals):
+            places.setdefault(individual, place)
+        opened: list[OpenRole] = []
+        lifted = []
+        for name, arguments in steps:
+            one = behaviors[name]
+            terms = dict(zip((p.name for p in one.parameters), arguments, strict=True))
+            for parameter in [p for p in one.parameters if terms[p.name] not in places]:
+                if terms[parameter.name] not in places:
+                    opened.append(open_role(one, parameter.name, parameter.kind, terms, places))
+                    places[terms[parameter.name]] = len(individuals) + len(opened) - 1
+            lifted.append((name, tuple(places[argument] for argument in arguments)))
+        return Method(behavior, len(individuals), tuple(lifted), tuple(opened))
+
+
+def open_role(
+    behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
+) -> OpenRole:
+    """Return how a parameter that no earlier role fills is found: by the condition that determines it, if there is one."""
+    for condition in behavior.preconditions:
+        if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
+            known = [places.get(terms.get(a, a)) for a in condition.arguments]
+            if None not in known:
+                return OpenRole(kind, (condition.situation, tuple(place for place in known if place is not None)), None)
+    becomes = next((effect.situation for effect in behavior.effects if effect.value == parameter), None)
+    return OpenRole(kind, None, becomes)

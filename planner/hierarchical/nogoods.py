@@ -1,0 +1,78 @@
+"""Nogoods: targets that were searched in a scope in vain, with what held in the scope, for all individuals that are alike.
+
+The individuals that the targets name are replaced by roles, as in a method: what failed for one parcel fails for another one that
+static facts don't tell apart from it, where the same holds of the rest of the scope. A nogood saves a search; it never proves that
+there is no plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+from confab.planner.hierarchical.effort import Effort
+from confab.planner.hierarchical.workspace import Keep, Workspace
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.reasoner.symbols import State
+
+Term: TypeAlias = "str | int"
+"""An individual, or the number of a role."""
+Held: TypeAlias = "tuple[str, tuple[Term, ...], Term, Term | None]"
+"""A situation type and its arguments, the value that held, and the one that was to be kept, if any."""
+
+
+class Nogoods:
+    """The nogoods of one program; they stay valid for other initial states and goals."""
+
+    def __init__(self, space: Workspace) -> None:
+        self.space = space
+        self.known: dict[object, list[list[Held]]] = {}
+
+    def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> bool:
+        """Return whether such targets were searched with this effort in vain, in a scope as it is now."""
+        roles = individuals(targets)
+        known = self.known.get(self.key(level, targets, roles, effort))
+        if not known:
+            return False
+        now, names = self.space.table.now, list(roles)
+
+        def named(term: Term | None) -> str | None:
+            return names[term] if isinstance(term, int) else term
+
+        def holds(held: Held) -> bool:
+            situation, arguments, value, kept = held
+            key = key_of(tuple([names[a] if isinstance(a, int) else a for a in arguments]))
+            found = now[situation].get(key)
+            return found is not None and found == named(value) and keep((situation, key), found) == named(kept)
+
+        return any(all(map(holds, nogood)) for nogood in known)
+
+    def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort, around: State) -> None:
+        """Keep that targets were searched with an effort in vain, in a scope in which this held."""
+        roles = individuals(targets)
+
+        def lifted(term: str) -> Term:
+            return roles.get(term, term)
+
+        held: list[Held] = []
+        for symbol, value in around.items():
+            kept = keep((symbol.situation, key_of(symbol.arguments)), value)
+            arguments = tuple([lifted(a) for a in symbol.arguments])
+            held.append((symbol.situation, arguments, lifted(value), None if kept is None else lifted(kept)))
+        held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # what differs most comes first
+        self.known.setdefault(self.key(level, targets, roles, effort), []).append(held)
+
+    def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], effort: Effort) -> object:
+        """Return what tells targets apart, but for individuals that are alike."""
+        pattern = tuple(
+            (situation, tuple([roles[a] for a in arguments_of(key)]), roles.get(value, value))
+            for (situation, key), value in targets.items()
+        )
+        alike = self.space.program.alike.sort
+        return level, effort, pattern, tuple([alike.get(individual, individual) for individual in roles])
+
+
+def individuals(targets: Mapping[Cell, str]) -> dict[str, int]:
+    """Return the individuals that targets name, each with its role."""
+    terms = dict.fromkeys(term for (_, key), value in targets.items() for term in (*arguments_of(key), value))
+    return {term: number for number, term in enumerate(terms)}

@@ -1,0 +1,103 @@
+"""Relevant behaviours: those that give a symbol its wanted value, those that give these what they lack, and so on backwards.
+
+A chain is a sequence of achievers from an applicable behaviour to a wanted value. Its length is a lower bound of the number of
+steps, each unmet condition taken by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TypeAlias
+
+from confab.planner.hierarchical.operators import Achiever
+from confab.planner.hierarchical.subgoals import Env, Want
+from confab.planner.hierarchical.workspace import Ground, Workspace
+from confab.planner.transitions import Cell, Key, arguments_of
+from confab.reasoner.symbols import TRUE
+
+Asked: TypeAlias = "set[tuple[str, Key, str]]"
+"""Values of symbols that were asked for on the way to others."""
+QUESTIONS = 1000
+"""Maximum number of values that the chains towards one value lead through."""
+
+
+def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
+    """Yield each applicable behaviour of a level that starts a chain of at most `depth` steps towards a value in `off`, once."""
+    given: set[Ground] = set()
+    for cell, value in off.items():
+        for length, ground in chains(space, level, cell, value):
+            if length > depth:
+                break
+            if ground is not None and ground not in given:
+                given.add(ground)
+                yield ground
+
+
+def chains(
+    space: Workspace,
+    level: int,
+    cell: Cell,
+    value: str,
+    questions: int = QUESTIONS,
+    met: dict[str, None] | None = None,
+    asked: Asked | None = None,
+) -> Iterator[tuple[int, Ground | None]]:
+    """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
+
+    Layer by layer: the achievers of the value, then the achievers of their unmet conditions. None begins a layer. All individuals
+    on the way are added to `met`, all values to `asked`.
+    """
+    asked = set() if asked is None else asked
+    space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
+    wants: Iterable[Want] = [(*cell, (value,))]
+    if cell[0] in space.program.rules:
+        wants = space.wants.defining(*cell, value == TRUE, level)
+    blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
+    length = 0
+    while (blocked or not length) and len(asked) < questions:
+        length += 1
+        yield length, None
+        if blocked:  # worked out only now: a caller that wants no longer chains has stopped
+            wants = _lacking(space, level, blocked)
+        blocked = []
+        for situation, key, values in wants:
+            for wanted in values:
+                if (question := (situation, key, wanted)) in asked:
+                    continue
+                asked.add(question)
+                for achiever in space.program.achievers.get((level, situation), ()):
+                    achieve = space.achieve[achiever.behavior, achiever.effect]
+                    for arguments, unmet, env in achieve(*arguments_of(key), wanted):
+                        space.look()
+                        if met is not None:
+                            met.update(dict.fromkeys((*arguments_of(key), wanted, *arguments)))
+                            met.update((found, None) for found in env.values() if found) if env else None
+                        if unmet:
+                            blocked.append((achiever, unmet, env))
+                        else:
+                            yield length, (achiever.behavior, arguments)
+
+
+def _lacking(space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]) -> list[Want]:
+    """Return the subgoals of achievers that aren't applicable."""
+    found: list[Want] = []
+    for achiever, unmet, env in blocked:
+        space.check_time()
+        for number in unmet:
+            found += space.wants.towards(achiever, number, env, level)
+    return found
+
+
+def waits_for(space: Workspace, level: int, cell: Cell, value: str) -> list[Cell]:
+    """Return the symbols whose change could make a value attainable in one step."""
+    found: dict[Cell, None] = {}
+    space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
+    if cell[0] in space.program.rules:
+        return [want[:2] for want in space.wants.defining(*cell, value == TRUE, level)]
+    for achiever in space.program.achievers.get((level, cell[0]), ()):
+        for _, unmet, env in space.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
+            space.look()
+            for number in unmet:
+                for situation, key, _ in space.wants.towards(achiever, number, env, level):
+                    found[situation, key] = None
+    return list(found)
