@@ -21,9 +21,12 @@ import confab
 from confab.connecting import connected
 from confab.execution import Execution, execute
 from confab.planner.acting.world import Report
-from confab.planner.plan import Step
+from confab.planner.plan import Limits, Step
 from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
+
+PLANNING = Limits(seconds=300.0)
+"""Of the wall clock: long, since the machine may have other work."""
 
 OUT = Path("confab-out") / "robots"
 SCENES = {1: "rooms-snacks", 2: "rooms-waste", 3: "rooms-breakfast", 4: "rooms-battery"}
@@ -110,7 +113,7 @@ def run(scene: Scene, problem: int, worlds: Path, seed: int, disturbed: bool) ->
     if disturbed:
         world.due, world.hand = draw.randint(2, REFERENCE[problem]), another_hand(draw)
     wall, cpu = perf_counter(), process_time()
-    done: Execution = execute(scene, scene.problem, world=world, patience=replace(patience))
+    done: Execution = execute(scene, scene.problem, world=world, patience=replace(patience, planning=PLANNING))
     episode = done.episode
     truth = at_goal(inner.transport.world, problem)  # type: ignore[attr-defined]
     return {

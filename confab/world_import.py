@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +82,47 @@ def scene_text(interface: Interface, model: Model, name: str, title: str) -> tup
     found = sorted(set(answer), key=str)
     if not found:
         raise KnowledgeError(f"{interface.scene_query} makes nothing of the world model of {interface.name}")
-    text = _turtle(iri, ox.NamedNode(interface.iri.rpartition("#")[0]), found, title)
+    text = _turtle(iri, [interface.iri.rpartition("#")[0]], found, title)
     return text, len({triple.subject for triple in found})
+
+
+def scene_of_graph(source: Path, query: str, path: Path) -> int:
+    """Write the scene that a CONSTRUCT query makes of a foreign graph as Turtle, and return the number of its individuals.
+
+    Parameters
+    ----------
+    source : Path
+        A file of RDF whose terms are of another ontology.
+    query : str
+        The name of a query among the alignments, or its file.
+    path : Path
+        File to write. It imports the shipped ontologies whose terms the query uses.
+
+    Raises
+    ------
+    KnowledgeError
+        A file can't be read, or the query makes nothing of the graph.
+    """
+    file = next((one for one in (Path(query), ontology.ROOT / "alignments" / query) if one.is_file()), None)
+    if file is None:
+        known = ", ".join(sorted(one.name for one in (ontology.ROOT / "alignments").glob("*.rq")))
+        raise KnowledgeError(f"no query '{query}', neither a file nor one of the alignments ({known})")
+    store = ox.Store()
+    formats = {".turtle": ox.RdfFormat.TURTLE, ".owl": ox.RdfFormat.RDF_XML}
+    try:
+        form = formats.get(source.suffix) or ox.RdfFormat.from_extension(source.suffix.lstrip("."))
+        store.load(path=str(source), format=form)
+        answer = store.query(file.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise KnowledgeError(f"{source}, {file.name}: {error}") from error
+    found = sorted(set(answer), key=str) if isinstance(answer, ox.QueryTriples) else []
+    if not found:
+        raise KnowledgeError(f"{file.name} makes nothing of {source}")
+    spaces = {term.value.rpartition("#")[0] for triple in found for term in triple if isinstance(term, ox.NamedNode)}
+    iri = f"https://example.org/{as_iri_part(path.stem)}"
+    text = _turtle(iri, sorted(spaces & {*ontology.shipped()}), found, f"Scene of {source.name}")
+    write_whole(path, stamped(IMPORTED, [text]))
+    return len({triple.subject for triple in found})
 
 
 def _interfaces() -> Mapping[str, Path]:
@@ -120,27 +159,34 @@ def _literal(shown: Any) -> ox.Literal | None:
     return ox.Literal(shown) if isinstance(shown, str) else None
 
 
-def _turtle(iri: str, imported: ox.NamedNode, found: list[ox.Triple], title: str) -> str:
+def _turtle(iri: str, imported: Sequence[str], found: list[ox.Triple], title: str) -> str:
     """Return a scene's triples as Turtle, with a head and labels, all individuals different."""
     individuals = sorted({str(triple.subject.value) for triple in found if isinstance(triple.subject, ox.NamedNode)})
     things = [one for one in individuals if "." not in one.rpartition("#")[2]]
+    labelled = {
+        str(t.subject.value) for t in found if t.predicate.value == LABEL and isinstance(t.subject, ox.NamedNode)
+    }
+    here = ox.NamedNode(iri)
     head = [
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(OWL + "imports"), imported),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(DCTERMS + "title"), ox.Literal(title, language="en")),
-        ox.Triple(ox.NamedNode(iri), ox.NamedNode(CORE + "symbolicOnly"), ox.Literal(True)),
+        ox.Triple(here, ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
+        *(ox.Triple(here, ox.NamedNode(OWL + "imports"), ox.NamedNode(one)) for one in imported),
+        ox.Triple(here, ox.NamedNode(DCTERMS + "title"), ox.Literal(title, language="en")),
+        ox.Triple(here, ox.NamedNode(CORE + "symbolicOnly"), ox.Literal(True)),
     ]
     labels = [
-        ox.Triple(
-            ox.NamedNode(one), ox.NamedNode(LABEL), ox.Literal(one.rpartition("#")[2].replace("_", " "), language="en")
-        )
+        ox.Triple(ox.NamedNode(one), ox.NamedNode(LABEL), ox.Literal(_words(one), language="en"))
         for one in things
+        if one not in labelled
     ]
     spoken = {"": iri + "#", "owl": OWL, "rdfs": RDFS, "xsd": XSD, "c": CORE, "dcterms": DCTERMS}
     terms = [term.value for triple in found for term in triple if isinstance(term, ox.NamedNode)]
     for space in sorted({term.rpartition("#")[0] + "#" for term in terms} - {*spoken.values(), RDF}):
-        spoken[space.rstrip("#").rsplit("/", 1)[-1]] = space
+        spoken[space.rstrip("#").rsplit("/", 1)[-1].removesuffix(".owl")] = space
     body = ox.serialize([*head, *found, *labels], format=ox.RdfFormat.TURTLE, prefixes=spoken) or b""
-    members = " ".join(f":{one.rpartition('#')[2]}" for one in things)
+    members = " ".join(f"<{one}>" for one in things)
     different = f"\n[ a owl:AllDifferent ; owl:distinctMembers ( {members} ) ] .\n"
     return body.decode("utf-8") + different
+
+
+def _words(iri: str) -> str:
+    return iri.rpartition("#")[2].replace("_", " ")

@@ -200,8 +200,11 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 @click.option(
     "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
 )
+@click.option("--by", "query", metavar="QUERY.rq", help="The CONSTRUCT query that makes a scene of a foreign RDF file.")
 @TIME_LIMIT
-def import_(source: str, problem: Path | None, out: Path, level: int, time_limit: float | None) -> None:
+def import_(
+    source: str, problem: Path | None, out: Path, level: int, query: str | None, time_limit: float | None
+) -> None:
     """Turn a PDDL problem, or a robot's world, into a scene.
 
     A robot's world is given as INTERFACE:ADDRESS, or as a world file.
@@ -215,9 +218,10 @@ def import_(source: str, problem: Path | None, out: Path, level: int, time_limit
         )
     with limited(time_limit):
         if problem is None:
-            from confab.world_import import scene_of_world
+            from confab.world_import import scene_of_graph, scene_of_world
 
-            count = scene_of_world(source, turtle_path(out))
+            path = turtle_path(out)
+            count = scene_of_world(source, path) if query is None else scene_of_graph(Path(source), query, path)
             print(f"{out}: {count} individuals; plan in it with: confab plan {out} --goal FACT")
             return
         from confab.pddl_commands import import_pddl

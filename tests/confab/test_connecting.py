@@ -25,7 +25,7 @@ from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
 from confab.sim.robots.http_transport import HttpRobot
 from confab.testing import check_world
-from confab.world_import import scene_text
+from confab.world_import import scene_of_graph, scene_text
 from tests.sim.robot_server import Fault, Robot, interface, served
 
 GOALS = ("ball THING_AT chest_inside", "chest OPEN false")
@@ -195,6 +195,30 @@ def test_an_interface_that_is_not_there_or_lacks_an_action_is_refused_by_name(ro
     alone = confab.load(str(tmp_path / "rover.ttl"))
     with pytest.raises(KnowledgeError, match="#grab has neither a parameter"):
         connected(alone, alone.problem, "rover:http://127.0.0.1:1")
+
+
+SKIROS = """@prefix s: <http://rvmi.aau.dk/ontologies/skiros.owl#> .
+@prefix cora: <http://www.inf.ufrgs.br/phi-group/ontologies/cora.owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+s:Room-1 a s:Room ; rdfs:label "hall" ; s:contain s:Shelf-4 . s:Room-2 a s:Room ; rdfs:label "den" ; s:contain s:Chest-5 .
+s:Door-3 a s:Door ; rdfs:label "door" ; s:Open false ; s:adjacentLocation s:Room-1, s:Room-2 .
+s:Shelf-4 a s:Location ; rdfs:label "shelf" ; s:Open true ; s:contain s:Ball-6 . s:Ball-6 a s:Ball ; rdfs:label "ball" .
+s:Chest-5 a s:Location ; rdfs:label "chest" ; s:Open false .
+cora:Robot-7 a cora:Robot ; rdfs:label "robi" ; s:at s:Room-1 ; s:BatteryPercentage "100"^^xsd:float ."""
+
+
+def test_a_scene_of_another_ontology_is_imported_by_a_query_and_planned_in(tmp_path: Path) -> None:
+    (tmp_path / "foreign.turtle").write_text(SKIROS)
+    count = scene_of_graph(tmp_path / "foreign.turtle", "rooms-from-skiros.rq", tmp_path / "scene.ttl")
+    assert count > 10
+    result = confab.load(str(tmp_path / "scene.ttl")).plan(["Ball-6 THING_AT Chest-5", "Chest-5 OPEN false"])
+    assert result.solved
+    assert [step.behavior for step in result.plan.primitives].count("B2_OPEN_DOOR") == 1
+    with pytest.raises(KnowledgeError, match="makes nothing"):
+        (tmp_path / "empty.ttl").write_text("")
+        scene_of_graph(tmp_path / "empty.ttl", "rooms-from-skiros.rq", tmp_path / "none.ttl")
+    with pytest.raises(KnowledgeError, match="no query 'x'"):
+        scene_of_graph(tmp_path / "foreign.turtle", "x", tmp_path / "none.ttl")
 
 
 # ------------------------------------------------------------------------------------------------------------- the protocol
