@@ -231,7 +231,9 @@ def _solution(
             name += "_"
         terms[one.name] = name
         variables.append(Parameter(name, one.kind))
-    conditions = tuple(substituted(condition, terms) for condition in (*aggregate.conditions, *existing(aggregate)))
+    members = (ClassCondition(p.name, p.kind) for p in aggregate.parameters)  # of others there is no such amount
+    asked = (*members, *aggregate.conditions, *existing(aggregate))
+    conditions = tuple(substituted(condition, terms) for condition in asked)
     return conditions, put_in(aggregate.amount, terms), tuple(variables)
 
 
