@@ -87,6 +87,9 @@ def in_time(
             faults = validate_timed(problem, timed, separation)
             if not faults:
                 return Timed(timed)
+        if not choices.of and until:
+            until = 0.0  # the turns of the plan, in its order
+            continue
         if not choices.of:
             said = faults[0].text if timed is not None else "its steps have no order"
             return Timed(reason=Reason(f"the schedule is no plan in time: {said}"))
@@ -204,4 +207,4 @@ def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
     place = {number: i for i, number in enumerate(old)}
     slots = tuple(replace(timed.slots[n], step=new) for n, new in zip(old, plan.primitives, strict=True))
     arcs = tuple(sorted((place[i], place[j]) for i, j in timed.arcs))
-    return replace(timed, plan=plan, slots=slots, arcs=arcs)
+    return replace(timed, plan=plan, slots=slots, arcs=arcs) if own is None or not validate(problem, plan) else own

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from confab.planner.timed import concurrent
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
+from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, Symbol, Times
@@ -105,3 +107,12 @@ def wrong(world: World) -> str | None:
 
 def test_plans_of_random_timed_worlds_are_plans_and_not_shorter_than_the_shortest() -> None:
     assert {seed: said for seed in range(7_000, 7_120) if (said := wrong(timed_world(seed)))} == {}
+
+
+def test_a_plan_that_leaves_a_level_keeps_its_stretches_in_time(tmp_path: Path) -> None:
+    write_scene(tmp_path / "table.ttl", "swap", 10, 2)
+    problem = read(load(str(tmp_path / "table.ttl"))).problem
+    found = plan(problem).plan
+    assert found is not None
+    timed = in_time(problem, found, 1.0)
+    assert timed.plan is not None, timed.reason
