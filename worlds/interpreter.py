@@ -19,7 +19,7 @@ from heapq import heappop, heappush
 from itertools import product
 from typing import Any
 
-from confab.reasoner.aggregates import in_order
+from confab.reasoner.aggregates import in_order, read_by
 from confab.reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import situations_of, walk
@@ -252,17 +252,23 @@ class Interpreter:
 
     def closed(self, values: list[Any]) -> State:
         """Return a state with all derived values: amounts, then rules, group by group, beginning with none."""
-        for slot in range(self.stated, len(self.symbols)):
-            values[slot] = FALSE
-        for slot, total in self.totals:
-            values[slot] = total(values)
-        for group, recursive in self.rules:
-            more = True
-            while more:
-                found = [slot for slot, test in group if values[slot] == FALSE and test(values)]
-                for slot in found:
-                    values[slot] = TRUE
-                more = recursive and bool(found)
+        reading = any(
+            read_by(one) & self.problem.domain.rules.keys() for one in self.problem.domain.aggregates.values()
+        )
+        for _ in range(
+            1 + len(self.problem.domain.aggregates) if reading else 1
+        ):  # rules and amounts may read each other
+            for slot, total in self.totals:
+                values[slot] = total(values)
+            for slot in range(self.stated, len(self.symbols)):
+                values[slot] = FALSE
+            for group, recursive in self.rules:
+                more = True
+                while more:
+                    found = [slot for slot, test in group if values[slot] == FALSE and test(values)]
+                    for slot in found:
+                        values[slot] = TRUE
+                    more = recursive and bool(found)
         return tuple(values)
 
     def aggregated(self, one: Aggregate) -> Iterator[tuple[int, Any]]:

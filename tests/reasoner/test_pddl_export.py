@@ -10,6 +10,7 @@ import pytest
 from confab.pddl_commands import import_pddl
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Status
+from confab.reasoner.aggregates import compiled, unfolded, with_totals
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.exporting import to_pddl
@@ -30,7 +31,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    spread,
 )
 from confab.reasoner.validation.validate import validate
 from worlds.interpreter import Interpreter, TooManyStatesError
@@ -63,8 +63,10 @@ def round_trip(problem: Problem, level: int | None = None) -> Problem:
 @pytest.mark.parametrize("seed", range(7_000_000, 7_000_020))
 def test_a_random_world_costs_the_same_behind_its_export_on_every_level(seed: int) -> None:
     meant = mixed(seed).problem
-    behaviors = {name: spread(one, meant.classes) for name, one in meant.domain.behaviors.items()}
-    problem = replace(meant, scene="x/d/p", domain=replace(meant.domain, behaviors=behaviors))
+    aggregates = {name: unfolded(one, meant.domain.rules) for name, one in meant.domain.aggregates.items()}
+    domain = compiled(replace(meant.domain, aggregates=aggregates), meant.classes)
+    initial = with_totals(domain, meant.classes, meant.relations, meant.initial)
+    problem = replace(meant, scene="x/d/p", domain=domain, initial=initial)
     for level in problem.domain.levels:
         try:
             again = round_trip(problem, level)
