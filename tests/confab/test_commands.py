@@ -21,6 +21,7 @@ from confab.cli import app
 from confab.examples import EXAMPLES
 
 SLOW = (
+    "world.yaml",
     "confab serve",
     "--episode",
     "--serve",
