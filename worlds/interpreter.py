@@ -140,6 +140,8 @@ class Interpreter:
                 initial.append(0)
         self.totals = [made for one in in_order(domain.aggregates) for made in self.aggregated(one)]
         self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
+        mutual = any(read_by(one) & domain.rules.keys() for one in domain.aggregates.values())
+        self.rounds = 1 + len(domain.aggregates) if mutual else 1  # rules and amounts may read each other
         self.initial = self.closed(initial)
         self.rests = self.unsettled()
         self._actions: dict[int, list[Action]] = {}
@@ -252,12 +254,7 @@ class Interpreter:
 
     def closed(self, values: list[Any]) -> State:
         """Return a state with all derived values: amounts, then rules, group by group, beginning with none."""
-        reading = any(
-            read_by(one) & self.problem.domain.rules.keys() for one in self.problem.domain.aggregates.values()
-        )
-        for _ in range(
-            1 + len(self.problem.domain.aggregates) if reading else 1
-        ):  # rules and amounts may read each other
+        for _ in range(self.rounds):
             for slot, total in self.totals:
                 values[slot] = total(values)
             for slot in range(self.stated, len(self.symbols)):
