@@ -55,7 +55,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     """Make the steps of a call shorter in rounds: one without a time limit, else as long as they pay."""
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    while rounds <= 2 * useful + 2:
+    while rounds < max(1, 2 * useful):
         before, begin = length(call.steps), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)
         rounds, saved = rounds + 1, before - length(call.steps)
