@@ -250,7 +250,8 @@ class _Windows:
 
     def restarted(self, plan: list[int]) -> list[int]:
         """Return a cheaper plan found by a search with all operators, within the remaining work; otherwise the same plan."""
-        most = self.work // max(len(self.task.owners), 1)
+        following = 1 + self.task.derived.effort // WAYS
+        most = self.work // (max(len(self.task.owners), 1) * following)
         found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
         return plan if found is None else shortened(self.task, found, self.deadline)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import pytest
 
 import confab
 from benchmarks.following import scene
-from confab.planner.grounded import plan_windows
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.planner import plan as default_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -84,18 +84,13 @@ def test_what_the_last_resort_finds_keeps_the_levels_where_it_can(monkeypatch: p
     assert sum(tops) > len(tops) / 2 > 5
 
 
-def test_a_plan_of_few_steps_is_not_shortened_on_a_level_of_thousands_of_operators(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It takes .05 s to find, and took a hundred times as long to look for a shorter one."""
-
-    def never(*_: object) -> None:
-        raise AssertionError("the level was grounded")
-
+def test_a_plan_of_few_steps_is_shortened_by_little_work_on_a_level_of_thousands_of_operators(tmp_path: Path) -> None:
+    """What follows from rules counts as work of a search for a shorter plan, which took a minute for a plan of ten steps."""
     path = tmp_path / "cups.ttl"
     path.write_text(scene(66, defined=True), encoding="utf-8")
-    monkeypatch.setattr(plan_windows, "shorter", never)
     problem = confab.load(path).problem
+    begin = process_time()
     found = solve(Request(problem))
     assert found.plan is not None
     assert len(found.plan.steps) == 8
+    assert process_time() - begin < 20
