@@ -69,7 +69,7 @@ def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_pat
         outcome = confab.load(tmp_path / "table.ttl").plan(mode=mode).outcome
         assert outcome.status is Status.UNSOLVABLE, mode
         assert outcome.reason is not None
-        assert "no Hand canReach" in outcome.reason.text
+        assert "a Hand that canReach location7, and there is none" in outcome.reason.text
 
 
 def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:

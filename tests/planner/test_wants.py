@@ -140,6 +140,6 @@ def test_whoever_stands_in_the_wrong_room_wants_the_next_one_though_its_door_is_
 
 
 def test_a_step_that_leads_away_first_and_back_is_refined_by_few_expansions() -> None:
-    outcome = plan(museum(21), limits=Limits(expansions=2_000))
+    outcome = plan(museum(21), limits=Limits(expansions=6_000))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert outcome.plan.length[1] == 1 and not outcome.given_up
