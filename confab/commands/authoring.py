@@ -258,7 +258,7 @@ def export(
     seed: int,
     time_limit: float | None,
 ) -> None:
-    """Write a level as PDDL, or a plan as trajectories or a behaviour tree."""
+    """Write PDDL, trajectories or a behaviour tree."""
     from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load
 

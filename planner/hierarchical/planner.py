@@ -39,6 +39,7 @@ FLAT = 50_000_000
 """What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
 FLAT_ROWS = 30_000
 """The largest join of such a task, on the way to its operators."""
+NOT_LEFT = "levels aren't to be left"
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -111,6 +112,8 @@ def _plan(
         if done or agenda.achieve_all():
             call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
+            if not leave_levels and any(step.level != levels[0] for step in plan.steps):
+                return given_up(call, f"a goal that level {levels[0]} doesn't see takes steps below it: {NOT_LEFT}")
             return call.outcome(Status.SOLVED, plan)
         return last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
@@ -124,9 +127,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
     if upper and not leave_levels:
-        return given_up(
-            call, f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
-        )
+        return given_up(call, f"no plan of level {upper[0]} was found that can be refined, and {NOT_LEFT}")
     if upper:
         call.given_up.append(
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"

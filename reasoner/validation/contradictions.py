@@ -193,13 +193,14 @@ def repeated_names(case: Case) -> Iterator[Fault]:
         return
     problem, names = case.reading.problem, case.reading.names
     told = set[_Inner]()
+    maxima = {p.kind for one in problem.domain.aggregates.values() if not one.kept for p in one.parameters}
     rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
     for name, behavior in (*problem.domain.behaviors.items(), *rules):
         for condition in behavior.conditions:
             for one in _inside_negated(condition, False):
                 outer = behavior.kinds.get(one.term)
-                if outer is None or one in told:
-                    continue
+                if outer is None or one in told or one.kind in maxima:
+                    continue  # a condition on a maximum or minimum restates the class that has it
                 told.add(one)
                 term, anyway = one.term[1:], _below(outer, one.kind, problem)
                 if not anyway and both(case, outer, one.kind):

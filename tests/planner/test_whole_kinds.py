@@ -115,7 +115,7 @@ def test_what_cant_be_meant_of_all_is_said(theatre: Theatre, old: str, new: str,
 
 def test_validation_names_a_class_that_never_has_the_situation_type(theatre: Theatre) -> None:
     found = [f.what for f in validate([theatre("c:about d:Lamp", "c:about d:Circuit")])]
-    assert "the goal night.lit wants LIT of Circuit, which has no such situation type" in found
+    assert "night.lit requires LIT of Circuit, but no Circuit can have that situation type" in found
 
 
 def test_who_is_only_one_of_a_kind_is_not_taken_for_named(theatre: Theatre) -> None:
