@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import count, product
+from itertools import chain, count, islice, product
 
 from confab.reasoner.afterwards import Afterwards, Conjunction, Formula, TooManyCasesError, both, negation
 from confab.reasoner.amounts import (
@@ -40,6 +40,7 @@ from confab.reasoner.amounts import (
 )
 from confab.reasoner.derivation import circular
 from confab.reasoner.language import DomainError, is_variable, mentions, situations_of, walk
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     FALSE,
     Aggregate,
@@ -66,6 +67,9 @@ from confab.reasoner.symbols import (
     substituted,
 )
 
+MOST_CONDITIONS = 2_000
+"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts; more take minutes."""
+
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
     """Return a domain whose behaviours keep its sums and counts, name no maximum or minimum, and no class in an effect.
@@ -77,10 +81,17 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
     """
     domain = extrema_replaced(domain)
     aggregates = domain.aggregates.values()
-    behaviors = {
-        name: spread(kept(behavior, aggregates, domain.situations, classes), classes)
-        for name, behavior in domain.behaviors.items()
-    }
+    behaviors = {}
+    for name, behavior in domain.behaviors.items():
+        check("deriving amounts")
+        behaviors[name] = spread(kept(behavior, aggregates, domain.situations, classes), classes)
+        conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
+        many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))
+        if aggregates and many > MOST_CONDITIONS:
+            raise DomainError(
+                f"{name}: the effects that keep {' and '.join(sorted(domain.aggregates))} take more than {MOST_CONDITIONS} "
+                "conditions; let fewer effects of it change what they are worked out from, or let no derived amount read another"
+            )
     return replace(domain, behaviors=behaviors)
 
 

@@ -135,7 +135,9 @@ def test_a_place_that_no_hand_reaches_is_named() -> None:
     outcome = plan(problem)
     assert outcome.status is Status.UNSOLVABLE
     assert outcome.reason is not None
-    assert outcome.reason.text.startswith("cup1 LOCATION location8 can't be reached: B3_REACH_HAND_LOCATION requires a Hand that canReach location8")
+    assert outcome.reason.text.startswith(
+        "cup1 LOCATION location8 can't be reached: B3_REACH_HAND_LOCATION requires a Hand that canReach location8"
+    )
     assert {"cup1", "LOCATION", "location8", "canReach"} <= set(outcome.reason.terms)
 
 
