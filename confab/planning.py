@@ -244,8 +244,10 @@ def _plan(
         return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
         outcome = search(without(problem, [behavior for behavior, _ in faulty]))
-        if outcome.status is not Status.SOLVED:
-            behavior, why = faulty[0]
+        behavior, why = faulty[0]
+        if outcome.status is Status.GAVE_UP and not leave_levels:
+            outcome = replace(outcome, reason=Reason(f"{why}; without it: {outcome.reason.text if outcome.reason else ''}"))
+        elif outcome.status is not Status.SOLVED:
             raise KnowledgeError(why, seen.names.iri(behavior.name))
     else:
         outcome = search(problem)
