@@ -40,7 +40,7 @@ from confab.reasoner.symbols import (
 Formula: TypeAlias = "Condition | bool"
 Conjunction: TypeAlias = "tuple[Condition, ...] | None"
 """Conditions that all hold; None for a contradiction."""
-MOST_CASES = 64
+MOST_CASES = 24
 """Maximum number of combinations of effects that may change one expression."""
 
 
