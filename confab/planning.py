@@ -243,11 +243,10 @@ def _plan(
         seconds = {**scene.seconds, "quantify": quantified}
         return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
-        outcome = search(without(problem, [behavior for behavior, _ in faulty]))
-        behavior, why = faulty[0]
-        if outcome.status is Status.GAVE_UP and not leave_levels:
-            outcome = replace(outcome, reason=Reason(f"{why}; without it: {outcome.reason.text if outcome.reason else ''}"))
-        elif outcome.status is not Status.SOLVED:
+        doable = without(problem, [behavior for behavior, _ in faulty])
+        outcome = search(doable)
+        if outcome.status is not Status.SOLVED and (leave_levels or not _solved_below(doable, deadline)):
+            behavior, why = faulty[0]
             raise KnowledgeError(why, seen.names.iri(behavior.name))
     else:
         outcome = search(problem)
@@ -270,6 +269,11 @@ def _plan(
     part = None if problem is not seen.problem or seen.whole else seen
     seconds = {**scene.seconds, "quantify": quantified}
     return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed)
+
+
+def _solved_below(problem: Problem, deadline: Deadline) -> bool:
+    """Return whether a task that isn't solved on its levels is solved where these may be left."""
+    return solve(Request(problem, limits=Limits(seconds=deadline.left))).status is Status.SOLVED
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
