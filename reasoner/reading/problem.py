@@ -88,6 +88,7 @@ KINDS = (
     "Condition",
     "Effect",
     "Level",
+    "Span",
     "Task",
     "Relation",
     "Calculation",
