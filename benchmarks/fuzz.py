@@ -350,7 +350,7 @@ def note(failure: Failure) -> None:
 
 
 def fuzz(cases: int, doors: Sequence[str]) -> int:
-    """Try so many cases, each door by its share; record results as they come. Return the number of faults."""
+    """Try `cases` inputs, each door by its share; record results as they come. Return the number of faults."""
     shares = {door: DOORS[door][1] for door in doors}
     begin, done, broke = time.monotonic(), 0, sum(fell for _, fell in tried().values())
     before = broke

@@ -59,7 +59,7 @@ class Ended(NamedTuple):
 def killed(
     write: Callable[[], object], after: float = math.inf, call: float = math.inf, sign: int = signal.SIGKILL
 ) -> Ended:
-    """Run a function in a process of its own; send it a signal after so many CPU seconds, or at one of its calls."""
+    """Run a function in a process of its own; send it a signal after a CPU time, or at one of its calls."""
     made = mmap.mmap(-1, 8)  # shared with the child
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads

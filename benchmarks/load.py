@@ -63,7 +63,7 @@ class Load:
     answers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     async def request(self, kind: str, content: bytes, leave: float | None = None, pause: float = 0.0) -> None:
-        """Send a request, byte by byte if it has pauses, and record the answer; leave after so many seconds."""
+        """Send a request, byte by byte if it has pauses, and record the answer; close the connection after a time."""
         begin = perf_counter()
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         try:

@@ -117,7 +117,7 @@ def marked(mark: str) -> list[int]:
 
 
 def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple[int, int]:
-    """End a command after so many seconds; return how many processes it had started, and how many are left."""
+    """End a command after a time; return the numbers of processes that it had started and that are left."""
     mark = os.environ[MARK] = uuid4().hex
     child = begun(run)
     time.sleep(after)

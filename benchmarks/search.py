@@ -341,7 +341,7 @@ def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
 
 @contextmanager
 def budget(seconds: float) -> Iterator[None]:
-    """Raise `LimitError`, which planners take for their own limit, after so many CPU seconds."""
+    """Raise `LimitError`, which planners take for their own limit, after `seconds` of CPU time."""
 
     def stop(*_: object) -> None:
         raise LimitError(f"{seconds:g} s of CPU")
@@ -356,7 +356,7 @@ def budget(seconds: float) -> Iterator[None]:
 
 
 def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
-    """Return the outcome of a planning call limited to so many CPU seconds."""
+    """Return the outcome of a planning call within a limit of CPU time."""
     try:
         with budget(seconds):
             return variant()

@@ -78,7 +78,7 @@ class Judged:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise `EndlessError` after so many CPU seconds."""
+    """Raise `EndlessError` after `seconds` of CPU time."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise EndlessError

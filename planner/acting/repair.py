@@ -1,4 +1,4 @@
-"""Repair: what of a plan is still valid is kept, the rest is planned anew.
+"""Repair: the steps of a plan that are still valid are kept, the rest is planned anew.
 
 The steps that are still to be done are replayed on one table from the situation as it is. A step is
 

@@ -2,8 +2,8 @@
 
 layer      bits that are reached together; a relaxed operator is reached with the last bit that it needs
 cost       of a bit: of the cheapest operator that sets it, its own number of repetitions plus the costs of what it needs
-repeated   an operator that moves an amount towards a comparison counts as often as that takes: so many times as the amount is
-           away, divided by how far the operator moves it; once where that depends on the state
+repeated   an operator that moves an amount towards a comparison counts as often as the comparison needs: the difference
+           divided by the change that the operator makes; once where that change depends on the state
 plan       the operators behind the goal; those of the first layer are the applicable ones
 
 A goal that isn't reached even so can't be reached at all.

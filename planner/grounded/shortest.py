@@ -1,4 +1,4 @@
-"""Shortest plans of a grounded task: the order of A*, with whatever estimate of what is left it is given.
+"""Shortest plans of a grounded task: the order of A*, with a given estimate of the remaining cost.
 
 g        cost of the operators from the start to a state
 h        what it costs from a state to the goal, infinite where there is no way. With a lower bound what is found is a cheapest

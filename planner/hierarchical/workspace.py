@@ -1,4 +1,4 @@
-"""What every search of one call shares: the table of what holds now, the behaviours bound to it, and the budget.
+"""The state shared by all searches of one call: the table of current values, the behaviours bound to it, and the budget.
 
 table     the present values of all symbols; it is changed in place and undone
 forward   per behaviour, a function of its arguments that returns its changes, or None where it isn't applicable

@@ -20,7 +20,7 @@ Window = tuple[int, int | None]
 
 @dataclass(frozen=True)
 class Network:
-    """The constants of a network: all but the durations, which may depend on who does what.
+    """The constants of a network: everything but the durations, which may depend on the chosen actors.
 
     Attributes
     ----------

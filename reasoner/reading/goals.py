@@ -111,7 +111,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     Raises
     ------
     KnowledgeError
-        Two goals exclude each other, or one says something of what isn't in the scene.
+        Two goals exclude each other, or a goal names an individual that isn't in the scene.
     """
     goal = dict[Symbol, str]()
     for task in tasks:

@@ -115,7 +115,7 @@ def served(robot: Robot) -> Iterator[str]:
         daemon_threads = True
 
         def handle_error(self, *_: object) -> None:
-            pass  # nobody listens to an action that was cancelled
+            pass  # the client has left: the action was cancelled
 
     server = Server(("127.0.0.1", 0), Handler)
     Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
