@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from confab.planner.plan import Limits, Outcome, Status
-from confab.planner.timed.plan import Slot, TimedPlan
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
 from confab.reasoner.symbols import Problem, Span
 from confab.reasoner.timing import only_during
+
+if TYPE_CHECKING:
+    from confab.planner.timed.plan import Slot, TimedPlan
 
 Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
 """What a plan is to have little of."""

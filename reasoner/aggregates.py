@@ -67,8 +67,8 @@ from confab.reasoner.symbols import (
     substituted,
 )
 
-MOST_CONDITIONS = 2_000
-"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts; more take minutes."""
+MOST_CONDITIONS = 5_000
+"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts: a second to bind for search."""
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
