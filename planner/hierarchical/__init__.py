@@ -1,1 +1,1 @@
-"""The default planner: goals in series on one table that is changed in place, levels below as they are needed."""
+"""The default planner: achieves goals one after another on a mutable state table and searches lower levels only as needed."""

@@ -1,12 +1,12 @@
-"""The agenda: goals one after the other on one table, and what was achieved before is kept.
+"""The agenda: achieves the goals one after another on one state table and keeps the goals achieved before.
 
-open     goals to try in one step of the most abstract level
-asleep   goals that something stands in the way of; they wake when a symbol that they wait for changes
-kept     goals that are achieved: later steps may undo them, but must restore them
-before   goals after which others could no longer be achieved (a full cup isn't moved) wait for those
+open     goals to be tried in one step of the most abstract level
+asleep   goals that are blocked; a goal wakes when a symbol that it waits for changes
+kept     achieved goals: later steps may violate them temporarily, but must restore them
+before   ordering constraints: a goal that would make another one unreachable waits for it (a full cup isn't moved)
 
-Where no goal is achieved in one step, more effort is spent, each rung of the ladder dearer than the one before, on each level from
-the top; what nothing has changed for isn't tried again. Steps are refined and done as soon as they are found.
+Where no goal is achieved in one step, the search effort is raised, rung by rung, on each level from the top. An attempt isn't
+repeated unless a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""Minimum number of states of the lowest level that are looked at for a proof: proofs of small tasks against time to search."""
+"""Minimum number of lowest-level states that are examined for a proof: proofs for small tasks against search time."""
 
 
 @dataclass
 class Agenda:
-    """The goals of a call, and what was tried to achieve them.
+    """The goals of a call and the attempts to achieve them.
 
     Attributes
     ----------
     call : Call
     levels : tuple of int, optional
-        The levels whose steps may be done; all if left out. Goals that the first level doesn't see may have steps of any level.
+        The levels whose steps may be used; all if left out. Goals that the first level doesn't see may use steps of any level.
     quickly : bool
         Whether only relevant steps and small scopes are tried.
     solvable : bool
-        Whether it is known that there is a plan, so that nothing is to be proved.
+        Whether the problem is known to be solvable, so that no proof of unsolvability is tried.
     forward : bool
-        Whether what was done stays done: nothing is begun again.
+        Whether applied steps are final: planning never restarts from the initial state.
     """
 
     call: Call
@@ -66,13 +66,13 @@ class Agenda:
 
     @property
     def too_large(self) -> Reason | None:
-        """Why the lowest level can't be grounded, if it is and that was asked."""
+        """Return the reason why the lowest level can't be grounded, if grounding was tried and failed."""
         return self._lowest if isinstance(self._lowest, Reason) else None
 
-    # ------------------------------------------------------------------------------------------------- one after the other
+    # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
-        """Achieve the goals one after the other, with more effort where these get stuck; return whether all are."""
+        """Achieve the goals one after another, with more effort where goals get stuck; return whether all goals hold."""
         call = self.call
         if not self.solvable:
             call.space.doubt = self.doubt
@@ -91,7 +91,7 @@ class Agenda:
             if self._asleep and not self.harder():
                 return False
             self.wake(mark if call.redone == redone else 0)
-            # Where no step was done, a pass has to leave fewer goals asleep: so the loop ends.
+            # If no step was applied, a pass must leave fewer goals asleep; so the loop ends.
             if self._asleep and not self._open and len(call.steps) == steps:
                 there = [cell for cell in self._asleep if call.met(cell)]
                 if not there:
@@ -111,7 +111,7 @@ class Agenda:
         self._open = deque(cell for cell in call.goal if cell not in call.kept)
 
     def at_once(self, cell: Cell) -> bool:
-        """Achieve a goal by advice or one step of the most abstract level; else put it to sleep, and return False."""
+        """Achieve a goal by advice or by one step of the most abstract level; otherwise put it to sleep and return False."""
         call, first = self.call, self.call.program.levels[0]
         unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
         promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
@@ -125,7 +125,7 @@ class Agenda:
         return False
 
     def wake(self, mark: int) -> None:
-        """Open the goals that what was done since a mark concerns: those that waited for it, and those that it undid."""
+        """Open the goals affected by the changes since a mark: those that waited for a changed symbol, and those undone."""
         call, asleep = self.call, self._asleep
 
         def opened(cell: Cell) -> None:
@@ -171,18 +171,18 @@ class Agenda:
                 return True
             if not self.solvable and self.allowed(level):
                 self._prove()
-        if call.progressed:  # something was done since some of these attempts failed
+        if call.progressed:  # the state has changed since some of these attempts failed
             call.failed.clear()
             call.progressed = False
             return self.harder()
         return False
 
     def allowed(self, level: int, cell: Cell | None = None) -> bool:
-        """Return whether steps of a level may be done for a goal."""
+        """Return whether steps of a level may be used for a goal."""
         return self.levels is None or level in self.levels or cell in self.call.unseen
 
     def singly(self, level: int, *efforts: Effort) -> bool:
-        """Achieve one of the sleeping goals with some efforts on a level; return whether that succeeded."""
+        """Achieve one of the sleeping goals with the given efforts on a level; return whether that succeeded."""
         call = self.call
         last = call.unseen.issuperset(self._asleep)
         for cell in self._ready():
@@ -200,13 +200,13 @@ class Agenda:
         return False
 
     def _ready(self) -> Iterator[Cell]:
-        """Yield the sleeping goals that no other has to come before; all, where they wait for each other."""
+        """Yield the sleeping goals whose predecessors are all achieved; all sleeping goals if they wait for each other."""
         call = self.call
         ready = [c for c in self._asleep if all(other in call.kept for other in self._before.get(c, ()))]
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
 
     def advised(self, cell: Cell) -> bool:
-        """Achieve a goal as advised, if there is advice now that wasn't tried; return whether that succeeded."""
+        """Achieve a goal by advice that hasn't been tried yet; return whether that succeeded."""
         call, attempt = self.call, (self.call.program.levels[0], ADVISED)
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
@@ -214,7 +214,7 @@ class Agenda:
         return call.achieve(attempt[0], cell, ADVISED)
 
     def settles(self) -> bool:
-        """Return whether something isn't at rest that steps of lower levels haven't tried to bring to rest."""
+        """Return whether a symbol isn't at rest and steps of lower levels haven't been tried to bring it to rest."""
         call = self.call
         return (
             not (call.settled or call.at_rest())
@@ -223,7 +223,7 @@ class Agenda:
         )
 
     def settle(self) -> bool:
-        """Bring to rest what isn't, so that steps of the first level can begin; return whether there were steps for that."""
+        """Bring all symbols to rest, so that steps of the first level become applicable; return whether that succeeded."""
         call = self.call
         if not self.settles():
             return False
@@ -235,9 +235,10 @@ class Agenda:
         return False
 
     def restart(self, level: int) -> bool:
-        """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was.
+        """Achieve all goals together from the initial state, after goals in series led to a dead end; on failure nothing changes.
 
-        Refinements then leave as it was what no level above sees, if they can: so that no goal gets out of reach unseen.
+        Refinements then keep the symbols that no upper level sees as they were, where possible: otherwise a goal could become
+        unreachable without any upper level noticing.
         """
         call, refiner = self.call, self.call.refiner
         if not call.steps or self.forward or level != call.program.levels[0]:
@@ -257,7 +258,7 @@ class Agenda:
         return False
 
     def together(self, level: int) -> bool:
-        """Achieve all goals at once on a level, from here; return whether that succeeded. It isn't tried twice from one state."""
+        """Achieve all goals together on a level from the present state, at most once per state; return whether that succeeded."""
         call = self.call
         if (
             not self.allowed(level)
@@ -272,14 +273,14 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------------------ proofs
 
     def _doubt(self) -> None:
-        """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
+        """Raise `UnsolvableError` if a cheap test shows that there is no plan."""
         if not self._doubted:
             self._doubted = True
             if proof := impossible(self.call.problem, deadline=self.call.space.deadline):
                 raise proof
 
     def doubt(self) -> None:
-        """Raise `UnsolvableError` if there is no plan and the lowest level is so small that looking at its states is no work."""
+        """Raise `UnsolvableError` if there is no plan and the lowest level is small enough to examine its states cheaply."""
         call = self.call
         if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
             self._prove()
@@ -287,7 +288,7 @@ class Agenda:
     def _prove(self) -> None:
         """Raise `UnsolvableError` if the lowest level shows that there is no plan.
 
-        What is expected is searched first, with as much work as one small world may cost.
+        What the steps are expected to find is searched first, with at most the work of one small scope.
         """
         call = self.call
         if call.advice is not None and call.advice.expects and call.space.worked < WIDER.work:
@@ -307,7 +308,7 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""
+    """Return for each goal the goals that must be achieved before it, since they become unreachable once it holds."""
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None
@@ -330,7 +331,7 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
 
 
 def rules_out(call: Call, first: Cell, then: Cell) -> bool:
-    """Return whether, with goal `first` achieved, no behaviour of the first level could achieve goal `then` any more."""
+    """Return whether no first-level behaviour could achieve goal `then` any more once goal `first` holds."""
     level = call.program.levels[0]
     mark = len(call.table.trail)
     call.table.put(*first, call.goal[first])
@@ -348,7 +349,7 @@ def rules_out(call: Call, first: Cell, then: Cell) -> bool:
 
 
 def attainable(call: Call, level: int, condition: Condition, achiever: Achiever, env: Mapping[str, str | None]) -> bool:
-    """Return whether some behaviour of a level has an effect that could bring an unmet condition about."""
+    """Return whether an effect of a behaviour of the level could make an unmet condition hold."""
     for situation, key, values in call.space.wants.of(achiever, condition, env, level):
         for other in call.program.achievers.get((level, situation), ()):
             for value in values:

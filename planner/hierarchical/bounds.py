@@ -1,12 +1,13 @@
-"""Plans with a proved bound of their distance from the optimum.
+"""Plans with a proved bound on their distance from the optimum.
 
-upper   cost of the best plan so far: the fast planner's, made shorter for as long as that helps
-lower   what any plan costs at least: the least f of A* on the lowest level, with what each goal costs alone and then with LM-cut
+upper   cost of the best plan so far: the default planner's plan, shortened as long as shortening pays
+lower   a lower bound on the cost of every plan: the least f of A* on the lowest level, first with the cost of each goal
+        alone as heuristic, then with LM-cut
 
-When both meet, the plan is optimal. When a limit comes first, both are returned, and their ratio bounds the loss.
+When both meet, the plan is optimal. If a limit is reached first, both are returned, and their ratio bounds the loss.
 
-LM-cut: Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. Relaxed
-operators that are effects of one behaviour share its cost here, which keeps the sum admissible with conditional effects.
+LM-cut: Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. Here the
+relaxed operators that come from one behaviour share its cost, which keeps the sum admissible with conditional effects.
 """
 
 from __future__ import annotations
@@ -42,13 +43,13 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: Compiled | None = None,
 ) -> Outcome:
-    """Plan, and prove a lower bound of the cost of any plan of the lowest level.
+    """Plan, and prove a lower bound on the cost of every lowest-level plan.
 
     Parameters
     ----------
     problem : Problem
     limits : Limits
-        Expansions of each A*; the time is used up unless optimality is proved before.
+        Maximum number of expansions of each A* search; the time limit is used up unless optimality is proved earlier.
     using : Compiled, optional
 
     Returns
@@ -78,7 +79,7 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Improve a plan by more and more orders of the goals, until that no longer helps or half of the time has passed."""
+    """Shorten a plan by trying more and more orders of the goals, until that stops paying or half of the time has passed."""
     begin = perf_counter()
     improve = 2 * ORDERS
     while best.plan is not None and improve <= 64 * ORDERS:
@@ -99,10 +100,10 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
 
 
 def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:
-    """Return a lower bound, and a cheaper plan if one was found on the way.
+    """Return a lower bound, and a cheaper plan if the search found one.
 
-    What is at rest in the beginning is wanted to be so in the end. What wasn't may stay as it was as long as nothing touches it:
-    of that the search knows nothing, so that its bound holds but what it finds may be no plan.
+    Symbols that are at rest initially must be at rest in the end. The others may stay as they are while no step touches them; the
+    search ignores that condition, so its bound is valid, but a sequence that it finds may be no plan.
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))
@@ -131,9 +132,9 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
 
 
 def lm_cut(task: Task, deadline: float | None = None) -> Bound:
-    """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is a bound, too.
+    """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is also a bound.
 
-    Bits are numbered as in the task, with two more: one that always holds, for operators that need nothing, and one that the
+    Bits are numbered as in the task, plus two: one that always holds, for operators without preconditions, and one that the
     goal's bits give at no cost.
     """
     always, end = task.size, task.size + 1
@@ -154,9 +155,9 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
             added_by[bit].append(o)
 
     def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
-        """Return the cost of each bit by its most expensive precondition, and that precondition for each operator (-1.
+        """Return the cost of each bit by its most expensive precondition, and that precondition for each operator.
 
-        Unreachable).
+        The precondition of an operator that can't be reached is -1.
         """
         value = [math.inf] * (task.size + 2)
         missing = [len(bits) for bits in needs]
@@ -195,14 +196,14 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
                 return math.inf
             if value[end] == 0.0:
                 return total
-            zone, waiting = {end}, [end]  # from where the goal costs nothing more
+            zone, waiting = {end}, [end]  # bits from which the goal costs nothing more
             while waiting:
                 for o in added_by[waiting.pop()]:
                     bit = support[o]
                     if bit >= 0 and bit not in zone and (owners[o] < 0 or price[owners[o]] == 0.0):
                         zone.add(bit)
                         waiting.append(bit)
-            before, waiting, cut = set(facts), list(facts), set()  # what is reached without entering the zone
+            before, waiting, cut = set(facts), list(facts), set()  # bits reached without entering the zone
             while waiting:
                 bit = waiting.pop()
                 for o in needed_by[bit]:

@@ -1,6 +1,6 @@
-"""One planning call: the workspace, the goals, and the steps done so far.
+"""One planning call: the workspace, the goals, and the steps applied so far.
 
-A goal is achieved by steps of a level, which are refined and done on the table at once (`Call.achieve`).
+A goal is achieved by steps of a level, which are refined and applied to the table at once (`Call.achieve`).
 """
 
 from __future__ import annotations
@@ -21,42 +21,42 @@ from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 ADVISED = Effort(steps=0, questions=0)
-"""By advice alone."""
+"""Effort that follows advice and searches nothing."""
 
 
 @dataclass
 class Compiled:
-    """What can be kept between calls on problems with the same domain, individuals and static facts."""
+    """The parts of a planning call that are reusable for problems with the same domain, individuals and static facts."""
 
     program: Program
     methods: dict[str, list[Method]] = field(default_factory=dict)
 
 
 def compiled(problem: Problem) -> Compiled:
-    """Compile the behaviours of a problem, for use in any number of calls with other initial states and goals."""
+    """Compile the behaviours of a problem, for any number of calls with other initial states and goals."""
     return Compiled(Program(problem))
 
 
 class GoalAdvice(Advice, Protocol):
-    """Steps that experience proposes for goals, too."""
+    """Steps that experience proposes, for goals as well as for refinements."""
 
     ranked: Ranked
-    """Returns ways to fill the roles of a method, the best first."""
+    """Returns the ways to fill the roles of a method, best first."""
     expects: bool
-    """Whether all goals are of kinds that were reached before."""
+    """Whether all goals are of kinds that were achieved before."""
 
     def ready(self) -> bool:
-        """Return whether advice is to be taken now."""
+        """Return whether the planner should follow advice now."""
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if a goal is promised by one step, 2 if by more, 0 if nothing is promised."""
+        """Return 1 if a rule achieves the goal in one step, 2 if in more steps, 0 if no rule achieves it."""
 
     def waits(self, cell: Cell) -> bool:
-        """Return whether another open goal should come first."""
+        """Return whether another open goal should be achieved first."""
 
 
 class Call:
-    """One planning call: the workspace, the goals that are achieved, and the steps done so far."""
+    """One planning call: the workspace, the goals, and the steps applied so far."""
 
     def __init__(self, problem: Problem, using: Compiled, deadline: float | None, most: int) -> None:
         self.problem = problem
@@ -73,43 +73,43 @@ class Call:
             for cell, value in self.goal.items()
             if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals that the most abstract level doesn't see: its last step is refined so that it brings them about."""
+        """Goals that the most abstract level doesn't see: the refinement of its last step achieves them."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.aim: dict[Cell, str] = {}
-        """The goals that were aimed at last."""
+        """The goals that were last aimed at."""
         self.failed: dict[Cell, set[tuple[int | Effort, ...]]] = {}
         self.progressed = False
         self.redone = 0
-        """Number of times that steps were done from the beginning."""
+        """Number of times that steps were applied from the initial state."""
         self.saving: float | None = None
         """Number of primitives per second that the last round of shortening saved."""
         self.settled = False
-        """Whether steps of lower levels bring to rest what isn't in the beginning."""
+        """Whether steps of lower levels bring symbols to rest that aren't at rest initially."""
 
     def advise(self, advice: GoalAdvice) -> None:
-        """Take advice before any search, for goals and for refinements."""
+        """Follow advice before any search, for goals and for refinements."""
         self.advice = self.refiner.advice = advice
         self.refiner.methods.ranked = advice.ranked
 
     def redo(self, steps: Sequence[RefinedStep]) -> None:
-        """Do steps from the beginning in place of those done so far; marks of the trail from before are void then."""
+        """Replace the steps applied so far by other steps from the initial state; earlier marks of the trail become invalid."""
         self.redone += 1
         self.table.undo(0)
         for step in steps:
             self.refiner.again(step)
 
     def achieve(self, level: int, cell: Cell, *efforts: Effort) -> bool:
-        """Achieve one goal and keep the others, by steps of a level that are refined and done; return whether that succeeded."""
+        """Achieve one goal by refined steps of a level and keep the other goals; return whether that succeeded."""
         return self.reach(level, {cell: self.goal[cell]}, *efforts)
 
     def reach(self, level: int, targets: dict[Cell, str], *efforts: Effort) -> bool:
-        """Do refined steps of a level after which the targets and all goals reached before hold; return whether there are some."""
+        """Apply refined steps of a level after which the targets and all achieved goals hold; return whether steps were found."""
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
         kept: Mapping[Cell, str] = self.kept
-        if level == first and self.unseen:  # its steps needn't keep what it doesn't see
+        if level == first and self.unseen:  # its steps needn't keep symbols that it doesn't see
             kept = {cell: value for cell, value in kept.items() if cell not in self.unseen}
         keep = self.space.keeping(kept)
         last = self.steps[-1] if self.unseen.issuperset(targets) and self.steps else None
@@ -142,11 +142,11 @@ class Call:
         return meets(self.table.now[cell[0]].get(cell[1], FALSE), self.goal[cell])
 
     def at_rest(self) -> bool:
-        """Return whether everything that the uppermost level doesn't see is at rest."""
+        """Return whether every symbol that the uppermost level doesn't see is at rest."""
         return not any(self.restless(level) for level in self.program.levels[1:])
 
     def restless(self, level: int) -> dict[Cell, str]:
-        """Return the rest values of the symbols of a level that aren't at rest."""
+        """Return the rest values of a level's symbols that aren't at rest."""
         return {
             (name, key): situation.rest
             for name, situation in self.problem.domain.situations.items()
@@ -156,12 +156,12 @@ class Call:
         }
 
     def count(self, other: Outcome) -> None:
-        """Count what another search did."""
+        """Add the counts of another search."""
         for level, counts in other.search.items():
             self.space.counts[level].add(counts)
 
     def outcome(self, status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
-        """Return how the call ended, with what it counted."""
+        """Return the outcome of the call, with its counts."""
         cache, given_up = self.refiner, tuple(self.given_up)
         return Outcome(
             status,
@@ -176,7 +176,7 @@ class Call:
         )
 
     def tree(self) -> Plan:
-        """Return the steps done as a plan."""
+        """Return the applied steps as a plan."""
         id_of, variables = self.program.problem.id_of, self.program.variables
 
         def step(done: RefinedStep, path: tuple[int, ...]) -> Step:
@@ -189,16 +189,16 @@ class Call:
 
 
 def fresh_call(call: Call, problem: Problem) -> Call:
-    """Return a call from the beginning once more, that knows which refinements were found and which weren't."""
+    """Return a new call from the initial state that knows which refinements succeeded and which failed."""
     other = Call(problem, call.using, call.space.deadline, call.space.most)
     other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
     return other
 
 
 def settle(call: Call) -> bool:
-    """Bring everything that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
+    """Bring all symbols that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
 
-    An object that is held goes where it is wanted if that takes no longer, else to any place.
+    A held object is taken to the place where a goal requires it if that needs no more steps, otherwise to any place.
     """
     for level in reversed(call.program.levels[1:]):
         targets = call.restless(level)

@@ -1,11 +1,11 @@
-"""A few relevant steps towards some targets, by iterative deepening on the table, which is changed and undone.
+"""Search for a few relevant steps towards some targets, by iterative deepening on a table that is changed and undone.
 
-targets   the symbols that shall get a value, with it
-off       symbols that haven't the value that they must have in the end: the search ends when none is left
-changed   the symbols that differ from the start, with their values: this names a state
+targets   the symbols to be changed, with their wanted values
+off       symbols that don't yet have their required final value: the search ends when none is left
+changed   the symbols that differ from the start, with their values: they identify a state
 
-Only relevant behaviours are tried (`confab.planner.hierarchical.relevance`), so that a shortest sequence of these is found. What
-relevance doesn't admit, and what is too long, is left to the search of a scope (`confab.planner.hierarchical.scope`).
+Only relevant behaviours are tried (`confab.planner.hierarchical.relevance`), so a shortest sequence of relevant steps is found.
+Longer sequences, and other steps, are left to the search of a scope (`confab.planner.hierarchical.scope`).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE
 
 Barred: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
-"""A quantified behaviour, and the changes since the start after which it is barred."""
+"""A quantified behaviour, and the changes since the start in which it is barred."""
 MOST_EXPANSIONS = 150
 """Maximum number of expansions of one search for a few steps."""
 
 
 class Chain:
-    """A search for a few relevant steps, repeated as often as steps turn out not to be refinable."""
+    """A search for a few relevant steps, repeated as long as one of the steps can't be refined."""
 
     def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, longest: int) -> None:
         self.space, self.level, self.targets, self.keep, self.longest = space, level, targets, keep, longest
@@ -36,13 +36,13 @@ class Chain:
         self.barred: set[Barred] = set()
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` takes one of them back."""
+        """Return steps, or None if none were found; `bar` excludes one of them."""
         found = find(self.space, self.level, self.targets, self.keep, self.longest, self.barred)
         self.found = found or []
         return found
 
     def bar(self, position: int) -> None:
-        """Bar a step of those found last in the present state, where it can't be refined."""
+        """Bar one of the steps found last in the state where it couldn't be refined."""
         self.barred.add((self.found[position], frozenset(self.space.table.since(self.mark).items())))
 
 
@@ -54,9 +54,9 @@ def find(
     longest: int,
     barred: AbstractSet[Barred] = frozenset(),
 ) -> list[Ground] | None:
-    """Return the shortest relevant steps, at most `longest`, that achieve all targets and keep the rest; None without any.
+    """Return the shortest sequence of at most `longest` relevant steps that achieves all targets and keeps the rest, or None.
 
-    The table is left as it was found.
+    The table is unchanged afterwards.
     """
     table, now = space.table, space.table.now
     counts, widest = space.counts[level], space.widest[level]
@@ -112,7 +112,7 @@ def _step(
     targets: Mapping[Cell, str],
     keep: Keep,
 ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
-    """Do a behaviour on the table and return what is off and changed after it, or None if it isn't applicable."""
+    """Apply a behaviour to the table; return the symbols off target and changed after it, or None if it isn't applicable."""
     now = space.table.now
     done = space.forward[ground[0]](*ground[1])
     if done is None:

@@ -1,7 +1,7 @@
-"""Detours dropped from a plan: steps of a level that together come to nothing, and that nothing between them needed.
+"""Removal of detours from a plan: steps of a level whose changes cancel out and that no step between them needs.
 
-A lid that is shut where a step ends and opened where the next begins, something put down and taken up again. What is left is put
-under the steps of the levels above again wherever one of these still does what it says.
+Examples: a lid that is shut at the end of a step and opened at the start of the next; an object put down and picked up again.
+The remaining steps are grouped under steps of the upper levels again wherever one of these still has its effect.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from confab.planner.hierarchical.refinement import RefinedStep, Refiner
 from confab.planner.transitions import Cell, Changes
 
 AGAIN = 30
-"""So many times each step is done again, on average, to see what can be done without others."""
+"""Maximum number of times that each step is replayed, on average, to test whether it works without others."""
 
 
 @dataclass(eq=False)
 class _Done:
-    """A step that was done: where it stood among all, itself, its changes, and the mark of the table before it."""
+    """An applied step: its position, the step, its changes, and the mark of the table before it."""
 
     number: int
     step: RefinedStep
@@ -27,22 +27,22 @@ class _Done:
 
 
 def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) -> list[RefinedStep]:
-    """Return steps to the same end without those of a level that come to nothing; the same where there are none.
+    """Return steps with the same final state, without steps of a level that cancel out; the same steps if there are none.
 
     Parameters
     ----------
     refiner : Refiner
-        Its table is in the initial state before and after.
+        Its table is in the initial state before and after the call.
     steps : sequence of RefinedStep
-        Steps that were done from there.
+        Steps that were applied from there.
     level : int
-        What is left out are steps of this level, with their refinements, or of one below where there are none of it.
+        Steps of this level are removed with their refinements; where there are none, steps of the level below.
     """
     table = refiner.table
     owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
     kept = dict(enumerate(part for step in steps for part in parts(step, level)))
     before, left, fewer = 0, AGAIN * len(kept), kept
-    while before != len(fewer):  # what was left out may have been what others were needed for
+    while before != len(fewer):  # others may only have been needed by the removed steps
         before = len(fewer)
         table.undo(0)
         done, left = _lasting(refiner, fewer, owners, left)
@@ -56,7 +56,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
 
 
 def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
-    """Yield the steps of a level in a step, in order; of one below where there are none of it."""
+    """Yield the steps of a level within a step, in order; where there are none, steps of a lower level."""
     if step.level >= level or not step.steps:
         yield step
         return
@@ -67,10 +67,10 @@ def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
 def _lasting(
     refiner: Refiner, steps: Mapping[int, RefinedStep], owners: Sequence[int], left: int
 ) -> tuple[list[_Done], int]:
-    """Do steps but for those that come to nothing and can be left out; return what was done.
+    """Apply the steps that can't be removed; return them.
 
-    Those that one step was refined to (by `owners`) are as they are: its refinement was searched. At most so many are done again as
-    are `left`; what is left of these is returned, too.
+    Steps that refine the same step (by `owners`) stay, since that refinement was searched. At most `left` steps are replayed; the
+    remaining number is returned too.
     """
     table = refiner.table
     done: list[_Done] = []
@@ -93,7 +93,7 @@ def _lasting(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return steps that changed the same symbols and nothing else, the last of which brings back what was before the first."""
+    """Return steps that changed exactly the same symbols, the last of which restores the values before the first."""
     cells = last.changes[0].keys()
     its = [latest[cell] for cell in cells]
     for back in range(2, 1 + min(map(len, its), default=0)):
@@ -106,7 +106,7 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
 
 
 def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
-    """Take back steps that come to nothing, where what is between them can be done without; whether it can."""
+    """Undo steps whose changes cancel out, if the steps between them work without them; return whether they do."""
     table, mark = refiner.table, circle[0].mark
     first = next(i for i in reversed(range(len(done))) if done[i] is circle[0])
     ended, gone = table.since(mark), set(map(id, circle))
@@ -131,10 +131,11 @@ def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> b
 
 
 class _Assembly:
-    """Steps put together again from their parts that were kept, by their numbers, each done on the table once more.
+    """Assembles steps from their remaining parts, by number, and replays each part on the table.
 
-    A step stands as it stood if none of its parts is gone and it still does what it says; not inside a stretch of a lower
-    level, which ends where everything is at rest again that the level of the step doesn't see.
+    A step stays as it was if all of its parts remain and it still has its effect. A step inside a stretch of a lower level
+    doesn't:
+    such a stretch ends where all symbols that the step's level doesn't see are at rest again.
     """
 
     def __init__(self, refiner: Refiner, level: int, kept: Mapping[int, RefinedStep]) -> None:
@@ -143,11 +144,11 @@ class _Assembly:
         self.restless: set[Cell] = set()
 
     def of(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Return what is left of steps."""
+        """Return the remaining parts of steps."""
         return [left for step in steps for left in self.one(step)]
 
     def one(self, step: RefinedStep) -> list[RefinedStep]:
-        """Return a step, or what is left of its steps."""
+        """Return a step, or its remaining sub-steps."""
         table, space = self.refiner.table, self.refiner.space
         begin, end = self.number, self.number + len(list(parts(step, self.level)))
         mark = len(table.trail)

@@ -1,29 +1,29 @@
-"""How hard steps are searched: a few relevant steps first, then scopes, each of which costs about as much as all efforts before."""
+"""Search efforts: a few relevant steps first, then scopes, each of which costs about as much as all efforts before it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 MUCH = 1_500_000
-"""Work of one search in a large scope, in states times operators."""
+"""Maximum work of one search in a large scope, in states times operators."""
 MOST_OPERATORS = 3_000
 """Maximum number of quantified behaviours of a level that is searched as a whole."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard the steps towards some targets are searched.
+    """The limits of one search for steps towards some targets.
 
     Attributes
     ----------
     steps : int
         Maximum number of relevant steps; 0 where a scope is searched instead.
     questions : int, optional
-        Maximum number of values that chains towards one target lead through; None takes the whole level.
+        Maximum number of values on the chains towards one target; None searches the whole level.
     spares : int
-        Number of values of each sort in the scope beside these.
+        Number of additional individuals of each symmetry class in the scope.
     work : int
-        Work of one search, in states times operators.
+        Maximum work of one search, in states times operators.
     """
 
     steps: int = 0
@@ -33,11 +33,11 @@ class Effort:
 
 
 ONE_STEP, FEW_STEPS, REFINING = Effort(steps=1), Effort(steps=3), Effort(steps=4)
-"""One step; the longest sequence of relevant steps towards goals, and in refinements: CPU time against that of scopes."""
+"""One step; maximum number of relevant steps towards goals, and in refinements: CPU time against that of scopes."""
 SMALL, WIDER = Effort(questions=10, spares=0, work=50_000), Effort(questions=20)
 WIDE, WHOLE = Effort(questions=160, spares=4, work=MUCH), Effort(work=MUCH)
 
 
 def scopes(size: int) -> tuple[Effort, ...]:
-    """Return the efforts that search scopes of a level with `size` quantified behaviours, the cheapest first."""
+    """Return the efforts that search scopes of a level with `size` quantified behaviours, cheapest first."""
     return (SMALL, WIDER, WHOLE if size <= MOST_OPERATORS else WIDE)

@@ -1,12 +1,12 @@
-"""What upper levels ask of a change, asked of the lower level's steps as well.
+"""Preconditions that the lower level inherits from the behaviours of the upper levels.
 
-Searching a lower level anew finds ways that the levels above have no step for: that is how a plan gets shorter. But a condition
-that only an upper level states ("a cup that is filled isn't moved") would then no longer be asked. So where plans are made anew,
-each behaviour of the lower level may bring about a value that the upper level knows only where some behaviour of the upper level
-could: its conditions on the individuals of the change itself must hold.
+A search of a lower level finds steps that no step of an upper level stands for; that is how a plan gets shorter. A condition that
+only an upper level states ("a cup that is filled isn't moved") would then be lost. So wherever a level is planned without the
+levels above, a behaviour of the lower level may give a symbol a value that the upper level sees only if some behaviour of the
+upper level could do so: that behaviour's conditions on the changed individuals must hold.
 
-Not asked are conditions on what an upper behaviour names besides (the other vessel), and on the old value of a symbol that is
-between two values of the upper level (the place that something in a hand came from).
+Not inherited are conditions on other individuals of the upper behaviour (the other vessel), and on the old value of a symbol that
+is between two values of the upper level (the place that a held object came from).
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from confab.reasoner.symbols import (
 
 
 def binding(problem: Problem, level: int) -> Domain:
-    """Return the domain with what the levels above `level` ask added to the preconditions of its behaviours.
+    """Return the domain with the preconditions of the levels above `level` added to the behaviours of that level.
 
     Parameters
     ----------
     problem : Problem
     level : int
-        The level that is planned anew.
+        The level that is planned without the levels above.
 
     Returns
     -------
     Domain
-        Its plans on that level are plans of the problem's own domain, too.
+        Its plans on that level are also plans of the problem's own domain.
     """
     domain = problem.domain
     above = [behavior for behavior in domain.behaviors.values() if behavior.level < level]
@@ -58,14 +58,14 @@ def binding(problem: Problem, level: int) -> Domain:
 def _guards(
     problem: Problem, behavior: Behavior, effect: ValueEffect, above: Sequence[Behavior]
 ) -> Iterator[Condition]:
-    """Yield what a level above asks of an effect: at most one condition for each of these levels."""
+    """Yield the conditions that the levels above impose on an effect: at most one for each level."""
     for level in sorted({upper.level for upper in above}):
         if problem.domain.situations[effect.situation].level > level:
             continue
         makers = [(upper, e) for upper in above if upper.level == level for e in upper.effects]
         makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]
         if not makers:
-            continue  # the level has the symbol, but changes it nowhere: what the lower one does with it is left to that one
+            continue  # the level has the symbol, but changes it nowhere: it imposes nothing
         alternatives = [*_between(problem, behavior, effect, level)]
         alternatives += [group for maker in makers for group in _asked(problem, behavior, effect, *maker, level)]
         alternatives += [(AnyOf((effect.when,), negated=True),)] if effect.when else []
@@ -74,7 +74,7 @@ def _guards(
 
 
 def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: int) -> Iterator[tuple[Condition, ...]]:
-    """Yield one alternative for each value of the effect that the level doesn't know: nothing is asked of these."""
+    """Yield one alternative for each value of the effect that the level doesn't see: the level imposes nothing on these."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
@@ -87,7 +87,7 @@ def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: i
 def _asked(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield the conditions under which an upper behaviour's effect could be this one; nothing if it never could."""
+    """Yield the conditions under which an upper behaviour could have this effect; nothing if it never could."""
     terms = upper.kinds
     here = lower.kinds
     names: dict[str, str] = {}
@@ -122,7 +122,7 @@ def _asked(
 
 
 def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
-    """Yield the conditions on what is known, with what these determine put in as witnesses; the others are left out."""
+    """Yield the conditions on known terms, with the variables that they determine replaced by witnesses; drop the others."""
     yield from (condition for condition in conditions if mentions(condition) <= known)
     for condition in conditions:
         if isinstance(condition, ValueCondition) and mentions(condition) - known == {condition.value}:

@@ -1,8 +1,8 @@
-"""Methods: refinements that were found, their individuals replaced by roles: a PICK refined once is refined for all hands.
+"""Methods: refinements with roles in place of individuals, so that a PICK refined for one hand is refined for all hands.
 
-The individuals of the refined step are the first roles of a method. A role that they don't fill is read off the table where a
-condition determines it (the place where the van is), else one individual of each symmetry class is tried. Each replayed step is
-checked (`confab.planner.hierarchical.refinement`): a method may be useless in a state, but never wrong.
+The individuals of the refined step fill the first roles of a method. Any other role is read off the table where a condition
+determines it (the place of the van); otherwise one individual of each symmetry class is tried. Every replayed step is checked
+(`confab.planner.hierarchical.refinement`): a method may be inapplicable in a state, but never wrong.
 """
 
 from __future__ import annotations
@@ -17,41 +17,41 @@ from confab.reasoner.memory.experience import Method, OpenRole
 from confab.reasoner.symbols import Behavior, ValueCondition
 
 METHODS, CHOICES = 6, 24
-"""Maximum number of methods kept of a behaviour, and of ways to fill the open roles of one."""
+"""Maximum number of methods kept per behaviour, and of ways to fill the open roles of one method."""
 
 Roles: TypeAlias = "tuple[str | None, ...]"
-"""The individuals in the roles of a method; None where the table will tell."""
+"""The individuals in the roles of a method; None where the table determines the individual."""
 Ranked: TypeAlias = "Callable[[Method, list[Roles]], list[Roles]]"
 
 
 def as_they_come(method: Method, ways: list[Roles]) -> list[Roles]:
-    """Return ways to fill the roles of a method in their order."""
+    """Return the ways to fill the roles of a method in the given order."""
     return ways
 
 
 class Methods:
-    """The methods of each behaviour, and the individuals for their roles.
+    """The methods of each behaviour, and the individuals that fill their roles.
 
     Parameters
     ----------
     space : Workspace
-    known : dict
+    Methods of earlier calls with the same program; new ones are added.
         From earlier calls over the same program; grows.
     """
 
     def __init__(self, space: Workspace, known: dict[str, list[Method]]) -> None:
         self.space, self.known = space, known
         self.ranked: Ranked = as_they_come
-        """Returns ways to fill the roles of a method, the best first."""
+        """Returns the ways to fill the roles of a method, best first."""
 
     def of(self, behavior: str, individuals: tuple[str, ...]) -> Iterator[tuple[Method, Roles]]:
-        """Yield the methods of a step, the shortest first, each with the ways to fill its roles."""
+        """Yield the methods of a step, shortest first, each with the ways to fill its roles."""
         for method in tuple(self.known.get(behavior, ())):
             for roles in self.ways(method, individuals):
                 yield method, roles
 
     def ways(self, method: Method, individuals: tuple[str, ...]) -> Iterable[Roles]:
-        """Return ways to fill the roles of a method: the step's own individuals, None where the table will tell, others."""
+        """Return the ways to fill the roles of a method: the step's individuals, None for determined roles, other candidates."""
         wants = self.space.wants
         choices: list[Sequence[str | None]] = []
         for role in method.open:
@@ -65,7 +65,7 @@ class Methods:
         return self.ranked(method, ways) if len(ways) > 1 else ways
 
     def filled(self, method: Method, roles: Roles) -> Iterator[Ground]:
-        """Yield the steps of a method, each as the table tells when those before are done; it ends where the table doesn't tell."""
+        """Yield the steps of a method, reading determined roles off the table after each step; stop if the table has no value."""
         filled = list(roles)
         first = len(roles) - len(method.open)
         for name, places in method.steps:
@@ -80,21 +80,21 @@ class Methods:
             yield name, individuals
 
     def prefer(self, method: Method) -> None:
-        """Try a method that was just replayed before others of its behaviour that aren't shorter."""
+        """Move a method that was just replayed before the other methods of its behaviour that aren't shorter."""
         known = self.known[method.behavior]
         if known[0] is not method and len(known[0].steps) >= len(method.steps):
             known.remove(method)
             known.insert(0, method)
 
     def learn(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> None:
-        """Keep the steps that refined a behaviour of some individuals."""
+        """Keep the steps that refined a behaviour with the given individuals."""
         known = self.known.setdefault(behavior, [])
         known.append(self.lifted(behavior, steps, individuals))
         known.sort(key=lambda method: len(method.steps))
         del known[METHODS:]
 
     def lifted(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Method:
-        """Return the steps that refined a behaviour as a method: its individuals are the first roles, other ones open roles."""
+        """Return the steps that refined a behaviour as a method: its individuals become the first roles, others open roles."""
         behaviors = self.space.program.domain.behaviors
         places: dict[str, int] = {}
         for place, individual in enumerate(individuals):
@@ -115,7 +115,7 @@ class Methods:
 def open_role(
     behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
 ) -> OpenRole:
-    """Return how a parameter that no earlier role fills is found: by the condition that determines it, if there is one."""
+    """Return how to find the individual of a parameter that no earlier role fills: by a condition that determines it, if any."""
     for condition in behavior.preconditions:
         if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
             known = [places.get(terms.get(a, a)) for a in condition.arguments]

@@ -1,8 +1,7 @@
-"""Nogoods: targets that were searched in a scope in vain, with what held in the scope, for all individuals that are alike.
+"""Nogoods: targets for which the search of a scope failed, with the state of the scope, generalised over symmetric individuals.
 
-The individuals that the targets name are replaced by roles, as in a method: what failed for one parcel fails for another one that
-static facts don't tell apart from it, where the same holds of the rest of the scope. A nogood saves a search; it never proves that
-there is no plan.
+Individuals named by the targets are replaced by roles, as in a method: what failed for one parcel fails for every parcel with the
+same static facts, if the rest of the scope is in the same state. A nogood saves a search; it never proves that there is no plan.
 """
 
 from __future__ import annotations
@@ -18,18 +17,18 @@ from confab.reasoner.symbols import State
 Term: TypeAlias = "str | int"
 """An individual, or the number of a role."""
 Held: TypeAlias = "tuple[str, tuple[Term, ...], Term, Term | None]"
-"""A situation type and its arguments, the value that held, and the one that was to be kept, if any."""
+"""A situation type and its arguments, the value that held, and the value to be kept, if any."""
 
 
 class Nogoods:
-    """The nogoods of one program; they stay valid for other initial states and goals."""
+    """The nogoods of one program, valid for all initial states and goals."""
 
     def __init__(self, space: Workspace) -> None:
         self.space = space
         self.known: dict[object, list[list[Held]]] = {}
 
     def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> bool:
-        """Return whether such targets were searched with this effort in vain, in a scope as it is now."""
+        """Return whether the search for such targets failed with this effort in a scope in the same state."""
         roles = individuals(targets)
         known = self.known.get(self.key(level, targets, roles, effort))
         if not known:
@@ -48,7 +47,7 @@ class Nogoods:
         return any(all(map(holds, nogood)) for nogood in known)
 
     def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort, around: State) -> None:
-        """Keep that targets were searched with an effort in vain, in a scope in which this held."""
+        """Record that the search for targets failed with an effort, in a scope in the given state."""
         roles = individuals(targets)
 
         def lifted(term: str) -> Term:
@@ -59,11 +58,11 @@ class Nogoods:
             kept = keep((symbol.situation, key_of(symbol.arguments)), value)
             arguments = tuple([lifted(a) for a in symbol.arguments])
             held.append((symbol.situation, arguments, lifted(value), None if kept is None else lifted(kept)))
-        held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # what differs most comes first
+        held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # the most specific facts first
         self.known.setdefault(self.key(level, targets, roles, effort), []).append(held)
 
     def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], effort: Effort) -> object:
-        """Return what tells targets apart, but for individuals that are alike."""
+        """Return the identity of targets, the same for symmetric individuals."""
         pattern = tuple(
             (situation, tuple([roles[a] for a in arguments_of(key)]), roles.get(value, value))
             for (situation, key), value in targets.items()
@@ -73,6 +72,6 @@ class Nogoods:
 
 
 def individuals(targets: Mapping[Cell, str]) -> dict[str, int]:
-    """Return the individuals that targets name, each with its role."""
+    """Return the individuals named by targets, each with its role."""
     terms = dict.fromkeys(term for (_, key), value in targets.items() for term in (*arguments_of(key), value))
     return {term: number for number, term in enumerate(terms)}

@@ -1,12 +1,11 @@
-"""Behaviours compiled to Python source, once per problem: their changes, and the ways in which each effect achieves a value.
+"""Behaviours compiled to Python source, once per problem: their changes, and the bindings with which each effect gives a value.
 
-Beside its function ``forward`` (`confab.planner.transitions`) a behaviour has for every effect one ``achieve(key …, value)``. It
-yields each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
+Besides its function ``forward`` (`confab.planner.transitions`) a behaviour has a function ``achieve(key …, value)`` per effect.
+It yields each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
 
-What enumerates an unbound parameter is, in this order of preference: a static
-relation to what is bound; the inverse of a situation type that nothing can change there; a class. What the state alone
-determines comes last and is *soft*: a static relation that fails on a value which can change is something to want, not a
-dead end.
+An unbound parameter is enumerated by, in this order of preference: a static relation to a bound term; the inverse of a situation
+type that no behaviour can change for these individuals; a class. Terms that only the state determines come last and are *soft*:
+a static relation that fails on a changeable value is a subgoal, not a dead end.
 """
 
 from __future__ import annotations
@@ -42,16 +41,16 @@ from confab.reasoner.symbols import (
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
-"""Yields arguments, positions of unmet conditions, and (if there are any) the binding."""
+"""Yields the arguments, the positions of unmet conditions, and the binding if there are any."""
 
 
 @dataclass(frozen=True)
 class Achiever:
     """One effect of one behaviour, as an achiever of its value.
 
-    `soft` are the conditions that the state can change, by position; `determined` says of which symbol a variable is the
-    value: its situation type and argument terms; of a rule, `determining` has the conditions that do so. If `deep`, what nobody may
-    satisfy is also to be brought about by what somebody is looked for inside of it.
+    `soft` lists the conditions that the state can change, by position. `determined` maps a variable to the symbol whose value it
+    is: situation type and argument terms. For a rule, `determining` lists the conditions that do so. If `deep`, the facts inside
+    a nested witness are subgoals of a negated condition, too.
     """
 
     behavior: str
@@ -66,23 +65,23 @@ class Achiever:
 
 @dataclass
 class Bound:
-    """The compiled functions, bound to one table."""
+    """The compiled functions of a program, bound to one table."""
 
     forward: dict[str, Forward]
     achieve: dict[tuple[str, int], Achieve]
 
 
 FEW = 8
-"""Maximum number of candidates that are all tried; of more, one of each symmetry class."""
+"""Maximum number of candidates that are all tried; of more candidates, one of each symmetry class is tried."""
 
 
 class Program:
-    """The compiled behaviours of one problem, for any table over the same individuals and static facts.
+    """The compiled behaviours of one problem, for any table with the same individuals and static facts.
 
     Parameters
     ----------
     problem : Problem
-        Its initial state and goal aren't looked at.
+        Its initial state and goal aren't used.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -103,7 +102,7 @@ class Program:
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
     def bind(self, table: Table, few: int = FEW) -> Bound:
-        """Return the functions over a table; of more than `few` interchangeable candidates, one is tried."""
+        """Return the functions bound to a table; of more than `few` interchangeable candidates, they try one."""
         if self._rules is not None:
             self._rules.define(table)
         return Bound(*self._bind(table.now, table.who, few))
@@ -119,11 +118,11 @@ class Program:
             return candidates
         groups = self.alike.groups(candidates)
         if len(groups) == len(candidates):
-            return candidates  # none is like another one
+            return candidates  # no two are interchangeable
         return self.alike.unlike(candidates, representatives(groups, who, {}), now)
 
     def size(self, level: int) -> int:
-        """Return the maximum number of quantified behaviours of a level."""
+        """Return an upper bound on the number of quantified behaviours of a level."""
         classes = self.problem.classes
         return sum(
             prod(len(classes.get(parameter.kind, ())) for parameter in behavior.parameters)
@@ -131,14 +130,14 @@ class Program:
         )
 
     def changing(self, level: int) -> list[SituationType]:
-        """Return the situation types, except boolean ones, that a level changes."""
+        """Return the situation types that a level changes, except boolean ones."""
         situations = self.domain.situations
         names = dict.fromkeys(e.situation for behavior in self.domain.at_level(level) for e in behavior.effects)
         return [situations[name] for name in names if not situations[name].boolean]
 
     @cached_property
     def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
-        """For each static relation the tuples of each individual."""
+        """Map each static relation to the tuples of each individual."""
         found: dict[str, dict[str, list[tuple[str, ...]]]] = {}
         for relation, rows in self.problem.relations.items():
             index = found.setdefault(relation, {})
@@ -165,7 +164,7 @@ class Program:
         hard: set[str] = set()
         tests: list[str] = []
         lines: list[str] = []
-        for term, given in zip(given_to, inputs, strict=False):  # behind them what is wanted of an amount
+        for term, given in zip(given_to, inputs, strict=False):  # followed by the wanted value of an amount
             if term.startswith("?") and term not in hard:
                 hard.add(term)
                 lines.append(f"{written(term)} = {given}")
@@ -179,7 +178,7 @@ class Program:
         def emit(text: str) -> None:
             lines.append("    " * depth + text)
 
-        # Hard: tests on what is bound, and enumeration of what isn't.
+        # Hard: tests on bound terms, and enumeration of unbound ones.
         while True:
             ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentions(c) - hard]
             for condition in ready:
@@ -197,7 +196,7 @@ class Program:
             hard.add(term)
             free = [p for p in free if p != term]
             tests.append(self.writer.member(term, kinds[term]))
-        # Soft: what the state determines, and tests on it.
+        # Soft: terms that the state determines, and tests on them.
         emit("unmet = ()")
         bound = set(hard)
         soft: list[Condition] = []
@@ -210,7 +209,7 @@ class Program:
                 and condition.value.startswith("?")
                 and condition.value not in bound
             ):
-                # A binding is made whether or not it is of the right class, for the tests that follow.
+                # The variable is bound even if the value isn't of its class, since later tests use it.
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
                 emit(f"{written(condition.value)} = {self.writer.look(condition)}")
@@ -261,7 +260,7 @@ class Program:
         behavior: Behavior,
         free: Sequence[str],
     ) -> tuple[str, str] | None:
-        """Return the cheapest way to enumerate one more unbound term, as its name and an iterable expression."""
+        """Return the cheapest way to enumerate one more unbound term, as the term's name and an iterable expression."""
         found: list[tuple[float, str, str]] = []
         for condition in waiting:
             match condition:
@@ -309,7 +308,7 @@ class Program:
     ) -> bool:
         """Whether an effect on the level of `behavior` can change a symbol with these terms."""
         if situation in self.domain.rules:
-            return True  # whatever it follows from
+            return True  # whatever its rules depend on
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
             others = other.kinds

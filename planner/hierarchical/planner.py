@@ -1,18 +1,18 @@
 """The default planner: an agenda of goals, each achieved on its level and refined at once; then the plan is shortened.
 
 ======  =========================================================================  =========================================
-word    what is done                                                               module
+word    meaning                                                                    module
 ======  =========================================================================  =========================================
-agenda  goals one after the other, with more effort where these get stuck          `confab.planner.hierarchical.agenda`
-call    achieve a goal: its steps are done on the table and kept                   `confab.planner.hierarchical.call`
-chains  what is relevant to a value, and a few relevant steps                      `confab.planner.hierarchical.chains`
-scope   a part of the world is cut out, grounded and searched flat                 `confab.planner.hierarchical.scope`
-refine  each step is done by steps of the level below: a method, a chain, a scope  `confab.planner.hierarchical.refinement`
-prove   where the agenda gets stuck: that there is no plan                         `confab.planner.hierarchical.unsolvability`
-shorten other orders of the goals, windows of steps, no detours                    `confab.planner.hierarchical.shortening`
+agenda  goals one after another, with more effort where goals get stuck            `confab.planner.hierarchical.agenda`
+call    achieve a goal: its steps are applied to the table and kept                `confab.planner.hierarchical.call`
+chains  relevant achievers of a value, and a few relevant steps                    `confab.planner.hierarchical.chains`
+scope   a part of the world is cut out, grounded and searched without levels       `confab.planner.hierarchical.scope`
+refine  replace a step by lower-level steps: a method, a chain, a scope            `confab.planner.hierarchical.refinement`
+prove   when the agenda gets stuck: test whether there is no plan                  `confab.planner.hierarchical.unsolvability`
+shorten other orders of the goals, windows of steps, removal of detours            `confab.planner.hierarchical.shortening`
 ======  =========================================================================  =========================================
 
-What is concluded from a level above the lowest is never that there is no plan.
+A failed search of a level above the lowest never proves that there is no plan.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from confab.reasoner.symbols import Problem, Symbol
 __all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
 
 FLAT = 50_000_000
-"""What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
+"""Maximum work of planning a task of one level as a whole before goals in series, in bits of relaxed plans: some seconds."""
 FLAT_ROWS = 30_000
-"""The largest join of such a task, on the way to its operators."""
+"""Maximum number of rows of a join when such a task is grounded."""
 NOT_LEFT = "levels aren't to be left"
 SEARCHING = 0.93
-"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
+"""Share of the time limit that is used for search; the rest is for releasing memory."""
 
 
 def alone(call: Call) -> None:
-    """Take no advice."""
+    """Follow no advice."""
 
 
 def plan(
@@ -57,20 +57,20 @@ def plan(
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
 ) -> Outcome:
-    """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
+    """Plan with goals in series on a mutable state table, refining each step at once.
 
     Parameters
     ----------
     problem : Problem
     limits : Limits
     improve : int
-        How many other orders of the goals are tried to shorten the first plan, and how much work that is; none leaves it as it is.
+        Work for shortening the first plan, by other orders of the goals and other means; 0 leaves it as it is.
     using : Compiled, optional
-        From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
+        From `compiled`, for a problem with the same domain, individuals and static facts; saves the compilation.
     leave_levels : bool
-        Whether steps of a lower level may stand where a level has no plan that can be refined.
+        Whether steps of a lower level may take the place of a level that has no refinable plan.
     advised : function of a call, optional
-        Lets advice in.
+        Attaches advice to the call.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def _plan(
     one_level = improve > 0 and len(problem.domain.levels) == 1
     flat = None
     if one_level and advised is alone:
-        flat = flat_first(problem, limits, deadline)  # compiling thousands of conditional effects would take longer
+        flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED:
             return flat
     call = Call(problem, using or compiled(problem), deadline, limits.expansions)
@@ -123,7 +123,7 @@ def _plan(
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
-    """Plan the lowest level alone, flat, unless levels aren't to be left or it is too large."""
+    """Plan the lowest level as a whole, unless levels must not be left or the level is too large."""
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
     if upper and not leave_levels:
@@ -140,26 +140,27 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest)
     plan = next((plan for plan in plans if plan is flat.plan or not validate(problem, plan)), None)
     if plan and upper and all(step.level == upper[0] for step in plan.steps):
-        call.given_up.clear()  # there are steps of it after all
+        call.given_up.clear()  # the plan has steps of that level after all
     return call.outcome(flat.status, plan, flat.reason)
 
 
 def given_up(call: Call, why: str) -> Outcome:
-    """Return that planning gave up, with where it was."""
+    """Return an outcome that says that planning gave up, and at which point."""
     from confab.planner.hierarchical.stuck import gave_up
 
     return call.outcome(Status.GAVE_UP, reason=gave_up(call, why))
 
 
 def by_rules_alone(call: Call) -> bool:
-    """Achieve the goals one after the other as rules advise, if they know all kinds of them; whether that succeeded."""
+    """Achieve the goals one after another by rules, if rules exist for all of their kinds; return whether that succeeded."""
     return call.advice is not None and call.advice.expects and Agenda(call, (), solvable=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
-    """Plan a task of one level as a whole by bounded work; it is given up where that isn't enough.
+    """Plan a task of one level as a whole with bounded work; give up where that isn't enough.
 
-    One level has no refinements for goals in series to go by, and may be too large to be grounded, or its goals too many.
+    A task of one level has no refinements that could guide goals in series, and may be too large to be grounded, or have too many
+    goals.
     """
     from confab.planner.grounded.best_first import plan_level
 
@@ -169,7 +170,7 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 
 
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
-    """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
+    """Plan the lowest level from the initial state; if a plan leaves a touched symbol not at rest, require rest of all."""
     from confab.planner.grounded.best_first import plan_level
 
     problem, deadline, lowest = call.problem, call.space.deadline, call.program.levels[-1]
@@ -183,9 +184,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
         call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break
-    if (
-        wanted is not goal and flat.status is Status.UNSOLVABLE
-    ):  # a plan may be left that doesn't touch all that doesn't rest
+    if wanted is not goal and flat.status is Status.UNSOLVABLE:  # a plan that touches fewer symbols may still exist
         return replace(
             flat, status=Status.GAVE_UP, reason=Reason("plans were found that leave what they touch not at rest")
         )

@@ -1,11 +1,12 @@
-"""The recursion: targets are achieved by steps of one level, and each of these is done by achieving its effects on the level below.
+"""The recursion: steps of one level achieve targets; each step is refined by achieving its effects on the level below.
 
-achieve   targets, by steps of a level: methods replayed, then a few relevant steps, then scopes; steps that are found are done
-do        a step: on the lowest level its changes are made; on another its effects are the targets of the level below, all that its
-          own level sees is kept as it was, and what is touched is at rest in the end (docs/levels.md)
+achieve   targets by steps of a level: replayed methods, then a few relevant steps, then scopes; steps found are applied
+do        a step: on the lowest level, make its changes; on another level, achieve its effects as targets of the level below,
+                    with all symbols that its own level sees unchanged, and all touched symbols at rest in the end
+                    (docs/levels.md)
 
-A step that can't be done is barred in the state where it was tried, and the search goes on without it. What succeeded for a step is
-kept as a method, what failed in a scope as a nogood.
+A step that can't be refined is barred in the state where it was tried, and the search continues without it. A successful
+refinement is kept as a method, a failed search of a scope as a nogood.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE
 
 LONG = 4
-"""Minimum number of steps of a method from which on replayed steps that aren't needed here are left out."""
+"""Minimum number of steps of a method whose needless steps are removed after it is replayed."""
 ATTEMPTS, FEW_ATTEMPTS = 40, 4
-"""Maximum number of searches for steps that can all be done; and as long as something isn't at rest that may be in the way."""
+"""Maximum number of searches for refinable steps; and the number while symbols that aren't at rest may block them."""
 
 
 class RefinedStep(NamedTuple):
-    """A step that was done: the individuals of its variables are `bindings`, `steps` refine it."""
+    """An applied step: `bindings` are the individuals of its variables, `steps` its refinement."""
 
     level: int
     behavior: str
@@ -41,9 +42,9 @@ class RefinedStep(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A step that is to be refined: its behaviour, its arguments with the individuals of its variables, and how.
+    """A step to be refined: its behaviour, its arguments, the individuals of its variables, and the manner.
 
-    If `careful`, what the level above doesn't see is left as it was.
+    If `careful`, symbols that the level above doesn't see keep their values.
     """
 
     behavior: str
@@ -52,20 +53,20 @@ class Task(NamedTuple):
 
 
 class Advice(Protocol):
-    """Steps that experience proposes before they are searched."""
+    """Policy that proposes steps before they are searched."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
-        """Do steps that achieve the targets and keep the rest; None, and the table as it was, without any."""
+        """Apply steps that achieve the targets and keep the rest; on failure return None and leave the table unchanged."""
 
 
 class Refiner:
-    """Achieves targets and does steps on the table of a workspace.
+    """Achieves targets and applies steps on the table of a workspace.
 
     Parameters
     ----------
     space : Workspace
     methods : dict
-        From earlier calls over the same program; grows.
+        Methods of earlier calls with the same program; new ones are added.
     """
 
     def __init__(self, space: Workspace, methods: dict[str, list[Method]]) -> None:
@@ -79,17 +80,17 @@ class Refiner:
         situations = space.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
-        """Refinements by task and state: they are done again where the agenda comes to the same state once more."""
+        """Refinements by task and state: they are replayed when the agenda reaches the same state again."""
         self.careful = False
-        """Whether refinements leave as it was what the level above doesn't see, if they can."""
+        """Whether refinements keep symbols that the level above doesn't see as they were, where possible."""
         self.hasty = False
         """Whether refinements are searched in small scopes only."""
         self.advice: Advice | None = None
         self.at: Ground | None = None
-        """The step of the most abstract level that is being refined, or couldn't be."""
+        """The step of the most abstract level that is being refined, or whose refinement failed."""
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
-        """Do a step, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
+        """Apply a step, refined to primitives, and return it; on failure return None and leave the table unchanged."""
         done = self.space.forward[name](*arguments)
         if done is None:
             return None
@@ -119,7 +120,7 @@ class Refiner:
         efforts: Sequence[Effort],
         task: Task | None = None,
     ) -> Sequence[RefinedStep] | None:
-        """Do steps of a level after which the targets hold and the rest is kept; None, and the table as it was, without any.
+        """Apply steps of a level after which the targets hold and the rest is kept; on failure return None, the table unchanged.
 
         Parameters
         ----------
@@ -129,7 +130,7 @@ class Refiner:
         efforts : sequence of Effort
             Tried one after the other.
         task : Task, optional
-            The step that is refined; without one the targets are goals.
+            The step to be refined; without one the targets are goals.
         """
         here: object = None
         if task is not None:
@@ -157,9 +158,9 @@ class Refiner:
         return found
 
     def searched(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> list[RefinedStep] | None:
-        """Search steps of a level with one effort, and do them; None, and the table as it was, without any.
+        """Search steps of a level with one effort and apply them; on failure return None and leave the table unchanged.
 
-        Steps that touch something and leave it wrong are searched again with this as a target, too.
+        If steps leave a touched symbol with a wrong value, the search is repeated with that symbol as an additional target.
         """
         if effort.steps == 0 and self.nogoods.apply(level, targets, keep, effort):
             return None
@@ -193,10 +194,10 @@ class Refiner:
             self.nogoods.learn(level, targets, keep, effort, first_search.held)
         return None
 
-    # ----------------------------------------------------------------------------------------------------- what must hold
+    # ---------------------------------------------------------------------------------------------------- required values
 
     def targets(self, changes: Sequence[Change]) -> dict[Cell, str]:
-        """Return the changes that make a difference in the present state."""
+        """Return the changes whose values differ from the present state."""
         now = self.table.now
         found: dict[Cell, str] = {}
         for situation, key, value in changes:
@@ -205,7 +206,7 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def left_wrong(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a symbol touched since a mark, or a target, that hasn't the value that it must have; None if all have."""
+        """Return a target, or a symbol touched since a mark, that doesn't have its required value; None if all have it."""
         now = self.table.now
         for cell, first in self.table.before(mark).items():
             wanted = targets.get(cell) or keep(cell, first)
@@ -215,12 +216,12 @@ class Refiner:
             (cell for cell, value in targets.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)), None
         )
 
-    # ---------------------------------------------------------------------------------------------------- steps done again
+    # ------------------------------------------------------------------------------------------------------ replayed steps
 
     def replay(
         self, level: int, method: Method, roles: Roles, targets: Mapping[Cell, str], keep: Keep
     ) -> list[RefinedStep] | None:
-        """Do the steps of a method; None, and the table as it was, if one can't be done or something is left wrong."""
+        """Apply the steps of a method; return None, the table unchanged, if a step fails or a symbol gets a wrong value."""
         mark, steps = len(self.table.trail), list[RefinedStep]()
         for name, arguments in self.methods.filled(method, roles):
             step = self.do(level, name, arguments)
@@ -235,7 +236,7 @@ class Refiner:
         return steps
 
     def pruned(self, steps: list[RefinedStep], mark: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep]:
-        """Return steps, done since a mark, without those that nothing here needs: one alone, or a pair that comes to nothing."""
+        """Return the steps done since a mark without needless ones: single steps, or pairs that undo each other."""
         for dropped in self._idle(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
             if self._redone(rest, mark) and self.left_wrong(mark, targets, keep) is None:
@@ -244,12 +245,12 @@ class Refiner:
         return steps
 
     def _redone(self, steps: Sequence[RefinedStep], mark: int) -> bool:
-        """Do steps in place of what was done since a mark; return whether all could be done."""
+        """Replace the steps applied since a mark by other steps; return whether all are applicable."""
         self.table.undo(mark)
         return all(self.again(step) is not None for step in steps)
 
     def _idle(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
-        """Return single steps that change only symbols which may have any value in the end, and pairs that undo each other."""
+        """Return single steps that change only symbols whose final values don't matter, and pairs that undo each other."""
         self.table.undo(mark)
         changes: list[Changes] = []
         for step in steps:
@@ -262,7 +263,7 @@ class Refiner:
         return alone + [{i, j} for j, (old, new) in enumerate(changes) for i in range(j) if changes[i] == (new, old)]
 
     def again(self, step: RefinedStep) -> RefinedStep | None:
-        """Do a step once more by the same sub-steps, and return it with its present bindings; None if it can't be done."""
+        """Replay a step with the same sub-steps and return it with its present bindings; None if it isn't applicable."""
         level, name, arguments, _, below = step
         done = self.space.forward[name](*arguments)
         if done is None:
@@ -285,7 +286,7 @@ class Refiner:
         return RefinedStep(level, name, arguments, done[0], tuple(inner))
 
     def redo(self, step: RefinedStep) -> bool:
-        """Do the primitives of a step that was done in this very state before; return whether all could be done."""
+        """Apply the primitives of a step that was applied in this same state before; return whether all were applicable."""
         if step.steps:
             return all(self.redo(child) for child in step.steps)
         done = self.space.forward[step.behavior](*step.arguments)
@@ -295,7 +296,7 @@ class Refiner:
 
 
 def begun(space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> Chain | Scope:
-    """Return the search that an effort stands for."""
+    """Return the search that an effort specifies."""
     if effort.steps:
         return Chain(space, level, targets, keep, effort.steps)
     return Scope(space, level, targets, keep, effort)

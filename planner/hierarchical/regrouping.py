@@ -1,4 +1,4 @@
-"""Regrouping: steps of one level put below behaviours of the levels above that have the same effect."""
+"""Regrouping: groups steps of one level under behaviours of the upper levels that have the same effect."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ LONGEST = 60
 
 
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan of one level with runs of its steps below steps of the levels above that have the same effect.
+    """Return a plan of one level with runs of its steps grouped under steps of the upper levels that have the same effect.
 
-    As few as can be stay by themselves. Nothing is asked of the plan here: what the checker refuses is no plan.
+    As few steps as possible stay ungrouped. The result may violate the rules of levels; the checker then refuses it.
     """
     steps = list(plan.steps)
     for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
         try:
             grouped = _grouped(problem, steps, level)
-        except OutOfTimeError:  # the plan stays as it is
+        except OutOfTimeError:  # the plan stays ungrouped
             break
         if grouped == steps:
             break
@@ -35,12 +35,12 @@ def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
 
 
 def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
-    """Return steps with as many as possible below as few steps of a level as possible, each run with its step's effect.
+    """Return the steps grouped, first as many as possible, under as few steps of a level as possible with the same effects.
 
-    Where a run begins and ends, all is at rest that the level doesn't see and that was touched.
+    At both ends of a run all touched symbols that the level doesn't see are at rest.
     """
     try:
-        task = ground(problem, level, goal={})  # which may be none that it sees
+        task = ground(problem, level, goal={})  # the level may see none of the goals
     except (UngroundableError, OutOfTimeError):
         return steps
     values = _course(problem, steps)
@@ -48,7 +48,7 @@ def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
         return steps
     states = [_state(task, value) for value in values]
     at_rest = list(_at_rest(problem, values, level))
-    best: list[tuple[int, int, int, int]] = [(0, 0, -1, -1)]  # steps by themselves, steps of the level, begin, operator
+    best: list[tuple[int, int, int, int]] = [(0, 0, -1, -1)]  # ungrouped steps, steps of the level, begin, operator
     best += [(i, 0, i - 1, -1) for i in range(1, len(states))]
     for i, state in enumerate(states[:-1]):
         alone, many = best[i][:2]

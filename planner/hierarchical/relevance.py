@@ -1,7 +1,7 @@
-"""Relevant behaviours: those that give a symbol its wanted value, those that give these what they lack, and so on backwards.
+"""Relevant behaviours: achievers of a wanted value, achievers of their unmet conditions, and so on backwards.
 
-A chain is a sequence of achievers from an applicable behaviour to a wanted value. Its length is a lower bound of the number of
-steps, each unmet condition taken by itself.
+A chain is a sequence of achievers from an applicable behaviour to a wanted value. Its length is a lower bound on the number of
+steps, each unmet condition considered alone.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from confab.planner.transitions import Cell, Key, arguments_of
 from confab.reasoner.symbols import TRUE
 
 Asked: TypeAlias = "set[tuple[str, Key, str]]"
-"""Values of symbols that were asked for on the way to others."""
+"""Values of symbols that were examined as subgoals of others."""
 QUESTIONS = 1000
-"""Maximum number of values that the chains towards one value lead through."""
+"""Maximum number of values on the chains towards one value."""
 
 
 def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
@@ -44,8 +44,9 @@ def chains(
 ) -> Iterator[tuple[int, Ground | None]]:
     """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
 
-    Layer by layer: the achievers of the value, then the achievers of their unmet conditions. None begins a layer. All individuals
-    on the way are added to `met`, all values to `asked`.
+    The search is layer by layer: achievers of the value, then achievers of their unmet conditions. None marks the start of a
+    layer.
+    Individuals on the way are added to `met`, values to `asked`.
     """
     asked = set() if asked is None else asked
     space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
@@ -57,7 +58,7 @@ def chains(
     while (blocked or not length) and len(asked) < questions:
         length += 1
         yield length, None
-        if blocked:  # worked out only now: a caller that wants no longer chains has stopped
+        if blocked:  # calculated late: a caller that needs no longer chains has stopped
             wants = _lacking(space, level, blocked)
         blocked = []
         for situation, key, values in wants:
@@ -89,7 +90,7 @@ def _lacking(space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[i
 
 
 def waits_for(space: Workspace, level: int, cell: Cell, value: str) -> list[Cell]:
-    """Return the symbols whose change could make a value attainable in one step."""
+    """Return the symbols whose change could make a value reachable in one step."""
     found: dict[Cell, None] = {}
     space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
     if cell[0] in space.program.rules:

@@ -1,14 +1,14 @@
-"""A scope: a part of the world, grounded and searched flat, for what no short chain of relevant steps achieves.
+"""A scope: a part of the world, grounded and searched without levels, where no short chain of relevant steps suffices.
 
-focus      the individuals that may act and be acted on: those of the targets, and those that chains towards the targets meet
-frozen     others that have a value of theirs, or that a condition looks for: they stand where they stand, so that whether there is
-           an individual such that … is judged as in the whole world
-targets    the symbols that shall get a value; what is kept besides is said by a function, as for
+focus      the individuals that take part: those of the targets, and those on the chains towards the targets
+frozen     other individuals that are values of those in focus or that a condition quantifies over: their state is fixed, so that
+                      conditions such as "there is an individual such that …" are evaluated as in the whole world
+targets    the symbols to be changed, with their wanted values; a function gives the values that others must keep, as for
 `confab.planner.hierarchical.chains`
 
-What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
-proves nothing. Everything is done on one level; the caller refines the steps and bars those that can't be. The room that grounds
-and searches is imported where a scope is searched: numpy alone takes longer to import than a small task to plan.
+The state of the individuals in focus is exact, so steps found here are applicable in the whole world; a failed search proves
+nothing. A scope has one level; the caller refines the steps and bars those that can't be refined. The package that grounds and
+searches is imported only when a scope is searched, since importing numpy takes longer than planning a small task.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 4
-"""Classes of so few individuals (the hands) are part of every scope, and so many holders of one value are."""
+"""Maximum size of a class that is part of every scope (the hands), and maximum number of holders of a value in a scope."""
 
 BITS = 20
-"""Bits that a flat search follows for each relaxed operator of a state, with what it does besides."""
+"""Bits processed per relaxed operator and state by a search without levels, overhead included."""
 LEAST, MAKING = 300, 100
-"""A task counts as having at least so many relaxed operators, since a state costs something whatever can be done there; and
-making it as much as looking at so many states. A scope of which not a fifth as many could be looked at isn't grounded."""
+"""Minimum number of relaxed operators that a task counts as having, and the cost of grounding it, in states examined. A scope
+isn't grounded if the budget would allow fewer than a fifth of that number of states."""
 
 
 class Scope:
-    """A scope on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
+    """A scope on one level in the present state: a grounded task, searched again whenever a step can't be refined."""
 
     def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> None:
         self.space, self.level, self.effort = space, level, effort
@@ -74,7 +74,7 @@ class Scope:
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
-            # What isn't at rest may stay so; who touches it is found out by the caller.
+            # A symbol that isn't at rest may stay so; the caller detects steps that touch it.
             if wanted is not None and meets(value, wanted):
                 goal.setdefault(symbol, wanted)
         for cell in space.defined:
@@ -84,7 +84,7 @@ class Scope:
         return ground(small, level, goal=goal, most=5 * effort.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` takes one of them back."""
+        """Return steps, or None if none were found; `bar` excludes one of them."""
         from confab.planner.grounded.best_first import search
 
         if self.task is None:
@@ -101,7 +101,7 @@ class Scope:
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
     def bar(self, position: int) -> None:
-        """Take back the plan that was found last because of one of its steps, which can't be refined where it stands."""
+        """Exclude the plan that was found last because one of its steps can't be refined at its position."""
         assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:
@@ -111,7 +111,7 @@ class Scope:
 
 
 def focus(space: Workspace, level: int, targets: Mapping[Cell, str], effort: Effort) -> set[str] | None:
-    """Return the individuals that acting towards the targets may concern; None are all."""
+    """Return the individuals relevant to reaching the targets; None stands for all."""
     if effort.questions is None:
         return None
     program, table = space.program, space.table
@@ -125,7 +125,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], effort: Eff
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
     met.update(dict.fromkeys(space.wants.spare(met, level, effort.spares)))
-    for individual in tuple(met):  # what these have, and who has what these are, as far as these are few
+    for individual in tuple(met):  # their values, and holders of them where these are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
                 continue
@@ -141,7 +141,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], effort: Eff
 def problem_of(
     space: Workspace, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
 ) -> Problem:
-    """Return one level of the problem as it is now, without a goal, of the individuals inside alone, or of all."""
+    """Return one level of the problem in the present state, without a goal, restricted to `inside`, or of all individuals."""
     program, table = space.program, space.table
     problem = program.problem
     situations = problem.domain.situations
@@ -160,7 +160,7 @@ def problem_of(
         behaviors[behavior.name] = replace(behavior, parameters=tuple(parameters))
     relations = {}
     for relation, rows in program.rows_of.items():
-        individuals = -1 if relation in program.measures else None  # a number isn't one
+        individuals = -1 if relation in program.measures else None  # numbers aren't individuals
         within = (row for one in there for row in rows.get(one, ()) if there >= set(row[:individuals]))
         relations[relation] = frozenset(within)
     initial = {
@@ -175,10 +175,11 @@ def problem_of(
 
 
 def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
-    """Return individuals with those on whom it depends what they can do, though these don't take part.
+    """Return the individuals together with those that their conditions depend on, though the latter don't take part.
 
-    These are the values that they have, the values of these and so on; and where a behaviour asks whether there is an individual
-    such that …, those who have one of them as a value, and those in a static relation to them.
+    The latter are their values, the values of these and so on; where a behaviour quantifies over individuals, also the
+    individuals
+    that have one of them as a value, and those in a static relation to one of them.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)
@@ -199,7 +200,7 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
         while waiting:
             individual = waiting.pop()
             for situation, cells in table.now.items():
-                value = dict.get(cells, individual)  # of what is kept, nothing is worked out
+                value = dict.get(cells, individual)  # read without calculating derived values
                 if value is not None and value not in met and program.domain.situations[situation].level <= level:
                     met.add(value)
                     waiting.append(value)
@@ -209,5 +210,5 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
 
 
 def depth(witness: Witness) -> int:
-    """Return how many witnesses are asked for one inside the other."""
+    """Return how deeply witnesses are nested."""
     return 1 + max([depth(inner) for inner in witness.conditions if isinstance(inner, Witness)], default=0)

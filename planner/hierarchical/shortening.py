@@ -1,12 +1,12 @@
-"""A plan made shorter, while that takes no more than half the effort of finding it.
+"""Shortening of a plan, with at most half the effort of finding it.
 
-orders   the agenda again in other orders of the goals, with the refinements that are known: what has to be put aside depends on it
-windows  on each level, from the top: steps in a row replaced by fewer (`confab.planner.hierarchical.windows`)
-detours  steps that together come to nothing are dropped (`confab.planner.hierarchical.detours`)
+orders   the agenda runs again with other orders of the goals and the known refinements: the objects to move away depend on it
+windows  on each level, from the top: consecutive steps are replaced by fewer (`confab.planner.hierarchical.windows`)
+detours  steps whose changes cancel out are dropped (`confab.planner.hierarchical.detours`)
 
-Orders, and windows of the first level, are only tried where a plan puts something aside or has many steps for its goals, other
-windows where it puts something aside. The shortest plan is kept; steps of the most abstract level, which say what the others are
-for, are given up only where that saves enough.
+Orders, and windows of the first level, are tried only where a plan moves an object away or has many steps per goal; other windows
+only where it moves an object away. The shortest plan is kept; steps of the most abstract level, which explain the others, are
+dropped only where that saves enough primitives.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
 ORDERS = 8
-"""The default share of work for shortening, in sixteenths of the effort of the first plan: length against CPU time."""
+"""Default work for shortening, in sixteenths of the effort of the first plan: plan length against CPU time."""
 SHUFFLES = 3
 """Number of random orders of the goals before the best one is changed a little at a time."""
 LEAST_EFFORT = 400_000
-"""The least effort that a first plan counts as, in states times operators: length of plans found at once, against CPU time."""
+"""Minimum effort assumed for a first plan, in states times operators: length of plans found at once, against CPU time."""
 DOING = 20
-"""The effort of doing a primitive once more, in states times operators."""
+"""Effort of replaying a primitive, in states times operators."""
 MANY = 1.25
-"""Steps for each goal from which on other orders are tried, too: some may be needless; length against CPU time."""
+"""Minimum number of steps per goal from which on other orders are tried: plan length against CPU time."""
 KEPT = 1.5
-"""Level-1 steps are kept as long as primitives that come to nothing make the plan longer by less than this factor."""
+"""Level-1 steps are kept as long as redundant primitives lengthen the plan by less than this factor."""
 
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
     """Return the plan of a call, made shorter by work in proportion to `improve`."""
-    with suppress(LimitError):  # then what is found so far is what there is
+    with suppress(LimitError):  # the plan so far is kept
         shorten(call, improve, leave_levels, advised)
     plan = call.tree()
     if all(step.level == call.program.levels[0] for step in plan.steps):
-        call.given_up.clear()  # there are steps of it after all
+        call.given_up.clear()  # the plan has steps of that level after all
     return plan
 
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
-    """Make the steps of a call shorter in rounds: one without a time limit, else as long as they pay."""
+    """Shorten the steps of a call in rounds: one round without a time limit, otherwise as long as rounds pay."""
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
     while rounds < max(1, 2 * useful):
@@ -66,7 +66,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
 
 def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:
-    """Try other orders of the goals, windows of each level and steps without detours, each by bounded work."""
+    """Try other orders of the goals, windows of each level, and removal of detours, each with bounded work."""
     levels = call.program.levels
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
@@ -81,7 +81,7 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
 
 
 def puts_aside(call: Call) -> bool:
-    """Return whether a step overwrites a value that no step before has asked for: else hardly a step is needless."""
+    """Return whether a step overwrites a value that no earlier step required: otherwise hardly any step is needless."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
@@ -109,9 +109,9 @@ def puts_aside(call: Call) -> bool:
 
 
 def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Random) -> None:
-    """Achieve the goals in other orders, by bounded work; keep the shortest steps, and go on from their order.
+    """Achieve the goals in other orders, with bounded work; keep the shortest steps and continue from their order.
 
-    Only steps of the most abstract level are tried; advice is taken for refinements: for goals it would lead to the same steps.
+    Only steps of the most abstract level are tried. Advice is used for refinements; for goals it would lead to the same steps.
     """
     order = list(call.kept)
     for other_order in neighbours(order, random) if len(order) > 1 else ():
@@ -131,7 +131,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
 
 
 def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
-    """Yield an order reversed, some random ones, then for ever the order, as it has become, with a few goals moved elsewhere."""
+    """Yield an order reversed, some random ones, then endlessly the current order with a few goals moved."""
     yield order[::-1]
     for _ in range(SHUFFLES):
         yield random.sample(order, len(order))
@@ -146,9 +146,9 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Leave out steps of a level that come to nothing, if that breaks no more of what levels above ask; return whether some were.
+    """Drop steps of a level that cancel out, unless that violates more conditions of upper levels; return whether any were.
 
-    Steps of the most abstract level are given up for that only if the plan is longer than without by more than a factor.
+    Steps of the most abstract level are dropped for that only if they lengthen the plan by more than a factor.
     """
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)

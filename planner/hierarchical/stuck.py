@@ -1,4 +1,4 @@
-"""Where planning was when it gave up: the goal, the step that wasn't refined, and amounts that were in the way."""
+"""The point at which planning gave up: the goal, the step that wasn't refined, and amounts that were insufficient."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
-"""Values, and ways to achieve them, that are followed from the goal to what is in its way; and amounts that are told."""
+"""Maximum number of values, and of achievers, examined between the goal and its obstacle; and of amounts reported."""
 
 
 def gave_up(call: Call, why: str) -> Reason:
-    """Return why planning gave up, with where it was, in the ontology's terms."""
+    """Return the reason why planning gave up and the point it had reached, in the ontology's terms."""
     parts, terms = [why], dict[str, None]()
     if call.aim:
         goals = [str(Fact(Symbol(cell[0], arguments_of(cell[1])), value)) for cell, value in call.aim.items()]
@@ -36,14 +36,14 @@ def gave_up(call: Call, why: str) -> Reason:
 
 
 def lacking(call: Call) -> Iterator[str]:
-    """Yield the amounts that behaviours towards the first goal that was aimed at ask for, where the steps so far end."""
+    """Yield the unmet requirements on amounts of behaviours towards the goal that was aimed at first, in the final state."""
     space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):
         return
     space.deadline, space.most_looked = (
         Limits().end(),
         space.looked + LOOKED,
-    )  # the search's own limits may be reached
+    )  # the limits of the search may be reached
     call.redo(call.steps)
     told: dict[Cell, str] = {}
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:

@@ -1,7 +1,7 @@
 """Subgoals: the values that an unmet condition of an achiever needs.
 
-A subgoal is a symbol with alternative values. If there are many, one of each symmetry class is proposed (`Alike`), so that a
-thousand free places count as one; values in goals are proposed as well.
+A subgoal is a symbol with alternative values. Of many values one of each symmetry class is proposed, so that a thousand free
+places count as one; values in goals are proposed as well.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from confab.reasoner.symbols import (
 )
 
 Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
-"""Situation type, key, and the alternative values."""
+"""Situation type, key, and alternative values."""
 DEEPEST = 8
 """Maximum depth of nested rules examined for missing facts."""
 Env: TypeAlias = "Mapping[str, str | None]"
@@ -51,7 +51,7 @@ class Wants:
     program : Program
     table : Table
     goal : mapping of cell to value
-        Its values are proposed for their symbols, and not handed to others as free ones.
+        Its values are proposed for their symbols, and aren't offered to other symbols as free values.
     """
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
@@ -63,9 +63,7 @@ class Wants:
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[Condition, Condition]] = {}
         self._possibles: dict[int, tuple[Condition, Condition]] = {}
-        self._entered: dict[tuple[str, Key, bool], int] | None = (
-            None  # what is defined, and how deep it was asked about
-        )
+        self._entered: dict[tuple[str, Key, bool], int] | None = None  # defined situation type, and depth of nesting
         self._depth = 0
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
@@ -162,7 +160,7 @@ class Wants:
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
         """Return alternative subgoals that may make a defined situation true, or false."""
-        if self._entered is not None and situation in self._circular:  # then it depends on where one comes from
+        if self._entered is not None and situation in self._circular:  # the result depends on the rules entered before
             return list(self._defining(situation, key, wanted, level))
         self._forget()
         asked = situation, key, wanted, level
@@ -179,7 +177,7 @@ class Wants:
         cell = situation, key, wanted
         assert self._entered is not None
         if self._entered.get(cell, DEEPEST) <= self._depth:
-            return  # what it wants is among what was found
+            return  # its subgoals are among those found
         self._entered[cell] = self._depth
         self._depth += 1
         for parameters, rule in self.program.rules[situation]:
@@ -197,18 +195,18 @@ class Wants:
         self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
-        """Return the candidates for a rule's witness that its goal names, or else a few that lack the least."""
+        """Return the candidates for a rule's witness that the goal names, otherwise a few with the fewest unmet conditions."""
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 
     def concern(self, individuals: frozenset[str]) -> None:
-        """Set the individuals to be tried first where a rule needs one."""
+        """Set the individuals that are tried first where a rule needs one."""
         if self.program.rules and individuals != self._concern:
             self._concern = individuals
             self._fresh.clear()
 
     def _holds_so_far(self, rule: Achiever, condition: Condition, env: dict[str, str | None]) -> bool:
-        """Whether a condition of a rule holds after the earlier ones; the variable that it determines is bound."""
+        """Return whether a condition of a rule holds after the earlier ones; the variable that it determines is bound."""
         if condition in rule.determining and isinstance(condition, ValueCondition):
             key = self._key(condition.arguments, env)
             found = None if key is None else self.table.now[condition.situation].get(key)
@@ -217,7 +215,7 @@ class Wants:
         return self.holds(rule, condition, env)
 
     def _amounts(self, condition: Comparison, env: Env) -> Iterator[Want]:
-        """Yield for each amount in a comparison the value that would satisfy it if the others stayed the same."""
+        """Yield for each amount in a comparison the value that would satisfy it if the other amounts stayed the same."""
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
         for part in dict.fromkeys((*inside(condition.left), *inside(condition.right))):
@@ -252,7 +250,8 @@ class Wants:
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
         """Yield subgoals for other values of the symbols that determine a condition's variables.
 
-        With another value a witness need only be possible (that room has a door, which is shut): what it lacks is wanted, too.
+        With another value a witness only has to be possible (that room has a door, which is shut): its unmet conditions become
+        subgoals, too.
         """
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
@@ -287,7 +286,7 @@ class Wants:
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
         """Return whether a condition is static, whether it compares, its variables, and the condition.
 
-        Itself, so that its `id` stays its own.
+        The condition is returned so that its `id` isn't reused.
         """
         found = self._conditions.get(id(condition))
         if found is None:
@@ -307,9 +306,9 @@ class Wants:
         return found[0]
 
     def _would_hold(self, achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
-        """Whether a condition would hold with another value for a variable.
+        """Return whether a condition would hold with another value for a variable.
 
-        What is static is asked once, unless it compares individuals once for all that no static fact tells apart.
+        A static condition is evaluated once, unless it compares individuals that no static fact distinguishes.
         """
         static, compares, others, _ = self._about(condition)
         if not static:
@@ -323,7 +322,7 @@ class Wants:
         return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
-        """Return values of a class for a symbol: its goal value, and one of each symmetry class, free ones first."""
+        """Return values of a class for a symbol: its goal value, and one value of each symmetry class, free ones first."""
         members = self.program.problem.classes.get(kind, ())
         if len(members) <= FEW:
             return members
@@ -369,7 +368,7 @@ class Wants:
     def one_of_each(self, kind: str, beside: Collection[str | None] = ()) -> list[str]:
         """Return the individuals of a class; of many, one of each symmetry class and state.
 
-        Of a symmetry class that has an individual `beside`, one more: it may have to be another.
+        Of a symmetry class of an individual in `beside`, one more is returned, since a different individual may be needed.
         """
         members, alike = self.program.problem.classes.get(kind, ()), self.program.alike
         if len(members) <= FEW:
@@ -387,7 +386,7 @@ class Wants:
         return None if None in found else key_of(found)  # type: ignore[arg-type]
 
     def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
-        """Whether a condition of an achiever holds now; undetermined terms have no value."""
+        """Return whether a condition of an achiever holds now; undetermined terms have no value."""
         test, names = self._asked(achiever, condition, env, False)
         return bool(test(*[env.get(name) for name in names]))
 

@@ -1,4 +1,4 @@
-"""Symmetry classes: individuals with the same static facts, of which one can stand for all."""
+"""Symmetry classes: individuals with the same static facts, of which one can represent all."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from confab.planner.transitions import Key
 from confab.reasoner.symbols import Problem
 
 ENDS = 8
-"""Number of individuals at each end of a large class that are examined for another state."""
+"""Number of individuals at each end of a large class that are examined for a different state."""
 
 
 class Alike:
     """The symmetry classes of a problem's individuals.
 
-    Two individuals are alike if they belong to the same classes, exist from the same level on, and exchanging them leaves
-    every static relation as it is. Names that behaviours mention are alike to nobody.
+    Two individuals are symmetric if they belong to the same classes, exist from the same level on, and exchanging them leaves
+    every static relation unchanged. An individual that a behaviour names is symmetric to no other.
 
     Parameters
     ----------
@@ -62,9 +62,9 @@ class Alike:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return members whose state differs from that of known members of their class, one for each state.
+        """Return members whose state differs from that of the known members of their class, one for each state.
 
-        Of a large group the first and the last few are looked at: what is used up is used up from one end.
+        Of a large group only the first and the last few are examined, since values are used up from one end.
         """
         found = list(known)
         sorts = {self.sort.get(one) for one in known}
@@ -85,7 +85,7 @@ class Alike:
         return found
 
     def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
-        """Return the values of an individual in situation types that behaviours use."""
+        """Return the values of an individual in the situation types that behaviours use."""
         values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 
@@ -99,9 +99,10 @@ def representatives(
 ) -> list[str]:
     """Return one value per class: the first that no object holds and no goal requires.
 
-    Where there is none, a few that nobody has; where there are none of these either, that of least `burden`. With
-    `cursors` (by the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone
-    through anew.
+    Otherwise a few that no object holds; otherwise the value of least `burden`. With `cursors` (by the group's `id`) the search
+    for the first starts where the last one ended, so that a long group isn't scanned again.
+
+
 
     >>> representatives([["a", "b", "c"], ["d"]], {"a": {"x": None}}, {"b": True})
     ['c', 'd']

@@ -1,8 +1,7 @@
-"""Where a search gets stuck: is there a plan at all? Asked cheapest first.
+"""Tests for unsolvability, run when a search gets stuck, cheapest first.
 
-All of it looks at the lowest level only: what an upper level can't do proves nothing, since the level below may do it otherwise.
-What says "no" here is a reason to stop searching; the proof is the certificate, which `confab.planner.solve` asks for and has
-checked.
+All tests examine the lowest level only: a failure of an upper level proves nothing, since the level below may find other steps.
+A positive test stops the search; the proof is the certificate, which `confab.planner.solve` requires and checks.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 LOOKING = 1_800_000
-"""The work of looking at all states, in states times relaxed operators, that no search has to come before."""
+"""Work of examining all states that is allowed before any search, in states times relaxed operators."""
 AT_ONCE, PAIRS = 20_000, 500_000
-"""So many tests of conditions are little work; and so many, at most, are done for a certificate once searches have failed."""
+"""Maximum number of tests of conditions that count as cheap; and maximum number for a certificate after searches have failed."""
 TEST = 2
-"""The effort of a test, about in microseconds."""
+"""Effort of a test, about in microseconds."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
-"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
+"""Maximum size of a join of relaxed reachability (some 200 MB), and of the changes of a level that is grounded (600 MB)."""
 
 
 def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
-    """Return why a problem has no plan, with a certificate, if so much work until a deadline shows it."""
+    """Return the error that a problem has no plan, with a certificate, if at most `most` tests until a deadline show it."""
     if deadline is not None and perf_counter() >= deadline:
         return None
     from confab.planner.certificate_reasons import told
@@ -47,7 +46,7 @@ def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = N
 
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
-    """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
+    """Return the facts reachable on a level from the problem's initial state, or another, under delete relaxation."""
     from confab.planner.grounded import reachability
 
     reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
@@ -56,7 +55,7 @@ def closed(problem: Problem, level: int, deadline: float | None, initial: State 
 
 
 def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
-    """Return why a level isn't to be grounded, if it would take too much memory: an effect on a symbol touches all its values."""
+    """Return why a level must not be grounded, if it would need too much memory: an effect on a symbol touches all its values."""
     values = {}
     for name, situation in reached.situations.items():
         rows = len(reached.tables["situation", name])
@@ -71,9 +70,9 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
 
 
 def proved(problem: Problem, level: int, deadline: float | None = None) -> Task | Reason:
-    """Raise `UnsolvableError` if a goal can't be reached on a level even if nothing ever became false.
+    """Raise `UnsolvableError` if a goal is unreachable on a level under delete relaxation.
 
-    Else that level is returned, grounded, or why it is too large for that.
+    Otherwise return the grounded level, or the reason why it is too large for that.
     """
     from confab.planner.grounded.grounding import ground
 
@@ -96,9 +95,9 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 
 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
-    """Raise `UnsolvableError` if none of all states that can be reached fulfils the goal; return how many were looked at.
+    """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of states examined.
 
-    That may cost as much as the searches have up to now. Nothing is done if these aren't twice as many as were looked at `before`.
+    The examination may cost as much as the searches so far. It is skipped unless these have doubled since `before`.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state
@@ -110,7 +109,7 @@ def looked_at(task: Task, space: Workspace, before: int) -> int:
 
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
-    """Return that none of all states fulfils the goal, if that is so and at most so many have to be looked at."""
+    """Return the reason that no reachable state satisfies the goal, if examining at most `most` states shows it."""
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)

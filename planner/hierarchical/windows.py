@@ -1,7 +1,7 @@
-"""Steps of a level in a row, replaced by fewer: the level is grounded, if it is small, and its plan's windows are searched.
+"""Windows: consecutive steps of a level are replaced by fewer, by searching windows of the plan in a small grounded level.
 
-What the levels above ask of a change is asked of these steps, too (`confab.planner.hierarchical.inherited_preconditions`). What is
-found is refined on the table and put under the levels above again wherever one of their behaviours says what a run of steps does.
+The preconditions of upper levels apply to the new steps, too (`confab.planner.hierarchical.inherited_preconditions`). The new
+steps are refined on the table and grouped under steps of the upper levels wherever a run has the effect of such a step.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""Level-1 steps that are given up for each primitive saved, at most: they say what the primitives are for."""
+"""Maximum number of level-1 steps given up per primitive saved: level-1 steps explain the primitives."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
-"""The largest level that is grounded to shorten a plan, in rows of a join, at all and per step: length against CPU time."""
+"""Maximum size of a level that is grounded to shorten a plan, in rows of a join, in total and per step: length against CPU
+time."""
 
 
 def windowed(call: Call, level: int, work: int) -> None:
-    """Replace steps of a level in a call's plan by fewer, if that makes the plan shorter and breaks no more than before."""
+    """Replace steps of a level in a call's plan by fewer, if the plan gets shorter and violates no more conditions."""
     new = fewer(call, level, work)
     if new is None:
         return
@@ -41,7 +42,7 @@ def windowed(call: Call, level: int, work: int) -> None:
         if step is None:
             return
         other.steps.append(step)
-    if not all(map(other.met, other.goal)):  # what the level doesn't see
+    if not all(map(other.met, other.goal)):  # goals that the level doesn't see
         Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level):
@@ -53,7 +54,7 @@ def windowed(call: Call, level: int, work: int) -> None:
 
 
 def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
-    """Return fewer steps of a level than a call's plan has, not refined; None if none are found, or the level is large."""
+    """Return fewer unrefined steps of a level than a call's plan has; None if none are found or the level is large."""
     steps = [part for step in call.steps for part in parts(step, level)]
     if any(step.level != level for step in steps):
         return None
@@ -70,7 +71,7 @@ def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
 
 
 def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
-    """Return the task of a level, with what it sees of the goal and of what is at rest; None if it is large."""
+    """Return the task of a level, with the goals and rest values that it sees; None if the level is large."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
 
@@ -83,7 +84,7 @@ def small(problem: Problem, level: int, deadline: float | None, most: int) -> Ta
 
 
 def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
-    """Return a plan of a level under the levels above, and as it is."""
+    """Return a plan of a level grouped under the upper levels, and ungrouped."""
     if level == problem.domain.levels[0]:
         return (plan,)
     from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -92,7 +93,7 @@ def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
 
 
 def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
-    """Return steps of a plan as a call has them."""
+    """Return steps of a plan in the form that a call uses."""
     names = call.program.variables
     return [
         RefinedStep(
@@ -112,15 +113,15 @@ def length(steps: Sequence[RefinedStep]) -> int:
 
 
 def abstract(problem: Problem, plan: Plan) -> int:
-    """Return how many of a plan's steps are of the most abstract level."""
+    """Return the number of steps of the most abstract level in a plan."""
     return sum(step.level == problem.domain.levels[0] for step in plan.steps)
 
 
 def worth(saved: int, given_up: int) -> bool:
-    """Whether primitives that are saved are worth the steps of the most abstract level that are given up for them."""
+    """Return whether saved primitives are worth the steps of the most abstract level that are given up for them."""
     return saved > max(given_up, 0) / PER_PRIMITIVE
 
 
 def broken(problem: Problem, plan: Plan) -> int:
-    """Return how many changes of a plan break what a level above asks."""
+    """Return the number of changes of a plan that violate a condition of an upper level."""
     return sum(len(left.broken) for left in levels_left(problem, plan))

@@ -2,9 +2,9 @@
 
 table     the present values of all symbols; it is changed in place and undone
 forward   per behaviour, a function of its arguments that returns its changes, or None where it isn't applicable
-achieve   per behaviour and effect, a function of a symbol and value that yields the arguments with which the effect gives it
-keep      a function of a symbol and its first value: the value that it must have in the end, or None if any will do
-budget    everything that is searched counts in one unit, about a microsecond: states times operators, or 100 for an expansion
+achieve   per behaviour and effect, a function of a symbol and a value that yields the arguments with which the effect gives it
+keep      a function of a symbol and its first value that returns its required final value, or None if any value is allowed
+budget    all searches are charged in one unit, about a microsecond: states times operators, or 100 for an expansion
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from confab.reasoner.symbols import FALSE
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
-"""Return the value that a touched symbol must have in the end, given its first one; None if any value will do."""
+"""Returns the required final value of a touched symbol, given its first one; None if any value is allowed."""
 EXPANSION = 100
 """The cost of an expansion in the unit of the budget."""
 
 
 def trusting() -> None:
-    """Doubt nothing."""
+    """Run no test for dead ends."""
 
 
 @dataclass
@@ -43,15 +43,15 @@ class Workspace:
     program : Program
     table : Table
     goal : mapping of cell to value
-        The task's goal, which proposes values.
+        The task's goal, whose values are proposed for subgoals.
     deadline : float, optional
-        When `LimitError` is raised, on the clock of `perf_counter`; the deadline that holds (`confab.reasoner.limits`) if left out.
+        The time at which `LimitError` is raised, on the clock of `perf_counter`; by default that of `confab.reasoner.limits`.
     most : int
-        Maximum number of expansions of all searches together, after which `LimitError` is raised.
+        Maximum number of expansions of all searches together; more raise `LimitError`.
     most_work : float
-        Maximum work in scopes, in states times operators, after which `LimitError` is raised.
+        Maximum work in scopes, in states times operators; more raises `LimitError`.
     doubt : function
-        Called each time that the effort has doubled: it may be in vain.
+        Called each time that the effort has doubled, to test whether the problem is unsolvable.
     """
 
     program: Program
@@ -66,7 +66,7 @@ class Workspace:
     def __post_init__(self) -> None:
         self.expanded = self.worked = self.doubted = self.looked = 0
         self.most_looked = EXPANSION * self.most
-        """Maximum number of achievers that are looked at, those that aren't applicable included."""
+        """Maximum number of achievers that are examined, inapplicable ones included."""
         if self.deadline is None:
             self.deadline = Limits().end()
         bound = self.program.bind(self.table)
@@ -83,7 +83,7 @@ class Workspace:
     # ------------------------------------------------------------------------------------------------------------ the table
 
     def apply(self, changes: Sequence[Change]) -> None:
-        """Make changes, as far as the symbols exist."""
+        """Apply changes to the symbols that exist."""
         now, put = self.table.now, self.table.put
         for situation, key, value in changes:
             old = now[situation].get(key)
@@ -93,7 +93,7 @@ class Workspace:
                 put(situation, key, value)
 
     def exists(self, situation: str, key: object) -> bool:
-        """Return whether a boolean symbol exists that the table doesn't list."""
+        """Return whether a boolean symbol exists that isn't in the table."""
         kind = self.program.domain.situations[situation]
         return kind.boolean and all(
             argument in self.program.members.get(of, ())
@@ -107,25 +107,25 @@ class Workspace:
             not levels or all(levels.get(argument, 1) <= level for argument in arguments_of(cell[1]))
         )
 
-    # --------------------------------------------------------------------------------------------------------- what is kept
+    # ---------------------------------------------------------------------------------------------------- required values
 
     def refining(self, level: int, careful: bool = False) -> Keep:
-        """Return what the refinement of a step of `level` keeps: all that this level sees as it was, everything else at rest.
+        """Return the values that the refinement of a step must keep: symbols that its level sees unchanged, others at rest.
 
-        If `careful`, symbols without a rest value, which may have any value otherwise, are kept as they were, too.
+        If `careful`, symbols without a rest value, which otherwise may have any value, are unchanged, too.
         """
         rest = self.rest
         return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
-        """Return what steps towards a goal keep: the goals that were reached before, and everything else at rest."""
+        """Return the values that steps towards a goal must keep: the goals achieved before, and all other symbols at rest."""
         return lambda cell, first: kept.get(cell) or self.rest.get(cell[0])
 
     # ----------------------------------------------------------------------------------------------------------- the budget
 
     @property
     def effort(self) -> int:
-        """What was searched so far, about in microseconds."""
+        """The search effort so far, about in microseconds."""
         return self.worked + EXPANSION * self.expanded
 
     def expand(self, level: int) -> None:
@@ -135,7 +135,7 @@ class Workspace:
         self._limited()
 
     def spend(self, level: int, counts: Counts, work: int) -> None:
-        """Count a search of a scope, and its work in states times operators; raise `LimitError` where a limit is reached."""
+        """Charge a search of a scope, with its work in states times operators; raise `LimitError` where a limit is reached."""
         self.counts[level].add(counts)
         self.expanded += counts.expanded
         self.worked += work
@@ -144,7 +144,7 @@ class Workspace:
             raise LimitError(f"{self.most_work:.0f} states times operators")
 
     def look(self) -> None:
-        """Count an achiever that is looked at; raise `LimitError` where a limit is reached."""
+        """Count an examined achiever; raise `LimitError` where a limit is reached."""
         self.looked += 1
         if self.looked > self.most_looked:
             raise LimitError(f"{self.most_looked:,} ways to achieve values")
