@@ -11,10 +11,10 @@ from confab.reasoner.symbols import Parameter, Problem, RelationCondition, Situa
 
 
 def lifted(problem: Problem, level: int) -> Problem:
-    """Return a problem whose conditional effects of one shape are one effect each, on the rows of a relation made for that.
+    """Return a problem in which conditional effects of the same shape are one effect, over the rows of an auxiliary relation.
 
-    Where an effect is made for all of a class, a problem has one for each individual: a cube of 26 faces has thousands, and each
-    would be a join of its own.
+    An effect on every member of a class is one effect per individual in a problem: a cube of 26 faces has thousands, and each
+    would need a join of its own.
     """
     relations: dict[str, frozenset[tuple[str, ...]]] = {}
     behaviors = dict(problem.domain.behaviors)
@@ -56,7 +56,7 @@ def _parts(effect: ValueEffect) -> list[ValueEffect | ValueCondition]:
 def _shape(effect: ValueEffect) -> object:
     """Return the common shape of effects that differ only in individuals.
 
-    Other conditions than on values count as a difference.
+    Conditions other than value conditions are part of the shape as they are.
     """
     values = tuple(
         (type(p), p.situation, tuple(t if is_variable(t) else "" for t in p.arguments), p.value) for p in _parts(effect)

@@ -1,10 +1,10 @@
-"""Amounts of a grounded level: above its bits a state holds the number of a tuple of amounts.
+"""Amounts of a grounded level: above its bits, a state contains the number of a tuple of amounts.
 
-A comparison with individuals put in is a bit that follows from the tuple, so that an operator's conditions, the goal and all that
-looks at bits are the same with amounts and without. What an operator that changes an amount may make true is known from how it
-moves each comparison: by how much, where that is the same in every state (`Push`).
+A ground comparison is a bit derived from the tuple. So an operator's conditions, the goal, and all functions that read bits are
+the same with and without amounts. Which comparisons an operator may make true follows from how far it moves each of them, where
+that is the same in every state (`Push`).
 
-Comparisons are linear: amounts times numbers, added up. Numbers are exact; whole ones are Python integers, which are fast.
+Comparisons are linear: sums of amounts times constants. Numbers are exact; whole numbers are Python integers, which are fast.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ class Linear:
 
 @dataclass(frozen=True)
 class Move:
-    """One change of an amount: what is done to it, by how much (None: nothing), and the bits with which it is done.
+    """One change of an amount: the operation, its amount (None: undefined), and the bits under which it happens.
 
-    Of several with one `position`, which are ways in which the condition of one effect holds, the first is done.
+    Changes with the same `position` are alternatives in which the condition of one effect holds; the first one applies.
     """
 
     position: int
@@ -127,7 +127,7 @@ class AmountTable:
         Raises
         ------
         UngroundableError
-            Two amounts that change are multiplied, or one is divided by.
+            Two changing amounts are multiplied, or a changing amount is a divisor.
         """
         match expression:
             case Amount(situation, arguments):
@@ -163,9 +163,9 @@ class AmountTable:
     def comparison(
         self, left: Linear | None, sign: str, right: Linear | None, negated: bool, fresh: Callable[[], int]
     ) -> tuple[tuple[int, ...] | None, ...]:
-        """Return the alternatives of which one must hold for a comparison to hold (negated: not to), each as literals.
+        """Return the alternatives under which a comparison holds (negated: doesn't hold), each as literals.
 
-        `fresh` gives the next free bit. A difference is at least zero, more than zero, or zero; nothing else has a bit.
+        `fresh` returns the next free bit. Bits state that a difference is at least zero, more than zero, or zero.
         """
         if left is None or right is None:
             return ((),) if negated else (None,)

@@ -1,11 +1,11 @@
-"""One level of a problem, or any grounded task, planned flat: two orders of one search loop take turns.
+"""Search of one level of a problem, or of any grounded task, without levels: two orders of one search loop take turns.
 
-It plans imported domains that have one level only, scopes cut out of a world, and is the last resort where refinement fails.
+It plans imported domains that have only one level and scopes cut out of a world, and it is the last resort where refinement fails.
 
 loop      `confab.planner.grounded.exploring`
-orders    by h_FF, with preferred operators and lookahead (`confab.planner.grounded.greedy`), which follows what the goals need; by
-          novelty (`confab.planner.grounded.novelty`), which is fast and leads out of where h stays as it is
-shorter   what is found is made shorter (`confab.planner.grounded.plan_windows`)
+orders    by h_FF, with preferred operators and lookahead (`confab.planner.grounded.greedy`), which follows the needs of the goals;
+                    by novelty (`confab.planner.grounded.novelty`), which is fast and leaves plateaus of h
+shorter   shortens the plan found (`confab.planner.grounded.plan_windows`)
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
 SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
-"""Operators looked at to make a plan shorter: at all, for each of so many first steps, and as a part of the search's work."""
+"""Operators examined to shorten a plan: in total, per step for at most `STEPS` steps, and as a share of the search's work."""
 
 
 @dataclass(frozen=True)
 class Flat:
-    """What a flat search found: `plan`, operators of the task, is there exactly if `status` is solved; and its work, in bits."""
+    """The result of a search without levels: `plan`, operators of the task, if `status` is solved; and the work, in bits."""
 
     status: Status
     plan: tuple[int, ...] = ()
@@ -60,7 +60,7 @@ def plan_level(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
+        In place of the problem's own. By default symbols at rest in the initial state must be at rest in the end.
     limits : Limits
         The time includes grounding.
     most_work : float
@@ -71,7 +71,7 @@ def plan_level(
     Returns
     -------
     Outcome
-        Unsolvable is said of this level only.
+        The status unsolvable refers to this level only.
     """
     began = perf_counter()
     deadline = limits.end()
@@ -102,20 +102,20 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a deadline can only cut the
-    search short.
+    Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan; a deadline can only end the
+    search early.
 
     Parameters
     ----------
     task : Task
     limits : Limits
-        Their seconds are the caller's to turn into a deadline.
+        The caller turns their seconds into a deadline.
     deadline : float, optional
         On the clock of `time.perf_counter`.
     found : function of a plan, optional
-        Called with the first plan, before it is made shorter.
+        Called with the first plan, before it is shortened.
     most_work : float
-        In bits followed by relaxed plans, or what takes as long.
+        Maximum work, in bits processed by relaxed plans.
     """
     counts = Counts()
     if task.initial & task.goal == task.goal:
@@ -136,7 +136,7 @@ def search(
     greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
     going: dict[Order, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
     spent: dict[Order, int] = dict.fromkeys(going, 0)
-    del novelty, greedy  # so that an order that runs out of memory leaves none of its states behind
+    del novelty, greedy  # releases the states of an order that ran out of memory
     while True:
         order = min(going, key=spent.__getitem__)
         try:
@@ -163,6 +163,6 @@ def search(
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:
         found(plan)
-    with suppress(MemoryError):  # then it stays as it is
+    with suppress(MemoryError):  # then the plan isn't shortened
         plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING, deadline)
     return Flat(Status.SOLVED, tuple(plan), None, counts, total)

@@ -1,12 +1,12 @@
-"""Bits that follow from other bits: a disjunction that some condition asks for, a fact of a situation type that is defined.
+"""Derived bits: disjunctions in conditions, and facts of defined situation types.
 
-part          bits that need each other, mostly one; what a part needs besides stands in the parts before it
-alternatives  a bit is set where all bits of one of its alternatives are; an opposite where the one bit that it names isn't
+part          bits that depend on each other, mostly a single one; parts are ordered by dependency
+alternatives  a bit is set if all bits of one of its alternatives are set; an opposite, if the one bit that it names isn't set
 
-After a change only the parts are looked at that need a bit which changed. A part of several bits is worked out from nothing, by
-counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984). Where a change wakes so
-many alternatives that all of the task are less work by arrays (who reaches whom in a large place; the ferry is empty, and every
-car may board), by arrays.
+After a change only the parts that depend on a changed bit are recalculated. A part of several bits is calculated from scratch
+by counting the missing bits of each alternative: Dowling and Gallier, Journal of Logic Programming 1 (1984). If a change affects
+more alternatives than arrays would process in the same time, all derived bits are calculated by arrays (examples: which places
+are reachable in a large map; the ferry becomes empty, so that every car may board).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Derived:
                 came = bool(state & low)
                 for number, mask, opposite in users[low]:
                     if mask and bool(state & mask) is (came is not opposite):
-                        continue  # it is already what this change could make of it
+                        continue  # the bit already has the value that this change implies
                     if number not in seen:
                         seen.add(number)
                         heapq.heappush(waiting, number)
@@ -104,7 +104,7 @@ class Derived:
 
     @cached_property
     def _few(self) -> int:
-        """Number of alternatives whose work one by one equals that of all by arrays."""
+        """Maximum number of alternatives that are faster one by one than all of them by arrays."""
         return self._all // AT_ONCE + CALLS * len(self._layers)
 
     @cached_property
@@ -160,7 +160,7 @@ class Derived:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
     def within(self, state: int, changing: int, wanted: int) -> Derived:
-        """Return the minimal condition for some bits if, of the other bits, only some ever differ from a state."""
+        """Return the derivation of some bits, simplified for states that differ from a given one only in the bits `changing`."""
         parts = []
         for number in self._support(wanted & self.mask):
             part = self.parts[number]
@@ -245,7 +245,7 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
     def work(state: int) -> int:
         state &= ~own
-        lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: how many are lacking, and of what
+        lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: missing bits, by alternative
         waiting: list[int] = []
         for outside, of_these in ways.items():
             if state & outside == outside:
@@ -271,9 +271,9 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return bits, by number, in parts that need each other, each behind what it needs (Tarjan, SIAM J. Computing 1, 1972).
+    """Return bits, by number, in parts that depend on each other, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
 
-    A way to a bit that needs the bit itself is none: left in, a part of one bit would stay set only because it was.
+    An alternative of a bit that requires the bit itself is dropped: with it, a part of one bit would stay set once it was set.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}

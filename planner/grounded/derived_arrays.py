@@ -1,4 +1,4 @@
-"""All derived bits of a task at once: in layers, each by arrays of all its alternatives."""
+"""All derived bits of a task calculated together: in layers, each by arrays over all its alternatives."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """Alternatives by how much they need: of layers before and of this one, in columns; the bit of each; which are opposites."""
+    """The alternatives of a layer: required bits of earlier layers and of this one in columns, resulting bits, and opposites."""
 
     before: Sequence[Ints]
     inside: Sequence[Ints]
@@ -56,13 +56,13 @@ class _Layer:
 
     @staticmethod
     def of(layer: Sequence[Bit], always: int) -> _Layer:
-        """Return the arrays of a layer; a bit that is always set fills up what is shorter."""
+        """Return the arrays of a layer; shorter rows are filled with a bit that is always set."""
         own = reduce(or_, (bit.mask for bit in layer))
         ways = [(way & ~own, way & own, _numbers(bit.mask)[0]) for bit in layer for way in bit.alternatives]
         ways.sort(key=lambda way: -way[0].bit_count())
         first, *others = _columns([before for before, _, _ in ways], always) or [np.full(len(ways), always)]
         return _Layer(
-            [first, *(column[column != always] for column in others)],  # only the first ones are so long
+            [first, *(column[column != always] for column in others)],  # the alternatives are sorted by length
             _columns([inside for _, inside, _ in ways], always),
             np.array([head for _, _, head in ways], np.int64),
             np.array([_numbers(bit.mask)[0] for bit in layer if bit.opposite], np.int64),
@@ -103,7 +103,7 @@ def _numbers(mask: int) -> list[int]:
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
-    """Return of which rows all bits are set; only the first column has one of each row, the others of the first ones."""
+    """Return the rows of which all bits are set; only the first column has an entry per row, the others cover the first rows."""
     found: Flags = flags[columns[0]]
     for column in columns[1:]:
         found[: len(column)] &= flags[column]

@@ -1,9 +1,9 @@
-"""The one search loop: states are reached one after the other, in an order, until the goal holds.
+"""The search loop: states are reached one after another, in a given order, until the goal holds.
 
-order       which candidate comes next: by h_FF (`confab.planner.grounded.greedy`), by novelty (`confab.planner.grounded.novelty`),
+order       selects the next candidate: by h_FF (`confab.planner.grounded.greedy`), by novelty (`confab.planner.grounded.novelty`),
             by cost and a bound (`confab.planner.grounded.shortest`)
-candidate   a state that operators lead to from one that was reached; it is taken unless it was reached as cheaply before
-open list   queues of entries, of each the least rank first; they take turns, and one may be given turns in advance
+candidate   a successor of a reached state; it is accepted unless the state was reached before at no higher cost
+open list   queues of entries, each ordered by rank; the queues take turns, and one may be given turns in advance
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from confab.planner.grounded.task import Task
 from confab.reasoner.limits import check
 
 MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
-"""Maximum bytes of the states kept by one search, approximately, and bytes of a state besides its bits."""
+"""Maximum size of the states kept by one search, in bytes, and size of a state besides its bits."""
 Entry = TypeVar("Entry")
 
 
@@ -30,10 +30,10 @@ class Candidate(NamedTuple):
 
 
 class Order(Protocol):
-    """What is tried next. `work` grows by what that takes, in bits followed by relaxed plans; a turn is over with `turn` of it.
+    """An order of search. `work` counts bits processed by relaxed plans; a turn ends after `turn` of it.
 
-    `reached` holds for each state the candidate by which it was reached last, `bytes` is what is kept besides these states; `best`
-    is the state in which a plan ends, if one was found.
+    `reached` maps each state to the candidate that reached it last; `bytes` is the memory used besides these states; `best` is the
+    final state of the best plan found, if any.
     """
 
     reached: dict[int, Candidate]
@@ -43,10 +43,10 @@ class Order(Protocol):
     best: int | None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield candidates until there are none left, or a good enough plan was found."""
+        """Yield candidates until none are left or a sufficiently good plan was found."""
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state that was just reached; discard it if the goal is out of its reach."""
+        """Rank a newly reached state; discard it if the goal is unreachable from it."""
 
 
 def explore(task: Task, order: Order) -> Iterator[int]:
@@ -55,7 +55,7 @@ def explore(task: Task, order: Order) -> Iterator[int]:
     Raises
     ------
     MemoryError
-        There are more states than may be kept.
+        The number of states exceeds the maximum.
     """
     reached, each = order.reached, STATE_BYTES + task.size // 4
     first = Candidate(task.initial, (), task.initial, 0.0)
@@ -106,5 +106,5 @@ class OpenList(Generic[Entry]):
         return which, self.queues[which][0][2]
 
     def drop(self, queue: int) -> None:
-        """Take the first entry out of a queue."""
+        """Remove the first entry of a queue."""
         heapq.heappop(self.queues[queue])

@@ -1,7 +1,7 @@
-"""Conditions with individuals put in, as conjunctions of bits.
+"""Ground conditions as conjunctions of bits.
 
-What doesn't speak of a witness is apart from it: "the ferry is here, and some car waits there" is the ferry's bit and a bit for the
-car, which is worked out once for each place.
+Conditions that don't mention a witness's variable are split from it: "the ferry is here, and some car waits there" is the ferry's
+bit and one bit for the car, which is derived once for each place.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ class _Part:
 
 
 class Formulas:
-    """Conditions with individuals put in, as conjunctions of bits. Disjunctions become derived bits, each made once.
+    """Ground conditions as conjunctions of bits. Disjunctions become derived bits, each created once.
 
-    Until `facts` is filled, situation types that change have no bits: only static conditions may be asked about.
+    Until `facts` is filled, changeable situation types have no bits, so that only static conditions can be evaluated.
     """
 
     def __init__(self, reached: Known) -> None:
@@ -84,9 +84,9 @@ class Formulas:
         self.complements: dict[int, int] = {}
         self.facts_of: dict[int, int] = {}  # their opposite
         self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
-        self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # of disjunctions, by bit
+        self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # alternatives of disjunctions, by bit
         self.asked = 0
-        self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # by part and what it has from outside
+        self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # by part and individuals bound outside
         self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Part]]]] = {}
         self._relations: dict[tuple[str, int, int, tuple[int, ...]], dict[tuple[str, ...], dict[str, None]]] = {}
         self._members: dict[str, dict[str, None]] = {}
@@ -95,12 +95,10 @@ class Formulas:
     def condition(
         self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
     ) -> Literals:
-        """Return the formula of a condition (negated: of its contrary)."""
+        """Return the formula of a condition, or of its negation."""
         self.asked += 1
         if self.asked > CONDITIONS_PER_ROW * self.reached.most:
-            raise UngroundableError(
-                f"more than {CONDITIONS_PER_ROW * self.reached.most} conditions with individuals put in"
-            )
+            raise UngroundableError(f"more than {CONDITIONS_PER_ROW * self.reached.most} ground conditions")
         if not self.asked % 1024:
             self.reached.check_time()
 
@@ -127,7 +125,7 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return the formula for some group to hold with some individuals for its own variables (negated: for none)."""
+        """Return the formula for some group to hold for some individuals as its variables (negated: for none)."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
@@ -248,7 +246,7 @@ class Formulas:
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
         """Return the formula for a symbol to have a value (negated: not to have it)."""
         kind = self.reached.situations.get(situation)
-        if kind is None:  # it doesn't exist on this level
+        if kind is None:  # the situation type doesn't exist on this level
             return () if negated else None
         if kind.boolean and value == FALSE:
             if not all(a in self.members(k) for a, k in zip(arguments, kind.arguments, strict=True)):

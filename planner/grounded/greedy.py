@@ -1,8 +1,8 @@
-"""The order by h_FF: what comes from a state with the least h first, with preferred operators and lookahead.
+"""The order by h_FF: successors of the state with the least h first, with preferred operators and lookahead.
 
-open list   states with the operators that are still to be tried in them, by h: in one queue all that are applicable, in another
-            those of the relaxed plan
-least       a new least h gives the preferred operators turns in advance, and is followed by a lookahead
+open list   states with their untried operators, by h: one queue with all applicable operators, one with those of the relaxed
+                        plan
+least       a new least h gives the preferred operators turns in advance and starts a lookahead
 
 A state is evaluated when it is reached and its operators are applied one by one: Richter and Helmert, "Preferred operators and
 deferred evaluation in satisficing planning", ICAPS 2009.
@@ -19,15 +19,15 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 BOOST = 1000
-"""Turns of the preferred operators after a new least h."""
+"""Number of turns given to the preferred operators after a new least h."""
 ALL, PREFERRED = 0, 1
 
 Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
-"""From a state and its relaxed plan to a later state, and the operators that lead there."""
+"""Maps a state and its relaxed plan to a later state and the operators that lead to it."""
 
 
 class Greedy:
-    """The order by h of a task; `counts` grows."""
+    """The order by h of a task; `counts` is updated."""
 
     def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
         self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts
@@ -59,7 +59,7 @@ class Greedy:
                 yield Candidate(state, (operator,), after, 0.0)
 
     def put(self, candidate: Candidate) -> None:
-        """Evaluate a state; if the goal is within reach, its operators become candidates."""
+        """Evaluate a state; if the goal is reachable from it, its operators become candidates."""
         state = candidate.state
         if state & self.task.goal == self.task.goal:
             self.best = state

@@ -1,15 +1,15 @@
 """Grounding: one level of a problem becomes a `Task`, by joins in rounds of relaxed reachability.
 
-reach      what can become true if nothing ever becomes false (`confab.planner.grounded.reachability`)
-assemble   bits for the facts that can change, operators for the rows that were joined
-goal       a wanted fact that isn't reachable even so proves that there is no plan
+reach      facts that can become true under delete relaxation (`confab.planner.grounded.reachability`)
+assemble   bits for the facts that can change, operators for the joined rows
+goal       an unreachable goal proves that there is no plan
 
-Conditions that only a state can decide are left out of the joins, which keeps reachability on the safe side; they are
-worked out once per combination of individuals when operators are assembled, as conjunctions of literals
+Conditions that depend on the state are left out of the joins, so reachability is overestimated; they become conjunctions of
+literals, once per combination of individuals, when operators are assembled
 (`confab.planner.grounded.reachability`).
 
-Semi-naive grounding as a database does it: Helmert, "Concise finite-domain representations for PDDL planning tasks",
-Artificial Intelligence 173 (2009), section 6. We join arrays and not tuples, and keep one value per symbol from the
+Semi-naive grounding as in databases: Helmert, "Concise finite-domain representations for PDDL planning tasks",
+Artificial Intelligence 173 (2009), section 6. Here arrays are joined instead of tuples, and each symbol has one value from the
 start.
 """
 
@@ -49,8 +49,8 @@ from confab.reasoner.symbols import (
 MOST_ROWS = 20_000_000
 """Maximum size of one join: about 1 GB."""
 SAID_ONCE = 20_000
-"""Minimum number of conditions saved, over all operators, before a shared condition is evaluated once per state: going through as
-many for one relaxed plan takes a millisecond."""
+"""Minimum number of conditions saved, over all operators, before a shared condition is evaluated once per state: evaluating that
+number of conditions for one relaxed plan takes a millisecond."""
 
 
 def ground(
@@ -72,23 +72,23 @@ def ground(
     initial, goal : State, optional
         In place of the problem's own.
     most : int
-        Rows that one join may have.
+        Maximum number of rows of one join.
     deadline : float, optional
         On the clock of `time.perf_counter`.
     apart : bool
-        Whether operators may be told apart by arguments and effects alone: where some crane is asked for, not by which.
+        Whether operators may be identified by arguments and effects alone: "some crane is free", whichever crane it is.
 
     Returns
     -------
     Task or Reason
-        A reason proves that no behaviours of this level lead from `initial` to `goal`, and says why.
+        A reason proves that no behaviours of this level lead from `initial` to `goal`, and states the cause.
 
     Raises
     ------
     UngroundableError
-        A join would have more than `most` rows, or an amount that changes is divided by, or multiplied by another.
+        A join would exceed `most` rows, or an amount that changes is a divisor or is multiplied by another.
     OutOfTimeError
-        The deadline came first.
+        The deadline has passed.
     DomainError
         A behaviour names a variable that nothing determines.
     """
@@ -129,7 +129,7 @@ class _Assembly:
             wanted = tuple(sorted({one for bit in wanted for one in means[bit]}))
         if wanted is None:
             return self._excluded(goal)
-        # Number the operators, then the conditional effects behind them; those whose operator fell away fall away too.
+        # Number the operators, then their conditional effects; a conditional effect whose operator was dropped is dropped, too.
         owners, first, count = {}, {}, 0
         for i in base:
             first[i] = count
@@ -188,7 +188,7 @@ class _Assembly:
         amounts = reached.amounts
         self.constants |= {symbol: amounts.text(symbol) for symbol in amounts.now if symbol not in amounts.place}
         size = len(self.facts)
-        for name in sorted(reached.defined):  # behind all that can be stated
+        for name in sorted(reached.defined):  # after all stated facts
             table = reached.tables["situation", name]
             self.fact_bit[name] = np.arange(size, size + len(table))
             rows = (tuple(names[i] for i in row) for row in table.rows.tolist())
@@ -210,7 +210,7 @@ class _Assembly:
         return found
 
     def _needs(self, schema: Schema, rows: Ints) -> tuple[Ints, tuple[Ints, Ints]]:
-        """Return the rows of a schema that can ever hold, and pairs of row and bit that it needs."""
+        """Return the rows of a schema that can ever hold, and pairs of a row and a bit that it requires."""
         place = {name: column for column, name in enumerate(schema.terms)}
         columns = {name: rows[:, column] for name, column in place.items()}
         keep = np.ones(len(rows), bool)
@@ -248,13 +248,13 @@ class _Assembly:
     def _derived(
         self, rows: Mapping[int, Ints], needs: Mapping[int, tuple[Ints, Ints]]
     ) -> tuple[Derived, list[tuple[tuple[int, ...], int]], Grouped | None]:
-        """Return the bits that follow from others; for the relaxed task each way in which one does; and what each bit means.
+        """Return the derived bits, the alternatives of each for the relaxed task, and the meaning of each bit.
 
-        A bit that follows in one way only stands for what that way asks, and isn't kept itself, unless that is much and
-        asked often: that nobody stands in a place.
+        A bit with one alternative is replaced by the bits of that alternative, unless the alternative is long and many operators
+        require it ("no object stands in that place").
         """
         formulas = self.formulas
-        ways: dict[int, dict[tuple[int, ...], None]] = {}  # of each bit of a situation type that is defined
+        ways: dict[int, dict[tuple[int, ...], None]] = {}  # alternatives of each bit of a defined situation type
         for name in self.reached.defined:
             ways |= {int(bit): {} for bit in self.fact_bit[name]}
         for i, schema in enumerate(self.reached.schemas):
@@ -299,10 +299,10 @@ class _Assembly:
         return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
-        """Add the conditions for a defined fact not to hold, where they are needed and the definition isn't recursive."""
+        """Add the conditions under which a defined fact doesn't hold, where required and unless the definition is recursive."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
-        for bit in waiting:  # which grows
+        for bit in waiting:  # the list grows
             self.reached.check_time()
             if bit in circular:
                 continue
@@ -324,7 +324,7 @@ class _Assembly:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
     def _excluded(self, goal: State) -> Reason:
-        """Return the goal that no state satisfies; if each is satisfiable, they exclude one another."""
+        """Return the reason that a goal holds in no state; if each goal alone is satisfiable, the goals exclude one another."""
         for symbol, value in sorted(goal.items()):
             if self.formulas.wanted(symbol, value) is None:
                 quantity = self.reached.problem.domain.situations[symbol.situation].quantity
@@ -350,7 +350,7 @@ class _Assembly:
         owner = np.concatenate([owners[i] for i in sorted(first, key=first.__getitem__)] or [np.empty(0, np.int64)])
         own_row = np.concatenate([needs[i][0] + first[i] for i in first] or [np.empty(0, np.int64)])
         own_bit = np.concatenate([needs[i][1] for i in first] or [np.empty(0, np.int64)])
-        # A conditional effect needs what its operator needs as well.
+        # A conditional effect also requires the preconditions of its operator.
         of_operator = _grouped(own_row[own_row < operators], own_bit[own_row < operators], operators)
         extra = np.arange(operators, count)
         lengths = np.diff(of_operator.starts)[owner[extra]]
@@ -442,8 +442,8 @@ class _Assembly:
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
         costs, prices = self._costs(bases, rows, first)
-        # In the relaxed task a conditional effect that sets no bit tells nothing. An alternative of a derived bit is an
-        # operator of no cost there, owned by nobody.
+        # In the relaxed task a conditional effect that sets no bit is useless. An alternative of a derived bit is an
+        # operator of cost 0 there, without an owner.
         telling = (np.arange(count) < operators) | (np.diff(add.starts) > 0)
         relaxed_needs, relaxed_adds, owner = _with_derived(
             _only(need, telling), _only(add, telling), owner[telling], [*cases, *left]
@@ -471,7 +471,7 @@ class _Assembly:
     def _costs(
         self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int]
     ) -> tuple[list[float], dict[int, Linear]]:
-        """Return the least cost of each operator, and those whose cost depends on amounts."""
+        """Return the least cost of each operator, and the operators whose cost depends on amounts."""
         costs: list[float] = []
         prices: dict[int, Linear] = {}
         for i in bases:
@@ -484,7 +484,7 @@ class _Assembly:
             for operator, row in enumerate(rows[i].tolist(), first[i]):
                 terms = dict(zip(schema.terms, (self.reached.individuals[n] for n in row), strict=True))
                 found = self.reached.amounts.linear(price, terms)
-                assert found is not None  # which the preconditions ask
+                assert found is not None  # the preconditions require a value
                 if found.terms:
                     prices[operator] = found
                 costs.append(max(float(found.bounds(self.reached.amounts.quantities)[0]), 0.0))
@@ -525,7 +525,7 @@ class _Assembly:
         return np.concatenate(parts) if parts else np.empty((0, 4), np.int64)
 
     def _moves(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> dict[int, list[Move]]:
-        """Return the changes of amounts by each relaxed operator that has some."""
+        """Return the changes of amounts by each relaxed operator that has any."""
         names, table = self.reached.individuals, self.reached.amounts
         found = defaultdict[int, list[Move]](list)
         for i, begin in first.items():
@@ -573,7 +573,8 @@ class _Assembly:
     ) -> tuple[Grouped, list[tuple[tuple[int, ...], int]]]:
         """Return the bits that each relaxed operator may set: complements only of values that the symbol may have had.
 
-        Where these are many, operators set a bit of the relaxed task that says "changed"; what follows from it is returned, too.
+        Where these are many, operators set one auxiliary bit "changed" of the relaxed task; the bits implied by it are returned,
+        too.
         """
         changed: dict[int, int] = {}
         opposites: dict[int, dict[int, int]] = {}
@@ -599,7 +600,7 @@ class _Assembly:
                 had, of = known.get(relaxed * stride + symbol), opposites[symbol]
                 lost.append((relaxed, symbol, [o for value, o in of.items() if value != bit and had in (None, value)]))
             more = sum(len(bits) for _, _, bits in lost) - len(lost)
-            if more > SAID_ONCE and not self.reached.amounts.place:  # what was used up is counted by who sets a bit
+            if more > SAID_ONCE and not self.reached.amounts.place:  # consumption is counted per bit
                 several = dict.fromkeys(symbol for _, symbol, bits in lost if len(bits) > 1)
                 changed = {symbol: self.formulas.fresh() for symbol in several}
             lost = [(r, s, [changed[s]] if s in changed and len(bits) > 1 else bits) for r, s, bits in lost]
@@ -636,7 +637,7 @@ def _meaning(
     circular: AbstractSet[int],
     means: dict[int, tuple[int, ...]],
 ) -> None:
-    """Put into `means` what a bit stands for: what its only way asks if it has one, or else the bit itself."""
+    """Enter the meaning of a bit into `means`: the bits of its only alternative if it has just one, otherwise the bit itself."""
     waiting = [bit]
     while waiting:
         one = waiting[-1]
@@ -654,7 +655,7 @@ def _meaning(
 
 
 def _expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
-    """Return pairs of row and bit with what each bit means in its place."""
+    """Return pairs of row and bit in which each bit is replaced by its meaning."""
     counts = np.diff(means.starts)[bit]
     return np.repeat(row, counts), means.items[ranges(means.starts[bit], counts)]
 

@@ -1,12 +1,12 @@
-"""The relaxed-plan heuristic h_FF, which also tells what is applicable and what is preferred.
+"""The relaxed-plan heuristic h_FF, which also yields the applicable and the preferred operators.
 
-layer      bits that are reached together; a relaxed operator is reached with the last bit that it needs
-cost       of a bit: of the cheapest operator that sets it, its own number of repetitions plus the costs of what it needs
-repeated   an operator that moves an amount towards a comparison counts as often as the comparison needs: the difference
-           divided by the change that the operator makes; once where that change depends on the state
-plan       the operators behind the goal; those of the first layer are the applicable ones
+layer      bits that are reached together; a relaxed operator is reached with the last of its required bits
+cost       of a bit: the repetitions of the cheapest operator that sets it plus the costs of that operator's required bits
+repeated   an operator that moves an amount towards a comparison counts as often as the comparison needs it: the difference
+                      divided by the operator's change; once where that change depends on the state
+plan       the supporters of the goal; those of the first layer are applicable
 
-A goal that isn't reached even so can't be reached at all.
+A goal that is unreachable in the relaxed task is unreachable.
 
 Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001); additive costs choose the supporters, as in Keyder and Geffner,
 "Heuristics for planning with action costs revisited", ECAI 2008; repetitions: Scala, Haslum, Thiébaux and Ramirez, "Subgoaling
@@ -25,13 +25,13 @@ from confab.planner.grounded.amounts import Exact, Linear, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
-"""Maximum number of repetitions that count: a distance has to be told from a longer one, and no more."""
+"""Maximum number of repetitions that count, enough to distinguish distances."""
 Push: TypeAlias = "tuple[Linear, str, Exact | None]"
-"""A difference, the sign that it has to have, and how far an operator moves it; None if that depends on the state."""
+"""A difference, its required sign, and how far an operator moves it; None if that depends on the state."""
 
 
 class Evaluation(NamedTuple):
-    """h of a state, its relaxed plan in the order of layers, the applicable operators, and the work of finding these, in bits."""
+    """h of a state, its relaxed plan by layers, the applicable operators, and the work of finding these, in bits."""
 
     h: int
     plan: list[int]
@@ -40,7 +40,7 @@ class Evaluation(NamedTuple):
 
 
 Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
-"""To the evaluation of a state; None if the goal isn't reachable from it."""
+"""Maps a state to its evaluation; None if the goal isn't reachable from it."""
 
 
 def heuristic(task: Task) -> Evaluate:
@@ -61,7 +61,7 @@ def heuristic(task: Task) -> Evaluate:
     of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
     def counted(state: int) -> tuple[list[int], set[int]]:
-        """Return how often each relaxed operator has to be repeated, and those that don't help however often they are."""
+        """Return the number of repetitions of each relaxed operator, and the operators that never help."""
         times, useless = once[:], set[int]()
         if amounts is not None:
             vector = amounts.vector(state)
@@ -105,13 +105,13 @@ def heuristic(task: Task) -> Evaluate:
                         layer.append(bit)
                     elif total < known:
                         cost[bit], supporter[bit] = total, o
-            # An operator that comes later may need fewer repetitions.
+            # A later operator may need fewer repetitions.
             if not layer or (not repeated and all(cost[bit] >= 0 for bit in goal)):
                 break
             reached = []
         if any(cost[bit] < 0 for bit in goal):
             return None
-        chosen: dict[int, tuple[int, int]] = {}  # operator: layer in which its effect is wanted first, repetitions
+        chosen: dict[int, tuple[int, int]] = {}  # operator: first layer in which its effect is required, repetitions
         waiting, seen = goal[:], set(goal)
         while waiting:
             bit = waiting.pop()
@@ -135,9 +135,9 @@ def heuristic(task: Task) -> Evaluate:
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[Push, list[int]]]:
-    """Return what the relaxed operators need and add, their owners, and those that move an amount, by how far.
+    """Return the required and added bits of the relaxed operators, their owners, and by how far they move amounts.
 
-    One that moves amounts towards a comparison is a relaxed operator of its own.
+    An operator that moves amounts towards a comparison is a separate relaxed operator.
     """
     needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
     repeated = defaultdict[Push, list[int]](list)
@@ -166,7 +166,7 @@ def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
 
 
 def _times(amount: Exact, sign: str, push: Exact | None) -> int:
-    """Return how often an operator has to be done until a difference is what its sign says; 0 if never."""
+    """Return how often an operator must be applied until a difference has the required sign; 0 if never."""
     if push is None:
         return 1
     if sign == "=":

@@ -1,6 +1,6 @@
-"""Tables of small integers and their joins, which is what grounding spends its time on.
+"""Tables of small integers and their joins, which take most of the time of grounding.
 
-A `Table` is append-only, so that "what was known before this round" is a prefix of its rows: semi-naive evaluation
+A `Table` is append-only, so the rows known before a round are a prefix of its rows: semi-naive evaluation
 needs no second table. An index sorts the rows by some columns once per size of the table; a match is then a binary
 search.
 """
@@ -17,11 +17,11 @@ from confab.reasoner.limits import check
 
 Ints = NDArray[np.int64]
 PAIR = 1e-7
-"""Seconds that a row of a join takes at least. A join can't be interrupted, so one that would outlast the deadline isn't begun."""
+"""Minimum time of a row of a join, in seconds. A join can't be interrupted, so one that would exceed the deadline isn't begun."""
 
 
 class Table:
-    """Distinct rows of integers in [0, radix), in the order in which they came."""
+    """Distinct rows of integers in [0, radix), in order of insertion."""
 
     def __init__(self, arity: int, radix: int) -> None:
         self.arity, self.radix = arity, radix
@@ -32,7 +32,7 @@ class Table:
         return len(self.rows)
 
     def add(self, rows: Ints) -> None:
-        """Append those of the rows that aren't there yet, each once."""
+        """Append the rows that aren't in the table yet, each once."""
         if not len(rows):
             return
         keys = pack(rows, self.radix)
@@ -81,7 +81,7 @@ class Table:
         return left, order[places]
 
     def _index(self, columns: tuple[int, ...]) -> tuple[NDArray[np.generic], Ints]:
-        """Return the rows' keys on some columns in order, and whose they are."""
+        """Return the rows' keys on some columns in ascending order, and the row of each key."""
         size, keys, order = self._indices.get(columns, (-1, _NONE, _NONE))
         if size != len(self):
             unsorted = pack(self.rows[:, columns], self.radix)
@@ -97,7 +97,7 @@ _NONE: Ints = np.empty(0, np.int64)
 def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
     """Return one key per row, equal where the rows are and in their lexicographic order.
 
-    An integer where the row fits into 63 bits, else its bytes, most significant first.
+    The key is an integer where the row fits into 63 bits, otherwise its bytes, most significant first.
 
     >>> pack(np.array([[1, 2], [0, 3]]), 10).tolist()
     [12, 3]

@@ -1,6 +1,6 @@
 """Landmarks: facts that every plan makes true at some time.
 
-The landmarks of an operator are all facts behind its needs, and those of a fact are what all operators that set it have in common.
+The landmarks of an operator are those of its required bits; the landmarks of a fact are common to all operators that set it.
 
 Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
 """
@@ -12,17 +12,17 @@ from time import perf_counter
 from confab.planner.grounded.task import Task, bits_of
 
 LOOK = 1_000
-"""Operators between two looks at the clock."""
+"""Number of operators between two checks of the clock."""
 
 
 def landmarks(task: Task, deadline: float | None = None) -> int:
-    """Return facts that every plan makes true at some time, the goal's among them; these alone where time is over.
+    """Return facts that every plan makes true at some time, the goals included; after the deadline, the goals alone.
 
-    The deadline is on the clock of `time.perf_counter`: thousands of ways to each of thousands of facts take seconds.
+    The deadline is on the clock of `time.perf_counter`: thousands of achievers for each of thousands of facts take seconds.
     """
     behind = [
         0 if task.initial >> bit & 1 else -1 for bit in range(task.size)
-    ]  # what is true before; -1: not reached yet
+    ]  # landmarks of each bit; -1: not reached yet
     ways = list(zip(task.needs.lists(), task.adds.lists(), strict=True))
     before = None
     while before != behind:

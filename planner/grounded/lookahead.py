@@ -1,4 +1,4 @@
-"""Lookahead: execute a relaxed plan as far as possible, and replace operators where it gets stuck.
+"""Lookahead: execute a relaxed plan as far as possible, and replace operators where no operator of it is applicable.
 
 Vidal, "A lookahead strategy for heuristic search planning", ICAPS 2004.
 """
@@ -15,18 +15,18 @@ from typing import TypeAlias
 from confab.planner.grounded.task import Task, bits_of
 
 ENABLING = 8
-"""Maximum number of bits for which a replacement is tried where a relaxed plan is stuck."""
+"""Maximum number of missing bits for which a replacement is tried where no operator is applicable."""
 Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""
 
 
 def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
-    """Return a function that carries out a relaxed plan as far as it goes, from a state: what is reached, and by which operators.
+    """Return a function that executes a relaxed plan from a state as far as possible and returns the final state and its operators.
 
-    Where no operator of it is applicable, one is replaced by an applicable one that brings about what it was to bring about for
-    a later one or the goal: a truck that went north in the meantime comes from there. Else one is put in that brings about what
-    others lack and only that: it drives back, so that the next can be loaded. Of several, that after which most goals hold once
-    the rest was carried out as far as it goes.
+    Where none of its operators is applicable, one is replaced by an applicable operator that sets the same bit for a later operator
+    or the goal: a truck that has moved north meanwhile starts from there. Otherwise an operator is inserted that sets the one bit
+    which others lack: the truck drives back, so that the next parcel can be loaded. Of several such operators, the one is chosen
+    after which most goals hold when the rest has been executed.
     """
 
     @cache
@@ -52,7 +52,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
         return found
 
     def replaced(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
-        needed = [task.goal]  # by the goal and, from the last on, by the operators behind
+        needed = [task.goal]  # required by the goal and by the later operators, from the last one
         for operator in reversed(stuck):
             needed.append(needed[-1] | task.known(operator)[0])
         for i, operator in enumerate(stuck):
@@ -66,7 +66,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
     def in_turn(state: int, left: Sequence[int]) -> tuple[int, list[int], list[int]]:
         done, stuck = [], []
         for operator in left:
-            if set_by(operator) & ~state:  # else it has nothing left to do
+            if set_by(operator) & ~state:  # otherwise its effects hold already
                 after = task.applied(state, operator)
                 if after is None:
                     stuck.append(operator)

@@ -1,15 +1,15 @@
-"""The order by novelty: a state comes first that has a fact which no state before it had at the same distance from the goal.
+"""The order by novelty: states first that have a fact which no earlier state had at the same distance from the goal.
 
-open        goals that don't hold, and landmarks that weren't met yet
-distance    what is open, and of the facts of a relaxed plan, made where the last of these was met, those met since
-novel       some fact is new among the states of the same distance: one "and" of two integers
-open list   states by novelty, then by what is open; of equal ones the last comes first
+open        goals that don't hold, and landmarks that haven't been met yet
+distance    the open goals and landmarks, and the number of facts met of the relaxed plan made when the last of these was met
+novel       a fact is new among the states of the same distance: one "and" of two integers
+open list   states by novelty, then by the number of open goals and landmarks; among equals the last comes first
 
-A relaxed plan is made only for states that meet what was open and are expanded, so that the order ranks a hundred thousand states a
-second. No state is dropped: where the open list runs empty, there is no plan.
+Relaxed plans are made only for expanded states that meet an open goal or landmark, so that the order ranks a hundred thousand
+states a second. No state is dropped: if the open list is exhausted, there is no plan.
 
 Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
-cut off at one.
+restricted to width one.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 CHILD, VISIT = 20, 2
-"""Number of bits that h_FF reads in the time of making one successor, and of visiting a tree node."""
+"""Number of bits that h_FF processes in the time of making one successor, and of visiting a tree node."""
 
 
 class Place(NamedTuple):
-    """Where a state is: how much is open, landmarks to come, facts of its relaxed plan (-1: not made yet), and those met."""
+    """The progress of a state: open goals, landmarks ahead, facts of its relaxed plan (-1: not made yet), and facts met."""
 
     state: int
     open: int
@@ -38,7 +38,7 @@ class Place(NamedTuple):
 
 
 class Novelty:
-    """The order by novelty of a task; a relaxed plan takes `relaxing` bits; `marks` are landmarks; `counts` grows."""
+    """The order by novelty of a task; a relaxed plan costs `relaxing` bits; `marks` are landmarks; `counts` is updated."""
 
     def __init__(self, task: Task, evaluate: Evaluate, relaxing: int, marks: int, counts: Counts) -> None:
         self.task, self.evaluate, self.counts = task, evaluate, counts
@@ -46,10 +46,8 @@ class Novelty:
         self.work, self.turn, self.bytes = 0, relaxing, 0
         self.open = OpenList[Place]()
         self.best: int | None = None
-        above = -1 << task.size if task.amounts else 0  # where the number of the amounts is, which is no fact
-        self.known: defaultdict[tuple[int, int], int] = defaultdict(
-            lambda: above
-        )  # of each distance, the facts met there
+        above = -1 << task.size if task.amounts else 0  # the number of the amounts is no fact
+        self.known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # facts met, by distance
         self.begin = Place(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
 
     def candidates(self) -> Iterator[Candidate]:
@@ -92,7 +90,7 @@ class Novelty:
         self.open.push((not state & ~old, open_, -len(self.reached)), place)
 
     def relaxed(self, place: Place) -> Place | None:
-        """Return the position of a state with the facts of its relaxed plan; None if the goal is out of reach."""
+        """Return the progress of a state with the facts of its relaxed plan; None if the goal is unreachable."""
         if place.wanted >= 0:
             return place
         evaluation = self.evaluate(place.state)
@@ -108,7 +106,7 @@ class Novelty:
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
-    """Return the bits of a state that an operator keeps, and those that it sets; None if that depends on the state."""
+    """Return the bits of a state that an operator keeps, and the bits that it sets; None if that depends on the state."""
     changes = task.known(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None

@@ -1,13 +1,13 @@
-"""Shorter plans: a window of steps is replaced where a bounded search finds fewer that do what the rest of the plan needs.
+"""Shorter plans: a window of steps is replaced if a bounded search finds fewer steps with the effects that later steps need.
 
-window      consecutive steps, from the state before them to the bits that the steps behind it (and the goal) need; amounts are
-            as these want them if the steps behind still lead to the goal
-operators   those nearest to the window: reachable early from its start and wanted early by its end
-search      A* with h_FF on these operators alone (`confab.planner.grounded.shortest`); what can't become shorter by h is cut off
-whole       in the end the whole plan is such a window, with all operators, h counting for more, for the work that is left
-order       windows are tried on the plan as it is and regrouped, so that a step stands behind one that it depends on
+window      consecutive steps, from the state before them to the bits that the later steps and the goal need; amounts must only
+                        allow the later steps to lead to the goal
+operators   those nearest to the window: reachable early from its start and useful late for its end
+search      A* with h_FF on these operators alone (`confab.planner.grounded.shortest`); branches that can't be shorter by h are cut
+whole       finally the whole plan is one window, with all operators and a greater weight of h, for the remaining work
+order       windows are tried on the plan as it is and regrouped, so that a step follows one that it depends on
 
-Work is counted in operators looked at and never in seconds, so the same plan is improved alike on any machine.
+Work is counted in operators examined and never in seconds, so that the same plan is shortened in the same way on any machine.
 
 Action elimination (`shortened`): Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
 2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
@@ -32,7 +32,7 @@ from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
-"""Maximum number of states for a cheapest plan, instead of windows."""
+"""Maximum number of states and steps for the search of a cheapest plan, instead of windows."""
 WAYS = 20
 """Number of alternatives of derived bits processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
@@ -42,20 +42,20 @@ OPERATORS, EVALUATIONS = 150, 100
 WEIGHT = 3
 """Maximum evaluations of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
-"""Maximum number of repeated operators to find steps that can be left out."""
+"""Maximum number of replayed operators when removing needless steps."""
 LOOK = 50
 """Number of operators ranked in the time of one evaluation."""
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
-    """Return a plan that costs no more than a given one: a cheapest one if few states suffice, otherwise by replacing windows.
+    """Return a plan that costs no more than a given one: a cheapest plan if few states suffice, otherwise by replacing windows.
 
     Parameters
     ----------
     task : Task
     plan : sequence of int
         Operators that lead from the task's initial state to its goal.
-    work : int
+    Maximum number of operators examined; a second covers half a million to a million.
         Operators that may be looked at, half a million to a million per second.
     deadline : float, optional
         On the clock of `time.perf_counter`.
@@ -68,7 +68,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         if proved:
             return best
     if task.prices:
-        return best  # fewer steps may cost more, depending on where they are done
+        return best  # fewer steps may cost more, depending on the state
     windows = _Windows(task, work, deadline)
     while True:
         before = len(best)
@@ -82,7 +82,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
-    """Return a cheapest plan or, if few states don't suffice, the given one; and whether it is proved cheapest."""
+    """Return a cheapest plan, or the given one if few states don't suffice; and whether it is proved cheapest."""
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
@@ -91,9 +91,9 @@ def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> 
 
 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
-    """Return a plan without steps that the goal doesn't need, nor steps that only those need.
+    """Return a plan without the steps that neither the goal nor a remaining step needs.
 
-    Of a very long plan only the first steps are tried.
+    Of a very long plan only the first steps are tested.
     """
     plan = list(plan)
     state, i, work = task.initial, 0, TRIALS
@@ -112,9 +112,9 @@ def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) ->
 
 
 def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
-    """Return a plan's steps in an order in which a step stands behind the latest that it depends on, as far as that leads on.
+    """Return a plan's steps reordered so that a step follows the latest step that it depends on, as far as the goal is still met.
 
-    Steps that depend on one another, or of which one would undo what the other needs, keep their order.
+    Steps keep their order if one depends on the other or would undo the other's precondition.
     """
     n = len(plan)
     states = _states(task, plan)
@@ -237,7 +237,7 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
-        """Search fewer steps from a state to the required bits; valid as far as the window's operators determine."""
+        """Search fewer steps from a state to the required bits; applicable as far as the window's operators determine."""
         if (state, wanted, len(steps)) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
@@ -269,7 +269,7 @@ class _Windows:
 
     @cached_property
     def arrays(self) -> tuple[Ints, Ints, Ints]:
-        """Of the relaxed operators: owner, and row per need and per add."""
+        """Arrays of the relaxed operators: owner, and row per required bit and per added bit."""
         task = self.task
         number = np.arange(len(task.owners))
         return (
@@ -284,9 +284,9 @@ class _Windows:
         return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
 
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
-        """Return the operators nearest to a window, in ascending order, its own among them.
+        """Return the operators nearest to a window, in ascending order, including its own.
 
-        What ends a bit that is wanted behind the window and that no step of it ends is left out: it would have to be undone.
+        Operators that clear a required bit that no step of the window clears are left out: their effect would have to be undone.
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
@@ -332,9 +332,9 @@ class _Windows:
         return sorted(chosen)
 
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
-        """Return the task of getting from a state to what is wanted by some operators, and those of them that it has.
+        """Return the task of reaching the required bits from a state by some operators, and those of them that it contains.
 
-        What they don't change has no bit; those that ask for it are left out where the state hasn't it.
+        Symbols that these operators don't change have no bits; operators that require another value of them are left out.
         """
         task = self.task
         if task.amounts is not None:
@@ -387,7 +387,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the same state with all bits, by which amounts are identified."""
+        """Return the same task with all bits, which identify amounts."""
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]

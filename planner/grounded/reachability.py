@@ -1,4 +1,4 @@
-"""Relaxed reachability: the facts of a level that can become true if none becomes false, by joins in rounds."""
+"""Relaxed reachability: the facts of a level that can become true under delete relaxation, by joins in rounds."""
 
 from __future__ import annotations
 
@@ -42,21 +42,21 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 
 class Reached:
-    """The tables of a level, and what becomes reachable in them.
+    """The tables of a level, and the facts reachable in them.
 
     Attributes
     ----------
     tables : mapping of (kind, name) to Table
-        Kind is situation, relation or class; the rows of a situation type are arguments and value (no value if it is
-        boolean, of which only the true ones are listed).
+        Kind is situation, relation or class; a row of a situation type has the arguments and the value (no value if it is
+        boolean, since only true facts are listed).
     rows : list of Ints
-        Per schema, the individuals put in for its terms.
+        Per schema, the individuals of its terms.
     changed : set of situation types
         Those that behaviours change or rules define.
     together : set of relations
-        Those that were made for effects of one shape.
+        Auxiliary relations for effects of the same shape.
     made : set of situation types
-        Those that stand for a part of a rule, which nobody has named.
+        Auxiliary situation types that represent a part of a rule.
     """
 
     def __init__(
@@ -146,7 +146,7 @@ class Reached:
         table.add(np.array(flat, np.int64).reshape(len(rows), arity))
 
     def close(self) -> None:
-        """Join every schema with what is new, until nothing is."""
+        """Join every schema with the new rows, until there are none."""
         fluents = [("situation", name) for name in self.situations]
         before = dict.fromkeys(fluents, 0)
         found: list[list[Ints]] = [[] for _ in self.schemas]
@@ -235,7 +235,7 @@ class Reached:
         check("grounding")
 
     def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
-        """Return the first of the atoms that match the fewest rows; an atom without new variables is always good enough."""
+        """Return the atom that matches the fewest rows, the first among equals; an atom without new variables is always taken."""
         best, least = -1, float("inf")
         for i in waiting:
             rows = self._fan_out(schema.atoms[i], columns)

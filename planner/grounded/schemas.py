@@ -1,11 +1,11 @@
-"""Behaviours in the form in which they are joined: a conjunction of atoms, filters, and what only a state can decide.
+"""Behaviours in the form in which they are joined: a conjunction of atoms, filters, and conditions that depend on the state.
 
-Atom        a table's row has to match it: a positive value or relation, a class
-filter      decided by static knowledge alone, once its variables are bound
-residue     the rest: negated values, disjunctions, "none such that"
+Atom        a condition that a row of a table must match: a positive value or relation, a class
+filter      a condition that static facts decide once its variables are bound
+residue     the other conditions: negated values, disjunctions, "no object such that"
 
-A positive `Witness` becomes a variable of its own. Variables that no atom binds are local to the condition they occur
-in.
+A positive `Witness` becomes a separate variable. Variables that no atom binds are local to the condition in which they occur.
+
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class Atom:
 class Schema:
     """A behaviour, or one of its conditional effects, as a join.
 
-    `terms` are what tells one operator from another; other variables are joined over and dropped. A conditional
-    effect has the terms of its behaviour first. `effects` are pairs of position and effect, in the order in which
-    they are made; so are `amounts`.
+    `terms` identify an operator; other variables are joined over and dropped. A conditional effect has the terms of its
+    behaviour first. `effects` and `amounts` are pairs of position and effect, in order of execution.
+
     """
 
     behavior: Behavior
@@ -67,15 +67,15 @@ class Schema:
 
 
 def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[list[Behavior], dict[str, SituationType]]:
-    """Return rules, each as a behaviour, in which nothing is looked for but one individual, with situation types made for that.
+    """Return rules as behaviours in which a witness is joined with nothing else, with the auxiliary situation types for that.
 
-    "There is a full cup, and there is a free shelf" joined at once would be all pairs. So a rule's witness becomes a
-    situation type of its own, true of the individuals that are named in it from outside, unless nothing else in the rule changes.
+    Joining "there is a full cup, and there is a free shelf" at once would give all pairs. So a rule's witness becomes an auxiliary
+    situation type over the terms that it shares with the rest, unless no other condition of the rule can change.
     """
     found: list[Behavior] = []
     made: dict[str, SituationType] = {}
     waiting = list(rules)
-    for rule in waiting:  # which grows
+    for rule in waiting:  # the list grows
         conditions: list[Condition] = []
         parameters, variables = list(rule.parameters), list(rule.variables)
         left = list(rule.preconditions)
@@ -127,7 +127,7 @@ def schemas(
     behavior : Behavior
     situations : mapping of name to SituationType
     changed : set of situation types
-        Those that some behaviour of the level changes; the others are static there.
+        The situation types that some behaviour of the level changes; the others are static there.
     members : function of a class to its individuals
 
     Raises
@@ -152,7 +152,7 @@ def schemas(
     for position, effect in both:
         if effect.when:
             own = set().union(*map(mentions, effect.when)) - set(base.terms)
-            names = {name: f"?*{name[1:]}" for name in own}  # not those that a precondition has of the same name
+            names = {name: f"?*{name[1:]}" for name in own}  # distinct from variables of the same name in preconditions
             compile_.kinds |= {names[name]: kinds[name] for name in sorted(own)}
             conditions = (*preconditions, *(substituted(c, names) for c in effect.when))
             arguments = tuple(names.get(a, a) for a in effect.arguments)
@@ -214,7 +214,7 @@ class _Compiler:
     def _flat(
         self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
     ) -> Iterator[Condition]:
-        """Yield the conjuncts, positive witnesses opened up; variables that are not `shared` get names of their own."""
+        """Yield the conjuncts, with positive witnesses expanded; variables that are not `shared` get unique names."""
         for condition in conditions:
             if isinstance(condition, Witness) and not condition.negated:
                 yield from self._opened(
@@ -273,7 +273,7 @@ class _Compiler:
                 yield Atom(("relation", relation), arguments)
             case ClassCondition(term, kind, False):
                 yield Atom(("class", kind), (term,))
-            case _:  # is worked out row by row
+            case _:  # is evaluated row by row
                 pass
 
     def _fluent(self, condition: Condition) -> bool:
@@ -283,6 +283,6 @@ class _Compiler:
 def plain_variables(group: Sequence[Condition]) -> set[str]:
     """Return the variables of a group that are bound outside or that it determines.
 
-    Variables of nested conditions are their own.
+    Variables inside nested conditions don't count.
     """
     return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

@@ -1,7 +1,7 @@
-"""Schemas without the variables that no effect names: who moves with some crane is one operator, and no longer one for each crane.
+"""Schemas without the variables that no effect names: a move with some crane is one operator instead of one per crane.
 
-What is asked of such a variable becomes a rule of its own, about the terms that it stands beside, so that a join has these rows
-and those of the rest, where it had all pairs of them.
+The conditions on such a variable become an auxiliary rule over its neighbouring terms. Each join then has the rows of one part,
+instead of all pairs of both.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
 def _separable(
     schema: Schema, named: set[str], members: Members
 ) -> tuple[int, str, tuple[str, ...], tuple[str, ...]] | None:
-    """Return the maximum number of rows without a variable, the variable, its neighbours and the rest.
+    """Return the maximum number of rows without a variable, the variable, its neighbours and the other terms.
 
-    None if that saves nothing.
+    Return None if that saves nothing.
     """
     every = {term for atom in schema.atoms for term in atom.terms if is_variable(term)}
 

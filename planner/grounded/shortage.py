@@ -1,10 +1,9 @@
-"""By how much an amount falls short: a proof that there is no plan, found by adding up.
+"""Proof of unsolvability by shortage: a sum of amounts that no operator increases is less than the goal requires.
 
-What is there of a situation type, over all symbols or of one, and of what was made of it: that sum never becomes larger if no
-operator makes it so. Facts stand for what was made of an amount, each for the least that any operator uses up that sets it
-(divided among those that one sets at once); an operator that gives an amount back (who lends a book frees its place) doesn't
-enlarge the sum if it undoes as much. What is wanted are the facts that the goals need, and what has to be left, by the goal or
-by the bounds.
+The sum covers the amounts of a situation type, over all its symbols or for one, and the facts that consumed some of them. A fact
+counts as the least amount consumed by any operator that sets it (divided among the facts set together). An operator that returns
+an amount (returning a lent book frees its place) doesn't increase the sum if it also clears facts of at least that worth. The
+requirement is the worth of the facts in the goal plus the amount that must remain, by the goal or by the bounds.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from confab.reasoner.amounts import written
 
 
 def shortage(task: Task) -> Reason | None:
-    """Return the reason if adding up shows that an amount doesn't suffice for the goal, with the missing quantity."""
+    """Return the reason, with the missing quantity, if a sum shows that an amount doesn't suffice for the goal."""
     amounts = task.amounts
     if amounts is None:
         return None
@@ -85,7 +84,7 @@ class _Sums:
 
     @cached_property
     def of(self) -> Mapping[int, Sequence[tuple[int, Move]]]:
-        """For each amount, the operators that change it, with their changes."""
+        """The operators that change each amount, with their changes."""
         found = defaultdict[int, list[tuple[int, Move]]](list)
         for o, its in self.moves.items():
             for move in its:
@@ -94,7 +93,7 @@ class _Sums:
 
     @cached_property
     def sets(self) -> Mapping[int, Set[int]]:
-        """For each operator the bits that it may set."""
+        """The bits that each operator may set."""
         found = defaultdict[int, set[int]](set)
         for bits, owner in zip(self.task.adds.lists(), self.task.owners, strict=True):
             found[owner].update(bits)
@@ -102,7 +101,7 @@ class _Sums:
 
     @cached_property
     def makers(self) -> Mapping[int, Sequence[int]]:
-        """For each bit the operators that may set it."""
+        """The operators that may set each bit."""
         found = defaultdict[int, list[int]](list)
         for o, bits in self.sets.items():
             for bit in bits:
@@ -118,7 +117,7 @@ class _Sums:
             yield {bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == kind}
 
     def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
-        """Return for some bits the least amount consumed by any operator that sets them, divided among bits set at once."""
+        """Return for each bit the least amount consumed by any operator that sets it, divided among bits set together."""
         found = {
             bit: min(
                 (Fraction(used.get(o, 0)) / len(self.sets[o] & bits) for o in self.makers[bit]), default=Fraction(0)
@@ -167,7 +166,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """For each bit with a lower bound on one amount, the amount and the bound."""
+        """The amount and the bound of each bit that is a lower bound on one amount."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()
@@ -175,12 +174,12 @@ class _Sums:
         }
 
     def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
-        """Return the lower bound of an amount in comparisons with a number."""
+        """Return the greatest lower bound that the comparisons among some bits set on an amount."""
         found = (self.limits[bit] for bit in bits if bit in self.limits)
         return max((wanted for of, wanted in found if of == place), default=None)
 
     def kept(self, place: int) -> Fraction | None:
-        """Return the part of an amount that no operator consumes, since each requires more than it takes."""
+        """Return the part of an amount that no operator consumes, since each requires more than it consumes."""
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:
             if move.operation == "increase" and move.by is not None and not move.by.terms and move.by.constant >= 0:
@@ -222,9 +221,9 @@ def _extent(
 
 
 def _change(moves: Sequence[Move], places: Sequence[int]) -> Exact | None:
-    """Return what an operator makes of a sum, at most: what it adds under a condition counts, what it takes so doesn't.
+    """Return the maximum by which an operator increases a sum: conditional increases count, conditional decreases don't.
 
-    None where that depends on the state.
+    Return None where it depends on the state.
     """
     total: Exact = 0
     for move in moves:

@@ -1,11 +1,11 @@
 """Shortest plans of a grounded task: the order of A*, with a given estimate of the remaining cost.
 
 g        cost of the operators from the start to a state
-h        what it costs from a state to the goal, infinite where there is no way. With a lower bound what is found is a cheapest
-         plan: `nothing`, which makes this a breadth-first search, `ways` of the single goals, or LM-cut
+h        estimated cost from a state to the goal, infinite where it is unreachable. With a lower bound the plan found is a
+                  cheapest one: `nothing`, which gives breadth-first search, `ways` of the single goals, or LM-cut
          (`confab.planner.hierarchical.bounds`)
-f        g + weight h, the least of which is expanded next; with weight 1 no plan is cheaper than the least f that is open
-upper    what a plan has to be cheaper than: a state of which g + h is no less is dropped
+f        g + weight h, the least of which is expanded next; with weight 1 no plan is cheaper than the least open f
+upper    the cost that a plan must stay below: states with g + h at or above it are dropped
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Bound: TypeAlias = "Callable[[int], float]"
 
 @dataclass(frozen=True)
 class Shortest:
-    """What was found: no plan is cheaper than `bound` or, if that is infinite, there is none cheaper than `upper`.
+    """The result: no plan is cheaper than `bound`; if that is infinite, no plan is cheaper than `upper`.
 
     `plan` are the operators of the cheapest plan found; `states` were reached.
     """
@@ -44,7 +44,7 @@ def nothing(state: int) -> float:
 
 
 class Cheapest:
-    """The order of A* by a bound on what is left; `lower` is the least f that is open, `counts` grows."""
+    """The order of A* by a bound on the remaining cost; `lower` is the least open f, `counts` is updated."""
 
     def __init__(self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1) -> None:
         self.task, self.bound, self.upper, self.weight, self.counts = task, bound, upper, weight, counts
@@ -60,7 +60,7 @@ class Cheapest:
             self.open.drop(0)
             h, (_, _, state, cost) = drawn[1]
             if cost > self.reached[state].cost or cost + h >= self.upper:
-                continue  # it was reached by a cheaper way since, or a plan was found that is no dearer
+                continue  # the state was reached more cheaply since, or a plan of at most this cost was found
             self.lower = max(self.lower, cost + self.weight * h)
             self.work += 1
             self.counts.expanded += 1
@@ -93,7 +93,7 @@ def shortest(
     known: float = math.inf,
     weight: int = 1,
 ) -> Shortest:
-    """Return a cheapest plan of those cheaper than `upper`, as far as the limits allow.
+    """Return a cheapest plan among those cheaper than `upper`, as far as the limits allow.
 
     Parameters
     ----------
@@ -101,15 +101,15 @@ def shortest(
     bound : function of a state
     upper : float
     most : int
-        Expansions after which only a bound, and the cheapest plan so far, are returned, as when the deadline (of
-        `time.perf_counter`) has passed.
+        Maximum number of expansions; at the limit, or at the deadline (of `time.perf_counter`), the bound and the cheapest plan
+        so far are returned.
     deadline : float, optional
     counts : Counts, optional
-        Grows by what is generated and expanded.
+        Updated with the generated and expanded states.
     known : float
-        States reached after which only a bound is returned: all of them will have to be expanded, if there is no plan.
+        Maximum number of states reached; at the limit only a bound is returned, since all of them would have to be expanded.
     weight : int
-        Of the bound in f; with more than 1 what is found first is dearer and comes sooner, and `bound` says nothing.
+        Weight of the bound in f; with more than 1 a plan is found sooner but may cost more, and `bound` is meaningless.
     """
     order = Cheapest(task, bound, upper, counts or Counts(), weight)
     expanded, lower = 0, None
@@ -125,7 +125,7 @@ def shortest(
 def ways(task: Task) -> Bound:
     """Return a lower bound: the sum of the costs of giving every goal's symbol its value separately.
 
-    Each operator counts for one symbol only, so that no plan is cheaper. A goal that isn't a value among several counts for
+    Each operator counts for one symbol only, so no plan is cheaper. A goal on a symbol without alternative values counts for
     nothing.
     """
     of_symbol: dict[object, list[int]] = {}
@@ -133,7 +133,7 @@ def ways(task: Task) -> Bound:
         of_symbol.setdefault(fact.symbol, []).append(bit)
     wanted = [(bits, at) for bits in of_symbol.values() if len(bits) > 1 for at in bits if task.goal >> at & 1]
     wanted.sort(key=lambda pair: -len(pair[0]))
-    symbol = np.full(task.size, -1)  # of each bit, by its place among those wanted
+    symbol = np.full(task.size, -1)  # symbol of each bit, by its position in the goal
     for number, (bits, _) in enumerate(wanted):
         symbol[bits] = number
     operator, before, after = _steps(task, symbol)
@@ -146,7 +146,7 @@ def ways(task: Task) -> Bound:
     while True:
         total, old = least[after] + costs, least.copy()
         np.minimum.at(least, before[stated], total[stated])
-        anyhow = np.full(len(wanted) + 1, np.inf)  # from whatever value; the last for bits of no symbol that is wanted
+        anyhow = np.full(len(wanted) + 1, np.inf)  # from any value; the last entry is for bits of other symbols
         np.minimum.at(anyhow, symbol[after[~stated]], total[~stated])
         np.minimum(least, anyhow[symbol], out=least)
         if np.array_equal(least, old):
@@ -167,7 +167,7 @@ def ways(task: Task) -> Bound:
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return the operators that set bits of symbols.
 
-    The operator, the bit of that symbol that it requires (-1: none), the bit it sets.
+    The columns are the operator, the required bit of that symbol (-1: none), and the bit that it sets.
     """
     owner = np.array(task.owners, np.int64)
     setter = owner[np.repeat(np.arange(len(owner)), np.diff(task.adds.starts))]

@@ -1,7 +1,7 @@
-"""Which operators are applicable in a state: a decision tree over symbols, whose branches are made where a state leads there.
+"""Applicable operators of a state: a decision tree over symbols, whose branches are created when a state reaches them.
 
-Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search looks at few of the branches, which is why the
-others aren't made.
+Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search visits few of the branches, so the others
+aren't created.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from confab.planner.grounded.joins import Ints
 from confab.reasoner.limits import check
 
 Waiting = tuple[int, list[int], int]
-"""An operator, the bits that it requires in the order of testing, and their number."""
+"""An operator, its required bits in the order of testing, and their number."""
 
 
 class Tree:
-    """Operators by the values that they need, symbol by symbol.
+    """Operators by the values that they require, symbol by symbol.
 
-    `mask` are the bits of a symbol; `by_value` leads on for each of its values, `otherwise` for operators that don't need it;
-    `waiting` are the operators that no branch was made for yet.
+    `mask` has the bits of a symbol; `by_value` has the subtree of each of its values, `otherwise` that of operators that don't test
+    the symbol; `waiting` are operators that aren't in a branch yet.
     """
 
     __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")
@@ -38,7 +38,7 @@ class Tree:
         found: list[int] = []
         visited = 0
         heads = [self]
-        for head in heads:  # which grows
+        for head in heads:  # the list grows
             node: Tree | None = head
             while node is not None:
                 visited += 1
@@ -76,12 +76,12 @@ class Tree:
 
 
 def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> Tree:
-    """Return the tree of operators that need bits; symbols that many operators need are asked first.
+    """Return the tree of operators; symbols that many operators require are tested first.
 
     Parameters
     ----------
     starts, items : array of int
-        Operator `i` needs the bits ``items[starts[i]:starts[i + 1]]``.
+        Operator `i` requires the bits ``items[starts[i]:starts[i + 1]]``.
     masks : sequence of int
         Per bit, all bits of its symbol.
     """

@@ -3,12 +3,12 @@
 ==============================  =================================================================
 in `confab.reasoner.symbols`           here
 ==============================  =================================================================
-`Fact`                          a bit; one that is always true or never reachable has none
-a fact that must not hold       a bit of its own, its complement, where some condition asks for it
-`AnyOf`, a negated `Witness`    a derived bit, where static knowledge doesn't decide it
+`Fact`                          a bit; none if it is always true or never reachable
+a fact that must not hold       a separate bit, its complement, if a condition requires it
+`AnyOf`, a negated `Witness`    a derived bit, unless static facts decide it
 `Behavior` with all its terms   an operator
-conditional effect              a step of an operator, and a relaxed operator of its own
-`Comparison`                    a bit that follows from the amounts (`confab.planner.grounded.amounts`)
+conditional effect              a change of an operator, and a separate relaxed operator
+`Comparison`                    a bit derived from the amounts (`confab.planner.grounded.amounts`)
 ==============================  =================================================================
 """
 
@@ -28,18 +28,18 @@ from confab.planner.plan import Step
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 Change = tuple[int, int, int]
-"""Where all bits of the first are set, the bits of the second are cleared and then those of the third set."""
+"""If all bits of the first mask are set, the bits of the second are cleared and then those of the third are set."""
 
 
 @dataclass(frozen=True)
 class Grouped:
-    """For each of n things a list of integers: ``items[starts[i]:starts[i + 1]]``."""
+    """A list of integers for each of n items: ``items[starts[i]:starts[i + 1]]``."""
 
     starts: Ints
     items: Ints
 
     def __getitem__(self, i: int) -> list[int]:
-        """Return the list of thing `i`."""
+        """Return list number `i`."""
         found: list[int] = self.items[self.starts[i] : self.starts[i + 1]].tolist()
         return found
 
@@ -51,40 +51,40 @@ class Grouped:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One level of a problem, grounded; `confab.planner.grounded.grounding.ground` makes it.
+    """One level of a problem, grounded by `confab.planner.grounded.grounding.ground`.
 
     Parameters
     ----------
     problem : Problem
     level : int
     facts : sequence of Fact
-        What the first bits stand for.
+        The facts that the first bits represent.
     complements : mapping of bit to Fact
-        The bits that are set where a fact doesn't hold.
+        The bits that represent the negation of a fact.
     size : int
         Number of bits: facts, their complements, derived ones.
     initial, goal : int
-        A state; the bits wanted.
+        A state; the required bits.
     constants : mapping of Symbol to value
         The symbols that no operator changes.
     costs : list of float
-        Per operator; where that depends on amounts, what it costs at least.
+        Per operator; the minimum cost if the cost depends on amounts.
     owners : list of int
-        Per relaxed operator, the operator that it is or a conditional effect of which it is.
+        Per relaxed operator, the operator that it represents as a whole or by a conditional effect.
     needs, adds : Grouped
-        Per relaxed operator, the bits that it needs and those that it may set.
+        Per relaxed operator, the bits that it requires and those that it may set.
     derived : Derived
-        The bits that follow from others.
+        The bits that are derived from others.
     change : function of an operator
-        To its precondition and its changes, in the order in which they are made.
+        Returns its precondition and its changes, in order of execution.
     describe : function of an operator
-        To its behaviour, arguments and bindings.
+        Returns its behaviour, arguments and bindings.
     amounts : Amounts, optional
-        Where some operator changes amounts.
+        Present if some operator changes amounts.
     prices : mapping of operator to Linear
-        What operators cost whose cost depends on amounts.
+        The costs that depend on amounts.
     barred : set of (state, operator)
-        What isn't to be done where: steps that turned out not to be refinable there.
+        Pairs excluded from the search: steps that turned out not to be refinable in a state.
     """
 
     problem: Problem
@@ -129,7 +129,7 @@ class Task:
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
         """Return the state after an operator, or None where it isn't applicable.
 
-        Unless what follows is to be worked out, the bits that follow from others stay as they are.
+        Derived bits are updated only if `follow`.
         """
         precondition, changes = self._changes.get(operator) or self.known(operator)
         if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
@@ -146,11 +146,11 @@ class Task:
         return self.derived.after(after, state) if follow and self.derived.parts else after
 
     def carried_out(self, state: int, plan: Sequence[int]) -> tuple[int, list[int]]:
-        """Return the state after those operators of a plan that are applicable when it is their turn, and these.
+        """Return the state after executing each operator of a plan if it is applicable in its turn, and the executed operators.
 
-        On the way, of the bits that follow from others only those are worked out that an operator asks for.
+        In between, only the derived bits that an operator requires are calculated.
         """
-        follow = bool(self.barred) or not self.derived.parts  # what is barred is told by whole states
+        follow = bool(self.barred) or not self.derived.parts  # barred pairs contain complete states
         kept = []
         for operator in plan:
             if not follow:
@@ -168,7 +168,7 @@ class Task:
 
     @cached_property
     def applicable(self) -> Callable[[int], tuple[list[int], int]]:
-        """From a state to its applicable operators, with the work of finding them in tree nodes."""
+        """Maps a state to its applicable operators and the work of finding them, in tree nodes."""
         of_symbol: dict[Symbol, int] = {}
         for bit, fact in enumerate(self.facts):
             of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
@@ -184,7 +184,7 @@ class Task:
         return known
 
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
-        """Return the operators for behaviours with their arguments, executed one after the other; None if one isn't applicable."""
+        """Return the operators of behaviours with arguments, executed in sequence; None if one isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
         for operator in range(len(self)):
             step = self.describe(operator)[:2]
@@ -200,7 +200,7 @@ class Task:
         return found
 
     def values(self, state: int) -> dict[Symbol, str]:
-        """Return a state as values of symbols; a boolean symbol that could never be true is left out."""
+        """Return a state as values of symbols; boolean symbols that could never be true are left out."""
         found = dict(self.constants)
         situations = self.problem.domain.situations
         for i, fact in enumerate(self.facts):
