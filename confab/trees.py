@@ -315,7 +315,7 @@ def filled(tree: Tree, path: Path, problem: Problem, world: World, told: Callabl
     from py_trees.behaviour import Behaviour
     from py_trees.common import Status
 
-    class Leaf(Behaviour):
+    class Leaf(Behaviour):  # type: ignore[misc, unused-ignore]  # where py_trees is not installed, it is untyped
         def __init__(self, kind: str, name: str, key: str) -> None:
             super().__init__(f"{name} {key}")
             self.kind, self.key = kind, key

@@ -1,11 +1,11 @@
-"""A plan as a reactive behaviour tree, which goes on by itself after a disturbance that undoes a step.
+"""A plan as a reactive behaviour tree, which recovers by itself after a disturbance that undoes a step.
 
-Each step becomes a fallback: *what it brings about already holds*, else *its conditions hold, do it*. What has to hold are the
-causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that needs a fact of it. A
-link is kept as long as the fact holds, or once the later primitive is done itself. So a primitive is done again exactly if one
-that is still to come needs it. Whether primitives are done is marked at the beginning of each tick, the last one first; after
-each primitive the tree is ticked anew. Steps are ticked in the order of the plan; steps beside each other whose primitives
-neither need nor disturb one another, and have different workers, are parallel. The steps below an abstract step are a subtree.
+Each step becomes a fallback: either *its effects hold already*, or *its conditions hold and it is executed*. The required facts are
+the causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that requires them. A
+link is satisfied if the fact holds, or once the later primitive is done itself. So a primitive is repeated exactly if a primitive
+still to come requires it. At the beginning of each tick the primitives that are done are marked, the last one first; after
+each primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps whose primitives neither require
+nor disturb one another, and that have different workers, are parallel. The steps below an abstract step are a subtree.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 @dataclass(frozen=True)
 class Holds:
-    """A condition leaf: some facts, or else some conditions with individuals put in, hold."""
+    """A condition leaf: some facts, or some ground conditions, hold."""
 
     facts: tuple[Fact, ...] = ()
     conditions: tuple[Condition, ...] = ()
@@ -37,7 +37,7 @@ class Holds:
 
 @dataclass(frozen=True)
 class Do:
-    """Conditions and an action: if its preconditions hold, a primitive is executed to its end; then the tree is ticked anew."""
+    """Conditions and an action: if its preconditions hold, a primitive is executed to its end; then the tree is ticked again."""
 
     step: Step
 
@@ -59,28 +59,28 @@ class Mark:
 
 @dataclass(frozen=True)
 class All:
-    """Children that are ticked one after the other, as long as they succeed."""
+    """Children that are ticked one after another, as long as they succeed."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class First:
-    """Children that are ticked one after the other, until one succeeds."""
+    """Children that are ticked one after another, until one succeeds."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Together:
-    """Children that are ticked at the same time, and have to succeed all."""
+    """Children that are ticked at the same time and must all succeed."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Subtree:
-    """A tree with a name of its own: the whole, the marking, or the steps below a step."""
+    """A tree with a name: the whole, the marking, or the steps below a step."""
 
     name: str
     child: Node
@@ -96,7 +96,7 @@ def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
     Parameters
     ----------
     problem : Problem
-        Its initial state is the one that the plan begins in.
+        Its initial state is the one in which the plan begins.
     plan : Plan
         A valid one (`confab.planner.validation.validate`).
     """
@@ -122,7 +122,7 @@ class _Tree:
         self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
         asked_above = _asked_above(self.purposes, purposes(problem, plan), plan)
         self.needs: dict[Path, list[Need]] = {}
-        for step in reversed(primitives):  # what only a step asks for that nothing needs isn't needed either
+        for step in reversed(primitives):  # a primitive required only by needless steps is needless
             needs = dict.fromkeys(self.purposes[step.path].needs)
             for change, consumers in asked_above.get(step.path, ()):
                 needs |= {
@@ -142,12 +142,12 @@ class _Tree:
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
 
     def marks(self) -> tuple[Node, ...]:
-        """Return the marks of all primitives that something needs, the last first."""
+        """Return the marks of all required primitives, the last first."""
         needed = [path for path in self.position if self.needs[path]]
         return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
 
     def in_order(self, steps: Iterable[Step]) -> tuple[Node, ...]:
-        """Return the nodes of steps beside each other; consecutive ones that are independent are parallel."""
+        """Return the nodes of sibling steps; consecutive steps that are independent are parallel."""
         groups: list[list[Step]] = []
         for step in steps:
             check("building the behaviour tree")
@@ -162,7 +162,7 @@ class _Tree:
         )
 
     def needed(self, step: Step) -> list[Step]:
-        """Return the primitives of a step that something needs."""
+        """Return the required primitives of a step."""
         return [below for below in Plan((step,)).primitives if self.needs[below.path]]
 
     def node(self, step: Step) -> Node:
@@ -181,7 +181,7 @@ class _Tree:
         pairs = [(self.position[a.path], self.position[b.path]) for a, b in product(ours, theirs)]
         return not any(networkx.has_path(self.order, *sorted(pair)) for pair in pairs)
 
-    # --------------------------------------------------------------------------------------------------- what steps are for
+    # ------------------------------------------------------------------------------------------------ purposes of the steps
 
     def kept(self, path: Path) -> Node:
         """Return the condition that all links from a primitive are kept."""
@@ -189,7 +189,7 @@ class _Tree:
         return links[0] if len(links) == 1 else All(links)
 
     def link(self, need: Need) -> Node:
-        """Return the condition that a link is kept: the later step is done, its facts hold, or what is asked of them holds."""
+        """Return the condition that a link is satisfied: the later step is done, or the link's facts or conditions hold."""
         kept: list[Node] = [Marked(need.by)] if need.by else []
         kept.append(Holds(tuple(self.wanted(change, need.kind) for change in need.gives)))
         if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
@@ -201,7 +201,7 @@ class _Tree:
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
     def wanted(self, change: FactChange, kind: Kind) -> Fact:
-        """Return the fact of a change; of an amount that it is at least, or at most, what the plan has where it is needed."""
+        """Return the fact of a change; for an amount, that it is at least, or at most, the planned value where it is required."""
         symbol, value = change.fact.symbol, change.fact.value
         if kind is Kind.GOAL and symbol in self.problem.goal:
             return Fact(symbol, self.problem.goal[symbol])
@@ -216,7 +216,7 @@ def _asked_above(
     """Return the links between abstract steps by primitives: the fact, and the primitives with which the link may end.
 
     Such a link begins with the primitive that gives the fact. It ends with the first primitive of the later step that changes
-    it, or else with the last one that something needs.
+    the fact, otherwise with the last required primitive of that step.
     """
     under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
     found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}
@@ -242,7 +242,7 @@ def _dotted(path: Path) -> str:
 
 
 class Situation:
-    """What the leaves of a tree ask of a state."""
+    """Evaluates the leaves of a tree in a state."""
 
     def __init__(self, problem: Problem, state: State) -> None:
         self.problem, self.state = problem, state

@@ -2,11 +2,11 @@
 
 A later step of the same level needs an earlier one if, in the same state but with one fact that the earlier step gave restored to
 its previous value, it isn't applicable or no longer has the effects that are needed. So a link is found for any kind of condition
-("no object stands there" as well as "the hand holds it"), and `confab.planner.validation` rejects the rest of the plan without the
-earlier step. Each level has its own sequence of steps; where a plan leaves a level, the steps below take their place.
+("no object stands there" as well as "the hand holds it"), and without the earlier step `confab.planner.validation` rejects the
+rest of the plan. Each level has its own sequence of steps; where a plan leaves a level, the lower steps take their place.
 
-The facts that a step reads are recorded, and only these are restored: the effort grows with what the steps of the plan read, and
-not with the square of its length.
+The facts that a step reads are recorded, and only these are restored: the effort grows with the number of facts read by the steps,
+and not with the square of the plan's length.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Need:
 class Purpose:
     """The facts that a step gives, as its level sees them, and their needs, nearest first.
 
-    Without a need, the goal is reached without it.
+    Without a need, the goal is reached without the step.
     """
 
     gives: tuple[FactChange, ...]
@@ -76,7 +76,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
     ----------
     problem : Problem
     plan : Plan
-        One that `confab.planner.validation.validate` finds nothing wrong with.
+        One in which `confab.planner.validation.validate` finds no fault.
     """
     gives: dict[Path, tuple[FactChange, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
@@ -292,7 +292,7 @@ class _Course:
     def followed(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the givers of the facts from which a defined goal follows.
 
-        Those that it read and without which it wouldn't hold.
+        These are facts that the goal's derivation read and without which it wouldn't hold.
         """
         if cell[0] not in self.problem.domain.rules:
             return

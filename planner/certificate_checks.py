@@ -1,6 +1,6 @@
-"""Does a certificate prove that a task has no plan? This checker shares no code with any search.
+"""Checks whether a certificate proves that a task has no plan. The checker shares no code with any search.
 
-It checks the whole task on its lowest level, since what an upper level can't do proves nothing. It reads behaviours and conditions
+It checks the whole task on its lowest level, since a failure of an upper level proves nothing. It reads behaviours and conditions
 as they are written (`confab.planner.possibilities`) and verifies that the certificate's set of states
 
 1. contains the initial state;

@@ -56,7 +56,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a fact can't hold: a sentence, the terms in it, and the claims it depends on (none if nothing can change it)."""
+    """Why a fact can't hold: a sentence, the terms in it, and the claims it depends on (none if no behaviour can change it)."""
 
     text: str
     terms: tuple[str, ...] = ()
@@ -125,7 +125,7 @@ class _Causes:
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
         last: tuple[tuple[Claim, ...], Cause] | None = None
-        for chain in queue:  # which grows
+        for chain in queue:  # the queue grows
             for cause in self.causes(chain[-1]):
                 if not cause.rests_on:
                     return list(chain), cause
@@ -157,7 +157,7 @@ class _Causes:
                 own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
                 terms = (*effect.arguments, None if amount else getattr(effect, "value", None))
                 boolean_or_set = fact.value if not amount else None
-                if kept:  # any other value counts
+                if kept:  # every other value matters
                     if terms[-1] == fact.value:
                         continue
                     boolean_or_set = None
@@ -269,7 +269,7 @@ class _Causes:
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
             free = {term for term in (*first.arguments, first.value) if term.startswith("?")}
-            if free and free <= kinds.keys():  # of all individuals at once, if that can be
+            if free and free <= kinds.keys():  # for all individuals at once, if possible
                 of_all = Fact(Symbol(first.situation, first.arguments), first.value)
                 claims.insert(0, Claim(of_all, tuple((term, kinds[term]) for term in sorted(free))))
         return Cause(f"{behavior.name} requires {text}", (behavior.name, *names), tuple(claims), len(opened))

@@ -22,20 +22,20 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Certificate:
-    """A set of states, the first one among them, that no behaviour of the lowest level leaves; in none does the goal hold.
+    """A set of states that contains the initial state, that no behaviour of the lowest level leaves, and that excludes the goal.
 
     Attributes
     ----------
     never : frozenset of Fact
         Facts that hold in no state.
     always : mapping of Symbol to value
-        Symbols that keep the value they have in the beginning; for an amount, the bounds between which it stays.
+        Symbols that keep their initial value; for an amount, the bounds within which it stays.
     told_apart : mapping of Symbol to values
-        Symbols, each with the values that are told apart from each other and from all others; none given: all values.
+        Symbols with the values that are distinguished from each other and from all others; without values, all are distinguished.
     cases : int
-        How many combinations of these values are reached; in each of them the goal doesn't hold.
+        Number of reachable combinations of these values; in each of them the goal doesn't hold.
     unmet : tuple of Fact
-        What of the goal can't hold together in any case.
+        Goals of which at least one doesn't hold in each case.
     """
 
     never: frozenset[Fact] = frozenset()
@@ -68,12 +68,12 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def certificate_from(data: Any) -> Certificate:
-    """Return the certificate that JSON has.
+    """Return the certificate that JSON data contain.
 
     Raises
     ------
     ValueError
-        It has none; the message says what was wanted.
+        The data contain none; the message says what was expected.
     """
     try:
         if data["format"] != FORMAT:

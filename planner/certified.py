@@ -1,4 +1,4 @@
-"""Every "unsolvable" passes this module: with a certificate that an independent checker accepts, or changed to "gave up"."""
+"""Every "unsolvable" passes this module: it needs a certificate that an independent checker accepts, or becomes "gave up"."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     problem : Problem
         The whole task.
     outcome : Outcome
-        If it has a certificate already, that one is tried first.
+        A certificate that it already has is checked first.
     """
     if outcome.status is not Status.UNSOLVABLE:
         return outcome
@@ -54,7 +54,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
 
 def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
-    """Return by how much an amount falls short, which is more specific than the combinations in which it does."""
+    """Return the missing amount, which is a more specific reason than the combinations of values in which it is missing."""
     if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
         return None
     from confab.planner.grounded.grounding import ground

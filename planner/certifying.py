@@ -4,11 +4,11 @@ First step: relaxed reachability. Assume that no fact ceases to hold; which fact
 from the goal, so that only relevant facts are considered. A required fact that can't become true never holds.
 
 Second step, if the goal is reachable in this way: distinguish few values, at first those of the goal, and search the cases, the
-combinations of these values. A path through the cases to the goal is executed on the task itself. The values on which it fails are
+combinations of these values. A path through the cases to the goal is executed on the task itself. Values on which it fails are
 distinguished too, until no path is left, or a path succeeds: then there is a plan.
 
-Last step: distinguish all values; a case is then a state. One way may have infinitely many cases and another few, so each way is
-tried with a small limit of work first, and then with a larger one.
+Last step: distinguish all values; a case is then a state. One partition may have infinitely many cases and another few, so each
+partition is tried with a small limit of work first, and then with a larger one.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ WORK = 3_000_000
 LITTLE = 2_000, 20_000
 """Maximum number of tests per goal in the first and in the second round, before all goals are examined to the end."""
 PAIR, SHARE = 100_000, 0.5
-"""Maximum number of tests for each pair of goals; each way to tell cases apart may take this share of the tests that are left."""
+"""Maximum number of tests for each pair of goals; and the share of the remaining tests that each kind of partition may use."""
 FEW = 3
 """Maximum number of distinguished values of a symbol; beyond it, all its values are distinguished."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
@@ -110,9 +110,9 @@ def _contested(lowest: Lowest) -> Certificate | None:
 
 
 class Relaxed:
-    """Relaxed reachability, computed backwards from what is asked.
+    """Relaxed reachability, computed backwards from the questions.
 
-    A question that is asked for the first time counts as impossible until a way to it is found; then all answers that depend on it
+    A question that is asked for the first time counts as impossible until an achiever is found; then all answers that depend on it
     are computed again.
     """
 
@@ -232,7 +232,7 @@ class Relaxed:
                     if after is None:
                         continue
                     low, high = max(after[0].low, min(least, now.low)), min(after[0].high, max(most, now.high))
-                    if not constant:  # in one stride as far as it may ever get
+                    if not constant:  # in one step to the farthest reachable amount
                         low = min(least, now.low) if low < now.low else low
                         high = max(most, now.high) if high > now.high else high
                     now = now.hull(Range(low, high))
@@ -268,7 +268,7 @@ class Relaxed:
             elif kind == LEAVES:
                 text = self._bounds(symbol)
                 if not text:
-                    continue  # it may be anything that is allowed
+                    continue  # it may have any allowed amount
                 always[symbol] = text
             reading = self.look(key)
             if kind == LEAVES and amount:
@@ -318,7 +318,7 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     """Return a certificate for two goals about the same individual that can't hold together, rest values included."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
-        if a in other.arguments or b in one.arguments:  # one is about the value of the other: these come first
+        if a in other.arguments or b in one.arguments:  # one is about the value of the other: these pairs come first
             pairs.append((0, {one: a, other: b}))
         elif not {*one.arguments}.isdisjoint(other.arguments):
             pairs.append((1, {one: a, other: b}))

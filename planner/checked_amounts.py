@@ -1,4 +1,4 @@
-"""Amounts as the checker calculates them, without a line in common with any search."""
+"""Amounts as the checker calculates them; no code is shared with any search."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def changed(
 ) -> list[tuple[str, Arguments, str]] | None:
     """Return the amounts after effects, each calculated in the state before; None if one is invalid.
 
-    An effect is a symbol, what is done to it, and by how much; on one that doesn't exist it has no effect.
+    An effect is a symbol, an operation and a number; an effect on a symbol that doesn't exist is ignored.
     """
     after: dict[Cell, Fraction | None] = {}
     for cell, operation, by in effects:

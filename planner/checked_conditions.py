@@ -78,9 +78,10 @@ class ConditionReader:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], last: Sequence[Test] = ()
     ) -> list[Test]:
-        """Return conditions as tests, the last of which may choose and test the rest; `bound` grows by what is chosen.
+        """Return conditions as tests, the last of which may choose individuals and test the rest; `bound` grows by these variables.
 
-        What only nested conditions (`AnyOf`, `Witness`) mention is their own. `last` are tests behind all others.
+        Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these. `last` are tests after all others.
+        Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these. `last` are tests after all others.
         """
         waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
         nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
@@ -117,7 +118,7 @@ class ConditionReader:
         return given
 
     def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
-        """Return whether the rest holds with one of some candidates for a variable."""
+        """Return a test whether the rest holds with one of some candidates for a variable."""
         place, members = self.place(variable), self.problem.members(kind)
 
         def some(facts: Stated, values: Values) -> bool:

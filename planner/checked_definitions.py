@@ -1,4 +1,4 @@
-"""Derived situations of rules and aggregates, as the checker computes them, without a line in common with any search."""
+"""Derived situations of rules and aggregates, as the checker computes them; no code is shared with any search."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Definitions:
     strata : mapping of situation type to its stratum
         From `stratum_of`.
     given : function of a situation type and arguments to a truth value
-        Whether one of the rules gives it; what rules ask for in turn they ask of `follows`.
+        Whether one of the rules derives it; rules read other defined situations by `follows`.
     """
 
     def __init__(self, strata: Mapping[str, tuple[str, ...]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
@@ -43,8 +43,8 @@ class Definitions:
     def follows(self, cell: Cell) -> bool:
         """Return whether a defined situation holds by its rules, which may depend on other defined situations.
 
-        What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
-        tried again until nothing more becomes true. What is true by then stays so, and all else that was asked for is false.
+        A symbol that is read while another one is evaluated is recorded and counts as false; all recorded symbols are evaluated
+        again until no more become true. Symbols that are true by then stay true, and all other recorded symbols are false.
         """
         if cell in self._known:
             return self._known[cell]
@@ -74,7 +74,7 @@ class Total:
     ----------
     rules : Source
         What conditions are read with.
-    aggregate : Aggregate
+    The context for reading conditions.
     """
 
     def __init__(self, rules: Source, aggregate: Aggregate) -> None:

@@ -1,8 +1,8 @@
-"""Why not that? An alternative is made to happen, and what follows is planned and costed; or what it lacks is named.
+"""Contrastive explanations: an alternative is enforced, and the rest is planned and costed; or its missing conditions are named.
 
-Two kinds of alternative are asked for. A *step* in the place of another one: the plan up to there is kept, the step is done
-(and refined) there, and what is left is planned anew. A *choice*, which individual shall take part in what changes a symbol: every
-behaviour that changes this symbol and could take the individual has to take it, and everything is planned anew.
+There are two kinds of alternative. A *step* in place of another one: the plan up to there is kept, the step is applied
+(and refined) there, and the rest is planned again. A *choice* of the individual that takes part in changes of a symbol: every
+behaviour that changes this symbol and could take the individual must take it, and the whole task is planned again.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def instead_of(
     plan : Plan
     behavior : Behavior
     given : mapping of parameters to individuals
-        The others may be anything with which it can be done.
+        Individuals of parameters that aren't given are chosen so that the step is applicable.
     ask : callable
-        Plans.
+        Plans a problem.
     place : Step, optional
-        In whose place, a step of the same level; if left out, of the most similar step where it can be done.
+        The step to be replaced, of the same level; if left out, the most similar step in whose place it is applicable.
     """
     rules, before = Rules(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))
@@ -128,7 +128,7 @@ def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) ->
             continue
         taken = tuple((EqualityCondition(part, who),) for part in parts)
         inner = tuple(substituted(condition, dict(pairs)) for condition in effect.when)
-        if inner:  # the change is made only under these conditions, which may determine the terms
+        if inner:  # the change is made only under these conditions, these may determine the terms
             asks.append(AnyOf((*taken, (AnyOf((inner,), negated=True),))))
         else:
             asks.append(AnyOf((*taken, *((EqualityCondition(term, name, negated=True),) for term, name in pairs))))
@@ -153,14 +153,14 @@ def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
 
 
 def _alike(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
-    """Return how similar two steps are: first by common individuals, then by the behaviour."""
+    """Return the similarity of two steps: first by common individuals, then by the behaviour."""
     return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
 
 
 def _lacking(
     rules: Rules, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
 ) -> Contrast:
-    """Return the position where a behaviour lacks the fewest conditions, and these conditions."""
+    """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
     best: Contrast | None = None
     for step, facts in places:
         found, lacks = lacking(rules, behavior.preconditions, given, behavior.kinds, (facts,))
@@ -174,7 +174,7 @@ def _lacking(
 def _refined(
     problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
 ) -> tuple[Step | None, Reason | None]:
-    """Return a step with its refinement from a state, or the reason why there is none."""
+    """Return a step with its refinement from a state, or the reason why it has none."""
     step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
     after = successor(problem, behavior, arguments, state)
     if behavior.level == problem.domain.levels[-1] or after is None or after == state:
@@ -191,7 +191,7 @@ def _refined(
 
 
 def _from(problem: Problem, level: int, state: State) -> Problem:
-    """Return the plan from a state between two steps of a level, by behaviours of that level and those below."""
+    """Return the problem from a state between two steps of a level, with behaviours of that level and those below."""
     behaviors = {b.name: b for b in problem.domain.behaviors.values() if b.level >= level}
     goal = problem.goal_on(level)
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors), initial=state, goal=goal)

@@ -1,4 +1,4 @@
-"""Defined situations, derived when generated Python reads them from a table; only scenes with definitions enter here."""
+"""Defined situations, derived when generated Python reads them from a table; only scenes with definitions import this module."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Rules:
         self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
 
     def define(self, table: Table) -> None:
-        """Let a table derive defined situations; to be called before any function is bound to it."""
+        """Make a table derive defined situations; call this before any function is bound to the table."""
         for group in strata(self.domain.rules):
             stratum = Stratum(table)
             for name in group:
@@ -68,10 +68,10 @@ class Derived(dict[Key, str]):
 
 
 class Stratum:
-    """Situation types whose rules need each other, and what is known of them at one age of the table.
+    """Mutually dependent defined situation types, and their known values at one age of the table.
 
-    What is asked for is tried, with all that its rules ask for in turn, until a round makes nothing more of it true: then the
-    rest is false. Nothing else is looked at, and no chain is too long for the interpreter's stack.
+    The requested situations, and all that their rules read, are evaluated in rounds until no more become true; the rest is then
+    false. Only these are evaluated, and the depth of a chain isn't limited by the interpreter's stack.
     """
 
     def __init__(self, table: Table) -> None:
@@ -105,14 +105,14 @@ class Stratum:
         order, done, known = [cell], 0, self.known
         while True:
             grown = False
-            while done < len(order):  # what was asked for the first time
+            while done < len(order):  # those read for the first time
                 grown |= self._try(order[done])
                 done += 1
                 if len(asked) > len(order):
                     order += list(asked)[len(order) :]
             if cell in known:
                 return True
-            for other in reversed(order):  # the last ones asked for are those that others wait for
+            for other in reversed(order):  # others depend on the last ones read
                 if other not in known:
                     grown |= self._try(other)
             if cell in known or not (grown or len(asked) > len(order)):

@@ -1,4 +1,4 @@
-"""A plan in the forms of other libraries: a graph of networkx, Graphviz' language, HTML."""
+"""Exports of a plan: a graph of networkx, Graphviz' language, HTML."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Path: TypeAlias = "tuple[int, ...]"
 
 
 class Node(NamedTuple):
-    """A step in a plan: where it is in the tree, what it is called, its level and its ID."""
+    """A step in a plan: its position in the tree, its label, its level and its ID."""
 
     path: Path
     label: str
@@ -32,7 +32,7 @@ PLAN = {
     "to_dataframe()": "dataframe df to_pandas table",
     "to_records()": "json to_json to_dict as_dict dict to_list to_csv",
 }
-"""Right names of a plan, and the words that mean them."""
+"""Attributes of a plan, and other names under which users look for them."""
 STEP = {
     "behavior": "name action operator action_name behaviour label",
     "arguments": "args parameters params objects actual_parameters",
@@ -41,7 +41,7 @@ STEP = {
     "walk()": "iter traverse descendants",
     "id": "number index key",
 }
-"""Right names of a step, and the words that mean them."""
+"""Attributes of a step, and other names under which users look for them."""
 
 
 def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
@@ -57,7 +57,7 @@ def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
 
 
 def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
-    """Yield which step is refined by which, and which is followed by which."""
+    """Yield the pairs of a step and its sub-step, and of a step and its successor."""
     paths = {node.path for node in nodes}
     for *above, place in sorted(paths):
         path = (*above, place)
@@ -68,7 +68,7 @@ def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
 
 
 def dot(nodes: Sequence[Node]) -> str:
-    """Return Graphviz' text of a plan: sub-steps below their step, dashed arrows to the step that follows."""
+    """Return Graphviz' text of a plan: sub-steps below their step, dashed arrows to the next step."""
     lines = ["digraph plan {", "  node [shape=box, style=rounded];"]
     lines += [f"  {_named(node.path)} [label={_quoted(node.label)}];" for node in nodes]
     style = {"refines": "", "then": " [style=dashed, constraint=false]"}
@@ -85,7 +85,7 @@ def _quoted(text: str) -> str:
 
 
 def html(headline: str, nodes: Sequence[Node]) -> str:
-    """Return a plan as HTML: its steps, each before its sub-steps, of which each can be opened."""
+    """Return a plan as HTML: its steps as a collapsible tree."""
     above = {node.path[:-1] for node in nodes}
     parts, depth = [f"<div>{escape(headline)}"], 1
     for node in nodes:

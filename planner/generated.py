@@ -1,4 +1,4 @@
-"""How generated Python names terms, keys and functions, and how it is compiled."""
+"""Names of terms, keys and functions in generated Python, and its compilation."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ def identifier(prefix: str, name: str) -> str:
 
 
 def written(term: str) -> str:
-    """Return a term as Python."""
+    """Return a term as a Python expression."""
     return identifier("v", term[1:]) if term.startswith("?") else repr(term)
 
 
 def tuple_written(items: Iterable[str]) -> str:
-    """Return the tuple of some expressions as Python."""
+    """Return the tuple of some expressions as a Python expression."""
     return "(" + "".join(f"{item}, " for item in items) + ")"
 
 
 def key_written(arguments: Sequence[str]) -> str:
-    """Return the key of some terms as Python."""
+    """Return the key of some terms as a Python expression."""
     return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
 
 
 @lru_cache(maxsize=256)
 def code(source: str) -> CodeType:
-    """Return source compiled."""
+    """Return compiled source."""
     return compile(source, "<compiled behaviours>", "exec")

@@ -30,17 +30,17 @@ from confab.reasoner.symbols import (
 )
 
 MOST_LACKING = 4
-"""Maximum number of conditions that are left out together to find those that a behaviour lacks."""
+"""Maximum number of conditions left out together to find the failing conditions of a behaviour."""
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return where a valid plan leaves a level, and which conditions of that level it violates there.
+    """Return the stretches in which a valid plan leaves a level, with the conditions of that level that they violate.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        `confab.planner.validation.validate` has to accept it.
+        One that `confab.planner.validation.validate` accepts.
     """
     return list(_Watch(problem).carried_out(plan.steps, 0))
 

@@ -1,4 +1,4 @@
-"""The values at the planner's door: a plan as a tree of steps, and the outcome of a planning call."""
+"""The values of a planning call: a plan as a tree of steps, and the outcome."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Step:
     """One behaviour of a plan, with the steps of the next level that refine it.
 
     `path` is the position in the tree; `bindings` are the individuals that the situation gave to the behaviour's variables
-    (what GRASP grasps); `rank` is the cogency ranking score c_m of eq. (4) with which it was chosen, where one was computed.
+    (the object that GRASP grasps); `rank` is the cogency ranking score c_m of eq. (4) with which it was chosen, if computed.
     """
 
     path: tuple[int, ...]
@@ -87,7 +87,7 @@ class Plan(Sequence[Step]):
         return len(self.steps)
 
     def __bool__(self) -> bool:
-        """Return True: a plan without steps is a plan, too."""
+        """Return True: an empty plan is a plan, too."""
         return True
 
     @overload
@@ -101,7 +101,7 @@ class Plan(Sequence[Step]):
         return self.steps[index]
 
     def __repr__(self) -> str:
-        """Return the number of steps per level, and the steps of the first one."""
+        """Return the number of steps per level, and the steps of the first level."""
         if not self.steps:
             return "Plan without steps"
         many = " / ".join(map(str, self.length.values()))
@@ -118,7 +118,7 @@ class Plan(Sequence[Step]):
 
     @property
     def primitives(self) -> tuple[Step, ...]:
-        """The steps without sub-steps, which is what a robot executes."""
+        """The steps without sub-steps, which a robot executes."""
         return tuple(step for step in self.walk() if not step.steps)
 
     @property
@@ -128,7 +128,7 @@ class Plan(Sequence[Step]):
         return {level: levels.count(level) for level in sorted(set(levels))}
 
     def to_networkx(self) -> networkx.DiGraph[tuple[int, ...]]:
-        """Return the plan as a directed graph: a node for each step, by its path; edges to its sub-steps and to what follows.
+        """Return the plan as a directed graph: a node for each step, by its path; edges to its sub-steps and to the next step.
 
         Nodes have ``label``, ``level`` and ``id``; an edge has a ``kind``, ``refines`` or ``then``.
         """
@@ -137,7 +137,7 @@ class Plan(Sequence[Step]):
         return digraph(self._nodes())
 
     def to_dot(self) -> str:
-        """Return the plan in Graphviz' language: sub-steps below their step, dashed arrows to the step that follows."""
+        """Return the plan in Graphviz' language: sub-steps below their step, dashed arrows to the next step."""
         from confab.planner.forms import dot
 
         return dot(self._nodes())
@@ -157,7 +157,7 @@ class Plan(Sequence[Step]):
         ]
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return a pandas DataFrame with a row for each step, as `to_records` has them (the extra `notebook` brings pandas)."""
+        """Return a pandas DataFrame with a row for each step, as in `to_records` (needs the extra `notebook`)."""
         import pandas
 
         return pandas.DataFrame(self.to_records())
@@ -175,7 +175,7 @@ class Plan(Sequence[Step]):
 
 @dataclass
 class Counts:
-    """What a search did: nodes generated, evaluated (scored) and expanded."""
+    """Effort of a search: nodes generated, evaluated (scored) and expanded."""
 
     generated: int = 0
     evaluated: int = 0
@@ -233,17 +233,16 @@ class Left:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a planning call ended, and with what.
+    """The result of a planning call.
 
-    `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
-    calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it; `hits` and `misses`
-    count the refinements that the cache had and those that had to be searched.
-    `cost` is what the plan costs, where some behaviour has a price; `bound` what any plan costs at least on the lowest level,
-    where that was proved; `engine` the other planner whose plan it is.
-    `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
-    break that only the level above asks. `saving` is the number of primitives per second by which the plan still became shorter
-    in the end, None where it wasn't shortened. `certificate` proves that a task is unsolvable; `confab.planner.solve` lets none of
-    these answers leave without one.
+    `plan` is present if and only if `status` is solved, `reason` if and only if it isn't. `search` counts per level, summed over
+    the calls at that level; `fallbacks` counts how often a level had no refinement for the level above; `hits` and `misses` count
+    the refinements found in the cache and those that had to be searched. `cost` is the cost of the plan if some behaviour has a
+    price; `bound` a lower bound on the cost of every lowest-level plan, if proved; `engine` the other planner that found the
+    plan. `given_up` says which level was given up for which goal, `left` where the plan has steps of a lower level instead, and
+    which conditions of the level above they violate. `saving` is the number of primitives per second by which the plan was still
+    being shortened in the end, None if it wasn't shortened. `certificate` proves that a task is unsolvable;
+    `confab.planner.solve` returns no such outcome without one.
     """
 
     status: Status
@@ -267,9 +266,9 @@ class Outcome:
 class Limits:
     """Limits of a planning call: seconds for the whole call (None: no limit), expansions, and work.
 
-    Expansions count per search in the paper's mode; in the default mode they count all searches before the last resort, and again
-    as many for the last resort. Work applies to the last resort only, in states times operators (about a microsecond each), and
-    only until there is a plan.
+    In the paper's mode expansions count per search; in the default mode they count over all searches before the last resort, and
+    separately for the last resort. Work limits only the last resort, in states times operators (about a microsecond each), and
+    only until a plan is found.
     """
 
     expansions: int = 200_000
@@ -277,15 +276,16 @@ class Limits:
     work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
-        """Return when a share of the time from now on is over, on the clock of `perf_counter`; None: never.
+        """Return the time at which a share of the remaining time is over, on the clock of `perf_counter`; None: never.
 
-        The time ends with the seconds of these limits, or with the current deadline (`confab.reasoner.limits`) if that is earlier.
+        The remaining time ends with the seconds of these limits, or with the current deadline (`confab.reasoner.limits`) if
+        earlier.
         """
         left = min((seconds for seconds in (self.seconds, current().left) if seconds is not None), default=None)
         return None if left is None else perf_counter() + share * left
 
     def until(self, end: float | None) -> Limits:
-        """Return the same limits with the seconds that are left until then, for a step of a longer call."""
+        """Return the same limits with the seconds left until then, for a step of a longer call."""
         return self if end is None else replace(self, seconds=max(end - perf_counter(), 0.0))
 
 
@@ -305,12 +305,12 @@ class UnsolvableError(Exception):
 
 
 class UngroundableError(Exception):
-    """A level can't be grounded: it is larger than allowed, or its amounts aren't linear; the message says which."""
+    """A level can't be grounded: it is larger than allowed, or its amounts aren't linear; the message gives the cause."""
 
 
 @contextmanager
 def paused_collection() -> Iterator[None]:
-    """Pause the garbage collector: reading and planning make no cycles, and collecting took a third of the time."""
+    """Pause the garbage collector: reading and planning make no cycles, and collection took a third of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -326,7 +326,7 @@ def changed(before: State, after: State) -> list[Fact]:
 
 
 def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
-    """Return steps with their paths counted from `first` on."""
+    """Return steps with their paths counted from `first`."""
     return tuple(
         replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
         for i, step in enumerate(steps, first)

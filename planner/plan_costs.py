@@ -31,7 +31,7 @@ def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
 def in_circles(problem: Problem, plan: Plan) -> int:
     """Return the number of primitives that lead from a state back to the same state: the goal is reached without them.
 
-    Of nested circles the widest counts; where primitives do more than they undo, there is none.
+    Of nested circles only the outermost counts; steps that change more than they undo form no circle.
     """
     rules, facts = Rules(problem), Facts(problem, problem.initial)
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}

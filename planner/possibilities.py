@@ -57,7 +57,7 @@ class Range:
 
 
 LOOKS = 4_096
-"""Number of tests between two looks at the clock."""
+"""Number of tests between two checks of the clock."""
 ANYTHING = Range(-math.inf, math.inf, True)
 
 

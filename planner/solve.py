@@ -1,16 +1,16 @@
-"""A planning call, top to bottom: a mode proves and searches, the checker validates, and levels given up are reported.
+"""A planning call, top to bottom: a mode proves and searches, the checker validates, and abandoned levels are reported.
 
 =========  ==========================================================  ================================
-mode       how it plans                                                 module
+mode       how it plans                                                module
 =========  ==========================================================  ================================
-guarded    goals in series; rules lead where they have helped          `confab.planner.experience.advice`
-leading    the same, and rules lead whatever their record is           `confab.planner.experience.advice`
-strict     the same, and rules don't lead                              `confab.planner.experience.advice`
+guarded    goals in series; rules of proven benefit propose steps      `confab.planner.experience.advice`
+leading    the same; rules propose steps regardless of their record    `confab.planner.experience.advice`
+strict     the same; rules propose no steps                            `confab.planner.experience.advice`
 optimal    shortened until a lower bound is met, without memory         `confab.planner.hierarchical.bounds`
 paper      A* with eq. (5) on each level                                `confab.planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-Every plan that leaves here was accepted by `confab.planner.validation`, every "unsolvable" by
+Every returned plan was accepted by `confab.planner.validation`, every "unsolvable" by
 `confab.planner.certificate_checks`. These share no code with any search.
 """
 
@@ -39,7 +39,7 @@ DEFAULT_MODE: Mode = "guarded"
 
 
 class RejectedPlanError(Exception):
-    """The checker rejects a plan that search returned: a fault of this program. The message names the step and the mode."""
+    """The checker rejects a plan that a search returned: an internal error. The message names the step and the mode."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class Request:
         A key of `MODES`.
     limits : Limits
     memory : Memory, optional
-        Experience, for the modes that it may lead.
+        Experience, for the modes that use it.
     links : Links, optional
-        The paper's memory, for its mode.
+        The paper's memory, for the paper's mode.
     grounds : mapping of level to quantified behaviours, optional
         For the paper's mode; quantified from the problem's classes if left out.
     leave_levels : bool
-        Whether steps of a lower level may stand where a level has no plan that can be refined.
+        Whether steps of a lower level may take the place of a level that has no refinable plan.
     """
 
     problem: Problem
@@ -81,9 +81,9 @@ def solve(request: Request) -> Outcome:
     Raises
     ------
     ValueError
-        There is no such mode.
+        The mode doesn't exist.
     RejectedPlanError
-        The plan that was found is none: a fault of this program, never to be taken for an answer.
+        The steps found are no valid plan: an internal error, and no answer to the request.
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
@@ -148,7 +148,7 @@ def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableE
     proof = impossible(problem, PAIRS if states else AT_ONCE, deadline)
     if proof is not None or not states:
         return proof
-    with suppress(OutOfTimeError):  # then nothing is shown
+    with suppress(OutOfTimeError):  # then no proof was found in time
         try:
             task = proved(problem, problem.domain.levels[-1], deadline)
         except UnsolvableError as proof:

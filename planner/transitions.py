@@ -1,9 +1,9 @@
-"""One state, as a table that is changed in place, and conditions and effects as Python that is generated for it.
+"""A state as a table that is changed in place, and Python code generated for conditions and effects.
 
 now    situation type → key → value. The key is the individual, or the tuple of individuals if the type has several arguments
-who    situation type → value → the keys that have it, in the order in which they got it; not kept for `FALSE`
+who    situation type → value → the keys that have the value, in order of assignment; not kept for `FALSE`
 trail  the overwritten values, oldest first; `undo` restores them down to a mark
-age    number of changes, undoing included; what was derived from the table at this age is still valid
+age    number of changes, undoing included; values derived from the table at this age are still valid
 
 The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
 
@@ -46,7 +46,7 @@ Cell: TypeAlias = "tuple[str, Key]"
 Change: TypeAlias = "tuple[str, Key, str]"
 """A changed cell with the values before and after."""
 Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
-"""What is changed: the values before and after it."""
+"""The net changes of cells: the values before and after."""
 Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
 """Returns the individuals of a behaviour's variables, and its changes."""
 
@@ -83,7 +83,7 @@ class Table:
                 self.who[symbol.situation].setdefault(value, {})[key] = None
 
     def put(self, situation: str, key: Key, value: str) -> None:
-        """Give a symbol a value, and record the old one."""
+        """Set the value of a symbol, and record the old one."""
         self.age += 1
         cells = self.now[situation]
         old = cells.get(key, FALSE)
@@ -100,7 +100,7 @@ class Table:
         self.trail.append((situation, key, old))
 
     def put_all(self, values: Mapping[Cell, str]) -> None:
-        """Give several symbols values."""
+        """Set the values of several symbols."""
         for (situation, key), value in values.items():
             self.put(situation, key, value)
 
@@ -248,7 +248,7 @@ class Writer:
     def satisfying(
         self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
     ) -> tuple[str, list[str]]:
-        """Return an iterable expression of the candidates for a witness, and the tests that each candidate has to pass."""
+        """Return an iterable expression of the candidates for a witness, and the tests that each candidate must pass."""
         term, kind = condition.variable, condition.kind
         inner = {**kinds, term: kind}
         candidates = self.problem.classes.get(kind, ())
@@ -278,7 +278,7 @@ class Writer:
     def listed(self, situation: str, value: str) -> bool:
         """Whether the table lists the holders of a value.
 
-        Not of defined situations, and not of false if a variable could be that.
+        It doesn't for defined situations, nor for false unless a variable could be false.
         """
         domain = self.problem.domain
         return situation not in domain.rules and (value == TRUE or not domain.situations[situation].boolean)

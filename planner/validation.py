@@ -1,11 +1,11 @@
-"""Is this a plan? A checker that shares no code with any search, and reads conditions as they are written.
+"""The checker of plans. It shares no code with any search and reads conditions as they are written.
 
-A behaviour's preconditions hold if *some* individuals, put in for its variables, satisfy them all. Each conjunction is read once
-into a list of tests and choices, the most determined condition first, and then asked of every state: a long plan is checked
+A behaviour's preconditions hold if *some* individuals, as its variables, satisfy them all. Each conjunction is compiled once
+into a list of tests and choices, the most determined condition first, and then evaluated in every state: a long plan is checked
 in time that grows with its length and not with the world.
 
-What a plan of several levels means is in docs/levels.md. In short: what a step's level sees is in the end as the step says; of
-what the level below adds, that which has a rest value and was touched is at rest; the next step begins where this one ended.
+The meaning of a plan of several levels is defined in docs/levels.md. In short: after a step, the symbols that its level sees are
+as the step says; touched symbols of the level below that have a rest value are at rest; the next step begins in that state.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Fault:
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
     """Return the faults of a plan; empty if it is valid.
 
-    Checked are: every step's ID, and all that `carried_out` checks.
+    Checked are every step's ID and everything that `carried_out` checks.
     """
     numbered = {step.path: problem.id_of(step.behavior, step.arguments) for step in plan.walk() if _fits(problem, step)}
     wrong = [
@@ -75,9 +75,9 @@ def carried_out(
 ) -> list[Fault]:
     """Return the faults of a plan during its execution on symbols.
 
-    Checked are: on each level, every step's preconditions in the state in which it is done; that the
-    refinement of a step leaves what that step says, as far as its level knows the symbols, and at rest what else it touched;
-    and the goal. After a step that can't be done, nothing more is checked.
+    Checked are: on each level, the preconditions of every step in the state before it; that its refinement leaves the symbols that
+    its level sees as the step says, and other touched symbols at rest; and the goal. Nothing is checked after an inapplicable step.
+
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def carried_out(
         Filled with the individuals on which the check depends. If the problem has all of them, every larger problem of the same
         scene has the same faults.
     lifted : mapping of name to behaviour, optional
-        The behaviours as they are before effects on each of a class are spread; what these change is then looked up, too.
+        The behaviours before effects on every member of a class are expanded; the individuals that these change are looked up, too.
     """
     rules = Rules(problem, lookups, lifted)
     check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
@@ -103,7 +103,7 @@ def open_goals(problem: Problem) -> list[Fact]:
 
 
 def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
-    """Yield each goal that doesn't hold, with the value that its symbol has instead."""
+    """Yield each goal that doesn't hold, with the actual value of its symbol."""
     for symbol, wanted in problem.goal.items():
         got = facts.value(symbol.situation, symbol.arguments) or FALSE
         if not meets(got, wanted):
@@ -127,7 +127,7 @@ class _Check:
         self.problem = problem
         self.levels = problem.domain.levels
         self.rests = {name: kind.rest for name, kind in problem.domain.situations.items() if kind.rest is not None}
-        self.depth = depth  # the lowest level that the plan speaks of
+        self.depth = depth  # the lowest level with steps in the plan
         self.rules = rules
         self.facts = Facts(problem, problem.initial, rules)
         self.faults: list[Fault] = []
@@ -138,11 +138,11 @@ class _Check:
     def carried_out(
         self, steps: Sequence[Step], above: int, path: tuple[int, ...], what: object, inside: bool = False
     ) -> bool:
-        """Carry out steps that together refine one of level `above`, or the task (level 0); whether all could be done.
+        """Execute steps that together refine one of level `above`, or the task (level 0); return whether all were applicable.
 
-        What the goal says of a symbol comes before its rest value, but not `inside` of a step, which knows no goal.
+        A goal on a symbol takes precedence over its rest value, but not `inside` a step, which knows no goal.
 
-        Among the steps of the next level may be stretches of lower ones, each of which stands in the place of such a step.
+        The steps of the next level may include stretches of lower levels, each in the place of such a step.
         """
         level = next((level for level in self.levels if level > above), above)
         marks = []
@@ -161,7 +161,7 @@ class _Check:
         return True
 
     def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield the changed symbols that aren't at rest, with their values and rest values, since some marks of the log."""
+        """Yield the symbols changed since some marks of the log that aren't at rest, with their values and rest values."""
         first, now = marks[0] if marks else len(self.facts.log), self.facts.value
         changed = {
             (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
@@ -195,7 +195,7 @@ class _Check:
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
         if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
             return False
-        said = {**self.facts.since(mark), **wanted}  # what isn't named stays as it was before
+        said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
         for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
             if cell in wanted or self.problem.sees(behavior.level, symbol, said[cell]):
@@ -203,7 +203,7 @@ class _Check:
         return True
 
     def within_bounds(self, step: Step) -> bool:
-        """Record the totals that a step leaves outside their bounds; return whether there are none."""
+        """Record the totals that a step leaves outside their bounds; return whether all are within bounds."""
         for name in self.rules.bounded:
             kind = self.problem.domain.situations[name]
             for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
@@ -217,7 +217,7 @@ class _Check:
 
 
 def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
-    """Yield each step of a level by itself, and what is below that level in stretches."""
+    """Yield each step of a level alone, and lower steps in stretches."""
     lower: list[Step] = []
     for step in steps:
         if step.level > level:
@@ -301,7 +301,7 @@ class Facts:
             self._holders[situation].setdefault(value, {})[arguments] = None
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the cells that have changed since the log had the length `mark`, with their values then."""
+        """Return the cells that have changed since the log had the length `mark`, with their values at that time."""
         before: dict[Cell, str] = {}
         for situation, arguments, old in self.log[mark:]:
             before.setdefault((situation, arguments), old)
@@ -417,7 +417,7 @@ class _Behavior:
                 reading.key(e.arguments),
                 reading.place(e.value),
             )
-            # What becomes true wins, as in PDDL.
+            # A value that becomes true takes precedence, as in PDDL.
             for e in sorted(behavior.effects, key=lambda effect: effect.value != FALSE)
         ]
         self.amounts = [
@@ -434,7 +434,7 @@ class _Behavior:
         ]
         self.price = None if behavior.price is None else worth(behavior.price, reading.key, rules.problem.relations)
         lifted = rules.lifted.get(behavior.name, behavior)
-        self.changed = [  # which looks up every individual that an effect on each of a class can change, and never holds
+        self.changed = [  # a test that never holds: it records every individual that such an effect can change
             reading.conjunction(
                 (*e.when, ClassCondition(e.each.name, "")), set(bound), {**kinds, e.each.name: e.each.kind}
             )

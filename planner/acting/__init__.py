@@ -1,1 +1,1 @@
-"""Acting in a world: carrying a plan out, noticing, repairing, replanning, and scheduling both hands."""
+"""Acting in a world: executing a plan, observing, repairing, replanning, and scheduling both hands."""

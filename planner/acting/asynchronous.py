@@ -34,7 +34,7 @@ class AsyncWorld(Protocol):
 class Synchronous:
     """A `World` that awaits the coroutines of an `AsyncWorld`.
 
-    The event loop runs all the time, so tasks of the world (a subscription, a heartbeat) go on between the calls. Use it as a
+    The event loop runs all the time, so tasks of the world (a subscription, a heartbeat) continue between the calls. Use it as a
     context manager, or call `close` in the end: both stop the running primitive and end the loop.
     """
 

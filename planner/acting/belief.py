@@ -1,4 +1,4 @@
-"""The executive's belief: the situation as last seen, the goal, what is known of the scene, and what of it is in doubt."""
+"""The executive's belief: the situation as last observed, the goal, the static facts, and the doubts about them."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from confab.reasoner.symbols import (
 
 @dataclass
 class Belief:
-    """The task as it is believed to be.
+    """The task as the executive believes it to be.
 
     `problem` has the situation, the goal, and the static facts and behaviours without those in doubt; `certain` has all static
-    facts and behaviours. `obstacles` are the discovered things that nothing can move: the behaviours that would move them
-    are refuted, in `certain`, too. `withdrawn` and `refuted` are the doubts. `unseen` are the symbols that the first observation
-    left out.
+    facts and behaviours. `obstacles` are discovered objects that can't be moved: behaviours that would move them
+    are excluded, in `certain`, too. `withdrawn` and `refuted` are the doubts. `unseen` are the symbols that the first observation
+    didn't include.
     """
 
     problem: Problem
@@ -61,7 +61,7 @@ class Belief:
 
     @property
     def doubted(self) -> bool:
-        """Whether anything is in doubt."""
+        """Return whether any fact or behaviour is in doubt."""
         return bool(self.withdrawn or self.refuted)
 
     def want(self, goal: Mapping[Symbol, str]) -> None:
@@ -95,14 +95,14 @@ class Belief:
     # ------------------------------------------------------------------------------------------------- knowledge of the scene
 
     def add(self, individual: str, kinds: Iterable[str]) -> None:
-        """Believe in one more individual."""
+        """Add an individual to the belief."""
         for kind in kinds:
             self.problem = with_individual(self.problem, individual, kind)
             self.certain = with_individual(self.certain, individual, kind)
         self.using = compiled(self.problem)
 
     def meet(self, found: Discovery) -> None:
-        """Believe in what a world has discovered."""
+        """Add a discovered individual, and the facts about it, to the belief."""
         self.problem, self.certain = met(self.problem, found), met(self.certain, found)
         if found.fixed:
             self.obstacles[found.individual] = found
@@ -118,7 +118,7 @@ class Belief:
     # ------------------------------------------------------------------------------------------------- doubts
 
     def doubt(self, facts: Iterable[Static] = (), refutations: Iterable[Refutation] = ()) -> None:
-        """Doubt static facts, or the possibility of behaviours."""
+        """Doubt static facts, or the applicability of behaviours."""
         self.withdrawn.update(facts)
         self.refuted |= dict.fromkeys(refutations)
         self._apply_doubts()
@@ -136,7 +136,7 @@ class Belief:
 
 
 def _with_obstacle(problem: Problem, individual: str) -> Problem:
-    """Return the problem in which no behaviour takes hold of an individual, or changes where it is."""
+    """Return the problem in which no behaviour takes hold of an individual, or changes its place."""
     behaviors = {}
     for behavior in problem.domain.behaviors.values():
         values = [effect for effect in behavior.effects if isinstance(effect, ValueEffect)]

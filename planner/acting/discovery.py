@@ -1,4 +1,4 @@
-"""A discovery: what a world has come across that the scene doesn't have."""
+"""A discovery: an individual that a world has found and the scene doesn't have."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from confab.reasoner.symbols import Fact
 
 @dataclass(frozen=True)
 class Discovery:
-    """An individual that a world has come across and the scene doesn't have: a thing, or a spot that is no place of the scene.
+    """An individual that a world has found and the scene doesn't have: an object, or a spot that isn't a place of the scene.
 
     Attributes
     ----------
@@ -19,12 +19,12 @@ class Discovery:
     relations : tuple of (str, tuple of str)
         Static facts about it.
     fixed : str
-        Why nothing can move it, if that is so.
+        The reason why it can't be moved, if it can't.
     blocked : tuple of str
-        Places at which nothing else has room as long as the fact `by` holds.
+        Places without room for another object while the fact `by` holds.
     by : Fact, optional
     text : str
-        What it is, and where, in words.
+        A description of the individual and its position.
     """
 
     individual: str

@@ -20,7 +20,7 @@ class Change(Enum):
     ADD = "add"  # an object appears
     KNOCK = "knock"  # an object is knocked over
     PUSH = "push"  # an object is pushed off its place
-    BOX = "box"  # a box of which no fact speaks is put at a place
+    BOX = "box"  # a box that no fact mentions is put at a place
     GOAL = "goal"  # a goal is added, or replaces that of its symbol
     DROP_GOAL = "drop-goal"
 
@@ -29,24 +29,24 @@ class Change(Enum):
 class Intervention:
     """An intervention by a person during an episode.
 
-    It happens as soon as the step with the ID `after` (an int: a step of the most abstract level) or the path `after` (a tuple)
+    It takes place as soon as the step with the ID `after` (an int: a step of the most abstract level) or the path `after` (a tuple)
     is done, or when the world's clock shows `at` seconds, which may be inside a primitive.
 
     Attributes
     ----------
     change : Change
     facts : tuple of Fact
-        What holds from then on, or is wanted.
+        The facts that hold from then on, or the new goals.
     symbol : Symbol, optional
-        Whose goal is dropped.
+        The symbol whose goal is dropped.
     individual, kind : str
-        What is added, taken away, pushed, knocked over; of which class it is.
+        The object that is added, removed, pushed or knocked over, and its class.
     numbers : tuple of float
-        Metres: by which an object is pushed along x and y; width, depth and height of a box.
+        Metres: the displacement of an object along x and y; or width, depth and height of a box.
     after : int or tuple of int, optional
     at : float, optional
     text : str
-        As it was written.
+        The intervention as it was written.
     """
 
     change: Change
@@ -69,7 +69,7 @@ class End(Enum):
     """How an episode ended."""
 
     REACHED = "reached"
-    IMPOSSIBLE = "impossible"  # proved: what is wanted can't be brought about any more
+    IMPOSSIBLE = "impossible"  # proved: the goal has become unreachable
     GAVE_UP = "gave-up"  # a limit came first
 
 
@@ -123,8 +123,8 @@ class Replan:
     """A change of the plan.
 
     `after` is the path of the last primitive that was begun. `kind` is ``repair`` where valid steps of the old plan were kept,
-    else ``replan``. `steps` is what was to be done from then on, of cost `cost`; `dropped` and `added` count its primitives'
-    difference from what was to be done before.
+    otherwise ``replan``. `steps` are the steps to be done from then on, of cost `cost`; `dropped` and `added` count the primitives
+    removed from and added to the steps planned before.
     """
 
     after: tuple[int, ...]
@@ -151,30 +151,30 @@ class Episode:
     scene : str
     status : End
     reasons : tuple of Reason
-        Why not everything that was wanted was reached.
+        The reasons why goals weren't reached.
     planned : Plan
-        As it was before anything happened.
+        The plan before the first step.
     done : Plan
-        As it was carried out; a primitive that failed isn't part of it, unless what it should bring about was there afterwards.
+        The executed steps; a failed primitive isn't part of it, unless its effects were observed afterwards.
     initial, observed : State
-        The situation in the beginning, and as it was seen in the end.
+        The situation in the beginning, and as it was observed in the end.
     goal : State
-        What was wanted in the end.
+        The goal in the end.
     events : tuple of Event
         Every primitive that was begun, in order.
     interventions : tuple of (Intervention, float)
-        Those that happened, with the time when they began to.
+        The interventions that took place, with the times of their beginning.
     replans : tuple of Replan
     failures : tuple of Failure
         Experience for the memory.
     missed : tuple of Intervention
-        Those that never came: the episode was over before.
+        The interventions that didn't take place, since the episode was over before.
     course : tuple of Seen
-        How the situation changed from `initial` to `observed`, in the order of time.
+        The changes of the situation from `initial` to `observed`, in order of time.
     refuted : tuple of Refutation
-        What planners of motions found to be impossible as things stood, and what was then done otherwise.
+        Behaviours that motion planning found impossible in a situation and that the executive replaced.
     discovered : tuple of (Discovery, float)
-        What the world came across that the scene doesn't have, and when.
+        Individuals that the world found and the scene doesn't have, with the time.
     """
 
     scene: str

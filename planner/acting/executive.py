@@ -1,14 +1,14 @@
-"""The executive: plan, act, observe, be interrupted, repair.
+"""The executive: plans, acts, observes, handles interventions, and repairs.
 
-belief    the situation as last seen, the goal as it is now, and what failures have taught about what is possible
-agenda    the steps that are still to be done; the first may be partly done
-expected  what the next observation should show
-aside     goals that are impossible as things stand; wanted again when something unexpected is seen
-put off   goals that can't be reached as long as doubts hold; tried again when everything else is done
+belief    the situation as last observed, the current goal, and doubts that failures have raised
+agenda    the steps still to be done; the first may be partly done
+expected  the situation that the next observation should show
+aside     goals that are impossible in the present situation; pursued again after an unexpected observation
+put off   goals that are unreachable while doubts hold; tried again when all other goals are done
 
 Rule 1: no primitive is begun whose precondition doesn't hold in the last observation.
-Rule 2: after every primitive the world is observed; whatever isn't as expected makes the agenda be looked at again.
-Rule 3: a goal that can't be reached is set aside or put off alone; the others are still pursued.
+Rule 2: after every primitive the world is observed; after an unexpected observation the agenda is checked again.
+Rule 3: an unreachable goal is set aside or put off alone; the others are still pursued.
 Rule 4: every loop ends: primitives and failures are counted, planning has limits.
 """
 
@@ -47,11 +47,11 @@ from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 @dataclass(frozen=True)
 class Patience:
-    """Limits of an episode: attempts per primitive, failures in all, primitives begun per primitive planned, and planning limits.
+    """Limits of an episode: attempts per primitive, total failures, primitives begun per primitive planned, and planning limits.
 
-    `rounds` is how often everything that failed is tried, anew once no other way is left: the situation has changed by then, and
-    a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `planning` limits each
-    planning call; the whole episode ends by the deadline that holds (`confab.reasoner.limits.within`).
+    `rounds` is the number of times that failed steps are tried once no alternative is left, since the situation may have changed
+    and a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
+    each planning call; the whole episode ends by the current deadline (`confab.reasoner.limits.within`).
     """
 
     attempts: int = 2
@@ -65,7 +65,8 @@ class Patience:
 class Moment:
     """An event for observers of the execution.
 
-    `seconds` is the time on the world's clock, `belief` the task as it is believed to be, with the situation in its initial state.
+    `seconds` is the time on the world's clock, `belief` the task as the executive believes it to be, with the present situation as
+    its initial state.
     """
 
     what: str  # plan, begin, end, intervention, discovery, repair, replan, over
@@ -95,22 +96,22 @@ def act(
     Parameters
     ----------
     problem : Problem
-        The situation in the beginning, and the goal.
+        The initial situation, and the goal.
     world : World
-        Anything with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
+        An object with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
     plan : Plan, optional
-        What to begin with; planned here if left out.
+        The first plan; made here if left out.
     interventions : sequence of Intervention
-        What people will do in the meantime.
+        The interventions by people during the episode.
     planner : callable, optional
-        Plans from scratch, from a situation of rest; the fast planner if left out.
+        Plans from scratch, from a situation of rest; the default planner if left out.
     patience : Patience
     tell : callable, optional
-        Is told every `Moment`.
+        Called with every `Moment`.
     mending : bool
         False replans from scratch instead of repairing.
     caution : Caution, optional
-        What failed in earlier episodes: what it speaks against is done otherwise, where there is another way.
+        Failures in earlier episodes: unreliable facts and behaviours are avoided where there is an alternative.
 
     Returns
     -------
@@ -138,7 +139,7 @@ def act(
     except (WorldError, LimitError) as error:
         run.world.stop()
         run.break_off(str(error))
-    except BaseException:  # Ctrl-C, too: nothing moves on without the executive
+    except BaseException:  # Ctrl-C, too: no motion continues without the executive
         run.world.stop()
         raise
     return run.episode()
@@ -174,10 +175,10 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- beginning, end
 
     def start(self, plan: Plan | None) -> None:
-        """Plan, unless there is a plan to begin with."""
+        """Plan, unless a first plan is given."""
         record = self.record
         record.initial = self.belief.state
-        record.course.clear()  # what was seen so far is the initial situation
+        record.course.clear()  # the facts seen so far are the initial situation
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
         begun, outcome, limits = plan, None, self.patience.planning
         if begun is None:
@@ -194,7 +195,7 @@ class _Run:
         self.say("plan", text="; ".join(reason.text for _, reason in self.aside.values()))
 
     def finish(self) -> None:
-        """End the episode, look at the agenda again, or take up a goal that was put off: no step is left."""
+        """End the episode, check the agenda again, or take up a goal that was put off: no step is left."""
         record = self.record
         if missing := open_goals(self.belief.problem):
             self.doubt(f"{missing[0]} doesn't hold yet")
@@ -211,7 +212,7 @@ class _Run:
         self.say("over", text=record.status.value)
 
     def break_off(self, why: str) -> None:
-        """Stop at once, since the world doesn't answer."""
+        """Stop at once, since the world doesn't respond."""
         self.going, self.record.status = False, End.GAVE_UP
         self.record.reason(Reason(why))
         self.say("over", text=f"{End.GAVE_UP.value}: {why}")
@@ -247,7 +248,7 @@ class _Run:
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
         """Execute the next primitive and observe; a failed primitive that had its effects counts as done.
 
-        Returns the primitive with what is above it, the situation before, and the verdict.
+        Returns the primitive with its ancestors, the situation before, and the verdict.
         """
         chain, record = first_chain(self.agenda), self.record
         step, before = chain[-1], self.belief.problem.initial
@@ -296,17 +297,17 @@ class _Run:
         return surprises
 
     def meet(self) -> None:
-        """Believe in the individuals that the world has discovered."""
+        """Add the individuals that the world has discovered to the belief."""
         for found in self.world.discoveries():
             self.belief.meet(found)
             self.record.discovered.append((found, self.world.seconds))
             self.doubt(found.text or f"there is {found.individual}")
             self.say("discovery", text=found.text)
 
-    # --------------------------------------------------------------------------------------------------- being interrupted
+    # ------------------------------------------------------------------------------------------------------- interventions
 
     def intervene(self) -> None:
-        """Let the interventions take place that follow the last primitive."""
+        """Execute the interventions that follow the last primitive."""
         if not self.waiting:
             return
         done = self.record.done
@@ -333,7 +334,7 @@ class _Run:
                 self.note(intervention, intervention.at or 0.0)
 
     def note(self, intervention: Intervention, seconds: float) -> None:
-        """Record an intervention, and change the goal if it says so."""
+        """Record an intervention, and change the goal if the intervention does."""
         self.record.interventions.append((intervention, seconds))
         goal = self.belief.goal
         if intervention.change is Change.GOAL:
@@ -350,13 +351,13 @@ class _Run:
         self.say("intervention", text=intervention.text)
 
     def forget(self, symbols: Iterable[Symbol]) -> None:
-        """Drop the goals that were set aside or put off."""
+        """Drop goals that were set aside or put off."""
         for symbol in symbols:
             self.aside.pop(symbol, None)
             self.put_off.pop(symbol, None)
 
     def doubt(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
-        """Request a new look at the agenda."""
+        """Request another check of the agenda."""
         if why not in self.puzzled:
             self.puzzled = f"{self.puzzled}; {why}" if self.puzzled else why
         for surprise in surprises:
@@ -425,17 +426,17 @@ class _Run:
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
-        """Take up goals again that were set aside or put off."""
+        """Take up goals that were set aside or put off."""
         if goals:
             self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in goals.items()}})
             goals.clear()
 
     def set_aside_the_vanished(self) -> None:
-        """Drop the goals about an object that is gone, or at no place that a fact could name."""
+        """Drop the goals about an object that has vanished, or that is at no place of the scene."""
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
     def despair(self, outcome: Outcome | None, limits: Limits) -> None:
-        """Look for room; otherwise set aside, or put off, the goals that are unreachable even alone; otherwise try again, or stop.
+        """Look for free spots; otherwise set aside or put off the goals unreachable even alone; otherwise retry, or stop.
 
         A goal that needs facts in doubt is put off until everything else is done.
         """
@@ -462,7 +463,7 @@ class _Run:
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
     def make_room(self) -> bool:
-        """Ask the world, once, for spots beside the scene's places; return whether it has any."""
+        """Request, once, spots besides the scene's places from the world; return whether it has any."""
         if self.room_wanted:
             return False
         self.room_wanted = True
@@ -475,7 +476,7 @@ class _Run:
         return bool(spots)
 
     def blocked(self, fact: Fact, limits: Limits) -> Reason | None:
-        """Return the reason if only immovable things block a goal; None otherwise."""
+        """Return the reason if a goal is blocked by immovable objects only; None otherwise."""
         if not self.belief.obstacles:
             return None
         free = self.belief.without_obstacles({fact.symbol: fact.value})
@@ -488,7 +489,7 @@ class _Run:
         return Reason(f"{fact} is blocked by {told}", (*fact.symbol.arguments, fact.value, *things))
 
     def told(self, fact: Fact, reason: Reason) -> Reason:
-        """Return the reason why a goal can't be reached, with what was discovered of its objects."""
+        """Return the reason why a goal is unreachable, with the discoveries about its objects."""
         there = {v for s, v in self.belief.state.items() if s.arguments[0] in fact.symbol.arguments}
         found = [one.text for one, _ in self.record.discovered if one.individual in there and one.text]
         return replace(reason, text="; ".join((*found, reason.text))) if found else reason
@@ -505,7 +506,7 @@ class _Run:
         return Reason(text, (*symbol.arguments, value, *objects))
 
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
-        """Drop all goals, so that only rest values remain; stop at once if that was tried already."""
+        """Drop all goals, so that only rest values remain; stop at once if that was done already."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
@@ -518,10 +519,10 @@ class _Run:
         self.most = len(self.record.events) + self.patience.primitives
         self.puzzled = reason.text
 
-    # --------------------------------------------------------------------------------------------------- failing
+    # ---------------------------------------------------------------------------------------------------- failures
 
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
-        """Try again, then in another way: a repeated failure counts as impossible for the rest of the episode."""
+        """Retry, then use an alternative: a behaviour that failed repeatedly counts as impossible for the rest of the episode."""
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
             self.doubt(verdict.message)
@@ -550,7 +551,7 @@ class _Run:
         facts: Iterable[tuple[str, tuple[str, ...]]] = (),
         refutations: Iterable[Refutation] = (),
     ) -> None:
-        """Doubt static facts or the possibility of behaviours, and plan the step in progress again."""
+        """Doubt static facts or the applicability of behaviours, and plan the step in progress again."""
         self.belief.doubt(facts, refutations)
         self.sound = False
         self.doubt(why)

@@ -1,10 +1,10 @@
-"""Failure as experience: which static facts proved unreliable, and what to do about it next time.
+"""Failure as experience: which static facts proved unreliable, and which of them to avoid.
 
-A primitive that fails though its preconditions hold casts doubt on the static facts that it relied on: that this hand can
-reach that place, for instance. Counts only grow, so that what several robots have seen can be added up. A fact that failed more
-often than it held isn't relied on as long as there is a plan without it.
+A primitive that fails though its preconditions hold casts doubt on the static facts that it relied on: for instance, that this
+hand can reach that place. Counts only grow, so that the counts of several robots can be added. A fact that failed more
+often than it held is avoided as long as there is a plan without it.
 
-What a planner of motions refutes is known at once, and more exactly: there is no way as long as everything is where it is
+A refutation by motion planning is certain and more specific: the behaviour is impossible while all objects are where they are
 (`refuted_by`).
 """
 
@@ -28,7 +28,7 @@ DOUBTFUL = 0.5
 
 @dataclass(frozen=True)
 class Caution:
-    """How often each static fact was relied on, and how often it failed.
+    """The number of times that each static fact was relied on, and that it failed.
 
     >>> reach = ("canReach", ("hand", "shelf"))
     >>> round(Caution({reach: (3, 2)}).doubt(reach), 2)
@@ -86,13 +86,13 @@ def refuted_by(
     ----------
     problem : Problem
     chain : sequence of Step
-        The primitive, behind all that is above it.
+        The primitive, preceded by its ancestors.
     facts : sequence of Fact
-        Where everything was that took part; none, if nothing can be said. A level above is refuted only if it sees them all.
+        The places of all participating objects; none if unknown. A level above is refuted only if it sees all of these facts.
     why : str
     likewise : sequence of Refutation
-        Primitives that are refuted for the same reason, for any hand. What is above them is refuted where nothing else does
-        what it does. Where they say all that is refuted, and more, the rest is left out.
+        Primitives refuted for the same reason, for any hand. An ancestor is refuted if no other behaviour has its effects.
+        Primitives that are implied by these are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
     for step in chain if facts and not any(one.covers(exact) for one in likewise) else ():
@@ -104,7 +104,7 @@ def refuted_by(
 
 
 def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
-    """Tell whether the level of a behaviour sees some facts."""
+    """Return whether the level of a behaviour sees some facts."""
     level = problem.domain.behaviors[behavior].level
     return all(problem.sees(level, fact.symbol, fact.value) for fact in facts)
 
@@ -135,7 +135,7 @@ def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
 
 
 def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
-    """Return the static facts that a primitive, or else the next behaviour above it, relied on."""
+    """Return the static facts that a primitive, or otherwise the next behaviour above it, relied on."""
     for step in reversed(chain):
         behavior = problem.domain.behaviors[step.behavior]
         env = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}

@@ -40,7 +40,7 @@ class Record:
 
     @property
     def executed(self) -> Plan:
-        """The steps done, as a tree."""
+        """The executed steps, as a tree."""
         return Plan(tree_of(self.done))
 
     def changes(self, before: State, after: State, seconds: float) -> None:
@@ -54,7 +54,7 @@ class Record:
             self.reasons.append(reason)
 
     def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...]) -> Episode:
-        """Return the episode: the record, with the task as it is in the end."""
+        """Return the episode: the record, with the final task."""
         return Episode(
             task.scene,
             self.status,

@@ -1,15 +1,15 @@
-"""Repair: the steps of a plan that are still valid are kept, the rest is planned anew.
+"""Repair of a plan: valid steps are kept, the rest is planned again.
 
-The steps that are still to be done are replayed on one table from the situation as it is. A step is
+The remaining steps are replayed on one table from the present situation. A step is
 
-dropped     if what it is for holds already, or isn't wanted any more
-kept        if its primitives still do what they should; else refined anew (by another hand, for instance)
-put off     if it can't be done yet; then so is what concerns the same individuals
+dropped     if its purpose holds already, or is no longer a goal
+kept        if its primitives still have their effects; otherwise refined again (for another hand, for instance)
+put off     if it isn't applicable yet; later steps about the same individuals are then put off, too
 
-What was put off is tried again as long as anything else succeeds. The goals that are open in the end are left to the fast
-planner, on the same table. A hand that stands in the middle of something first finishes it, or is brought to rest.
+Steps put off are tried again as long as another step succeeds. The goals that are open in the end are achieved by the default
+planner, on the same table. A hand in the middle of a step first finishes it, or is brought to rest.
 
-Nothing leaves here to be followed that `confab.planner.validation` doesn't accept.
+Every result is accepted by `confab.planner.validation`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CLOSE = 1.1
 """Maximum ratio of the cost of a repair to that of a new plan; beyond it, the new plan is taken."""
 
 MOST = 5_000
-"""Maximum number of expansions of a repair, before everything is planned anew."""
+"""Maximum number of expansions of a repair, before the whole task is planned again."""
 
 SHARE = 0.5
 """Share of the time for a repair; the rest is left for a new plan."""
@@ -55,7 +55,7 @@ class Mended:
 
 @dataclass(frozen=True)
 class Repaired:
-    """The result of a repair: the steps, their cost, and `least`, a lower bound of the cost of any plan for the open goals."""
+    """The result of a repair: the steps, their cost, and `least`, a lower bound on the cost of any plan for the open goals."""
 
     steps: tuple[Step, ...]
     cost: float
@@ -76,25 +76,25 @@ def mend(
     Parameters
     ----------
     problem : Problem
-        The situation as it is, and the goal as it is now.
+        The present situation, and the present goal.
     rest : sequence of Step
-        What was to be done from here on; the first step may be partly done, with only its open sub-steps below it.
+        The remaining steps; the first step may be partly done, with only its open sub-steps below it.
     planned : Problem
-        What `rest` was planned for: the situation that was expected here, and the goal.
+        The problem for which `rest` was planned: the expected situation, and the goal.
     planner : callable, optional
-        Plans from scratch, from a situation of rest; the fast planner if left out.
+        Plans from scratch, from a situation of rest; the default planner if left out.
     using : Compiled, optional
         From `confab.planner.hierarchical.planner.compiled`, for the same domain, individuals and static facts.
     in_progress : bool
-        Whether the first step of `rest` may be finished as it was planned.
+        Whether the first step of `rest` may be finished as planned.
     limits : Limits
-        Of the whole call, whether it repairs, plans anew, or does both.
+        Limits of the whole call, whether it repairs, replans, or does both.
     """
     using, end = using or compiled(problem), limits.end()
     repaired = repair(problem, rest, planned, using, in_progress, limits)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
-    fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
+    fewer = planned.goal.keys() - problem.goal.keys()  # then steps needed before may be needless
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return Mended("repair", repaired.steps, repaired.cost)
     anew, outcome = replan(problem, planner, using, limits.until(end))
@@ -106,15 +106,15 @@ def mend(
 def repair(
     problem: Problem, rest: Sequence[Step], planned: Problem, using: Compiled, in_progress: bool, limits: Limits
 ) -> Repaired | None:
-    """Return what is to be done with as much of `rest` as is still valid, or None if that wasn't found.
+    """Return steps for the open goals that keep as many valid steps of `rest` as possible, or None if none were found.
 
-    The least counts what was planned and isn't touched by the changes, what was in progress, and for each goal that is open the
-    step that achieves it; of the steps that concern one thing that is touched, or that a new step concerns, one.
+    The lower bound counts the planned steps that the changes don't touch, the step in progress, and one step per open goal; of the
+    steps about an individual that is touched, or that a new step concerns, it counts one.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
     call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
-    # What is impossible is proved by replanning; nor is anything kept undone here: beginning anew is replanning, too.
+    # Replanning proves impossibility. Here no step is undone: a restart is a new plan.
     agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
@@ -128,7 +128,7 @@ def repair(
         _restore(call, pending)
         restored = len(call.steps)
         whole = _replay(call, pending, wanted)
-        # Where nothing is dropped, all that is kept has its purpose.
+        # Where no step is dropped, all kept steps have their purpose.
         kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
         settle(call)
         now = replace(problem, initial={**problem.initial, **call.table.state()})
@@ -139,7 +139,7 @@ def repair(
         return None
     costs = costs_of_steps(call.problem, call.tree().steps)
     needed = {i for i in kept if touched.isdisjoint(call.steps[i][2])} | _last_steps(call)
-    for individual in sorted(touched):  # its steps could perhaps be done as one
+    for individual in sorted(touched):  # one step might replace its steps
         together = [i for i in needed if individual in call.steps[i][2]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
@@ -180,9 +180,9 @@ def replan(
 
 
 def rejected(problem: Problem, steps: Sequence[Step]) -> Reason | None:
-    """Return what the independent checker has against following some steps; None if they can be followed from here to the goal.
+    """Return why the independent checker rejects some steps; None if they lead from the present situation to the goal.
 
-    Their primitives are checked: the first step may be under way, so that what its parents ask held before.
+    Only their primitives are checked: the first step may be in progress, so its parents' preconditions held earlier.
     """
     faults = validate(problem, Plan(renumbered(Plan(tuple(steps)).primitives)))
     return Reason(f"the steps that were found can't be followed: {faults[0].text}") if faults else None
@@ -208,7 +208,7 @@ def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> li
 
 
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
-    """Return how many primitives of the old steps are dropped, and how many of the new ones are added.
+    """Return the number of old primitives that are dropped, and of new primitives that are added.
 
     The two sequences are compared: a primitive at another position counts as dropped and added.
     """
@@ -221,9 +221,9 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 
 
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
-    """Do the open steps of the step in progress, up to a situation of rest, and remove them from `pending`.
+    """Apply the open steps of the step in progress, up to a situation of rest, and remove them from `pending`.
 
-    If they don't lead to one, or to what isn't wanted any more, nothing is done, and the first of them is given up.
+    If they don't lead to such a situation, or only to values that are no longer goals, none is applied and the first is dropped.
     """
     mark = len(call.table.trail)
     for count, step in enumerate(pending, 1):
@@ -233,7 +233,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
         call.steps.append(done)
         if call.at_rest():
             if _useless(call, call.table.since(mark), wanted):
-                break  # nor is it to be finished if it changes nothing that the upper levels know of
+                break  # a step without an effect on the upper levels isn't finished
             del pending[:count]
             return
     call.table.undo(mark)
@@ -242,7 +242,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
 
 
 def _restore(call: Call, pending: Sequence[Step]) -> None:
-    """Achieve first the open goals for which no step is pending, where one step does it: something happened to them."""
+    """Achieve first the open goals without a pending step, where one step does it: their symbols were disturbed."""
     planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
     before = order(call) if orphans else {}
@@ -252,7 +252,7 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
 
 
 def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
-    """Do as many pending steps as possible, in their order if possible; return whether none was dropped."""
+    """Apply as many pending steps as possible, in their order if possible; return whether none was dropped."""
     progress, whole = True, True
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
@@ -281,9 +281,9 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
 
 
 def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
-    """Do a step by the very primitives that it has, or return None with the table as it was.
+    """Apply a step by its own primitives, or return None with the table unchanged.
 
-    Of a step that was `begun` before, only its primitives count; any other must be applicable, and do what it promises.
+    Of a step that was `begun` before, only the primitives count; any other step must be applicable and have its effects.
     """
     mark = len(call.table.trail)
     applicable = call.space.forward[step.behavior](*step.arguments)
@@ -310,7 +310,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
-    """Replace the value that a step gives by the present goal value, if one step achieves that."""
+    """Replace the value that a step gives by the present goal value, if one step achieves that value."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
             call.achieve(call.program.levels[0], cell, ONE_STEP)
@@ -339,7 +339,7 @@ def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapp
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of the steps that last give an open goal its value.
+    """Return the positions of the last steps that give an open goal its value.
 
     Consecutive steps below the first level serve one purpose.
     """

@@ -1,7 +1,7 @@
 """Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that keeps it.
 
-Most of a plan's order is arbitrary. A primitive has to wait for an earlier one only if, executed before it, one of the two would be
-inapplicable or have other effects. This is tested with the behaviours themselves, so that conditions of any form count.
+Most of a plan's order is arbitrary. A primitive must wait for an earlier one only if, executed before it, one of the two would be
+inapplicable or have other effects. The behaviours themselves are used for this test, so it covers all forms of conditions.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def _needs(
     i: int,
     j: int,
 ) -> bool:
-    """Return whether primitive `j` has to wait for the earlier primitive `i`."""
+    """Return whether primitive `j` must wait for the earlier primitive `i`."""
     if writes[i].keys() & writes[j].keys():
         return True
     live = {s: old for s, (old, new) in writes[i].items() if not any(s in writes[k] for k in range(i + 1, j))}

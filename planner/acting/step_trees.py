@@ -1,4 +1,4 @@
-"""Trees of steps that are partly done: the next primitive, the rest, and the whole as it was carried out."""
+"""Trees of partly executed steps: the next primitive, the rest, and the tree of executed steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from confab.planner.plan import Step
 
 
 def first_chain(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the first primitive below the first step, behind all steps that are above it."""
+    """Return the first primitive below the first step, preceded by all its ancestors."""
     chain = list(steps[:1])
     while chain and chain[-1].steps:
         chain.append(chain[-1].steps[0])

@@ -1,4 +1,4 @@
-"""A symbolic world: behaviours have exactly their effects, except for interventions and planted faults."""
+"""A symbolic world: behaviours have exactly their effects, except for interventions and injected faults."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 DONE = Report(True)
 Fault = Callable[[Step, State], Report | None]
-"""Decides whether a primitive fails in a situation, and how; for trials."""
+"""Decides whether a primitive fails in a situation, and how; for tests."""
 
 
 class SymbolicWorld:
-    """A world in which every primitive takes its time and then has its effects.
+    """A world in which every primitive takes its duration and then has its effects.
 
     Parameters
     ----------
     problem : Problem
         Its initial state is the world's.
     seconds_of : mapping of behaviour to seconds
-        How long each takes; a second if not said.
+        Duration of each; one second by default.
     fault : callable, optional
     """
 
@@ -51,7 +51,7 @@ class SymbolicWorld:
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
     def execute(self, step: Step) -> Report:
-        """Carry out a primitive; what happens in the meantime stops it if its precondition is lost."""
+        """Execute a primitive; an intervention meanwhile stops it if its precondition is lost."""
         end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
         disturbed = False
         while self._waiting and (self._waiting[0].at or 0.0) < end:
@@ -73,15 +73,15 @@ class SymbolicWorld:
         return DONE
 
     def stop(self) -> None:
-        """Do nothing: a primitive takes no time of the machine's."""
+        """Do nothing: a primitive takes no computing time."""
 
     def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention happen.
+        """Apply an intervention.
 
         Raises
         ------
         ImpossibleStateError
-            What it would lead to can't be.
+            The resulting state is impossible.
         """
         if intervention.change in (Change.ADD, Change.BOX):
             self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
@@ -96,20 +96,20 @@ class SymbolicWorld:
         self.state = after
 
     def discoveries(self) -> tuple[Discovery, ...]:
-        """Return the boxes and spots that came up since the last call."""
+        """Return the boxes and spots that have appeared since the last call."""
         news, self._news = tuple(self._news), []
         return news
 
     def free_spots(self) -> tuple[Discovery, ...]:
-        """Return nothing: this world has no room but its places."""
+        """Return nothing: this world has no room besides its places."""
         return ()
 
     def why_unplaced(self, individual: str) -> str:
-        """Return that an object lies, if it is still there."""
+        """Return that an object lies, if it still exists."""
         return "lies" if any(symbol.arguments[0] == individual for symbol in self.state) else ""
 
     def _add_spot(self, individual: str) -> None:
-        """Put an object that stands at a place on a new spot beside it, of which the same static facts hold."""
+        """Put an object that stands at a place on a new spot beside it, with the same static facts as the place."""
         symbols = place_symbols(self.problem, individual)
         there = next((self.state[s] for s in symbols if self.state.get(s) in self.problem.individuals), None)
         symbol = next((s for s in symbols if s in self.state), None)
@@ -136,8 +136,8 @@ class SymbolicWorld:
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
     """Return the state after an intervention.
 
-    An object that is moved, knocked over or taken away is let go: a hand that held it rests, and one that was at it stays where it
-    was. An object that lies is at no place.
+    An object that is moved, knocked over or removed is released: a hand that held it is at rest, and a hand that was at it stays
+    where it was. An object that lies has no place.
     """
     after = dict(state)
     if intervention.change is Change.KNOCK:
@@ -157,7 +157,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Take an individual out of the values of others: where it was if that can be said of them, else their rest."""
+    """Remove an individual from the values of other symbols: they get its former place if possible, otherwise their rest values."""
     own = [value for symbol, value in state.items() if symbol.arguments[0] == individual]
     for symbol, value in state.items():
         if value == individual and symbol in after:
@@ -171,7 +171,7 @@ def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual
 
 
 def _is_whereabouts(problem: Problem, situation: str) -> bool:
-    """Whether a situation type shares values with another one: what changes it, changes what others are at."""
+    """Return whether a situation type shares values with another one: a change of place then changes both."""
     own = set(problem.classes.get(problem.domain.situations[situation].range, ()))
     return any(
         own & set(problem.classes.get(other.range, ()))
@@ -181,7 +181,7 @@ def _is_whereabouts(problem: Problem, situation: str) -> bool:
 
 
 def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
-    """Return the problem with one more individual, which is counted last in its classes."""
+    """Return the problem with one more individual, which comes last in its classes."""
     kinds, waiting = {kind}, [kind]
     while waiting:
         for parent in problem.parents.get(waiting.pop(), ()):
@@ -206,7 +206,7 @@ def met(problem: Problem, found: Discovery) -> Problem:
 
 
 def shared_kinds(problem: Problem, individuals: Iterable[str]) -> tuple[str, ...]:
-    """Return the classes that some individuals have in common, without those whose superclasses they are."""
+    """Return the common classes of some individuals, without superclasses of others among them."""
     names = {*individuals}
     common = [kind for kind, members in problem.classes.items() if names and names <= {*members}]
     above = {parent for kind in common for parent in problem.parents.get(kind, ())}
@@ -214,6 +214,6 @@ def shared_kinds(problem: Problem, individuals: Iterable[str]) -> tuple[str, ...
 
 
 def place_symbols(problem: Problem, individual: str) -> list[Symbol]:
-    """Return the symbols that say at which place an object is."""
+    """Return the symbols that give the place of an object."""
     situations = problem.domain.situations.values()
     return [Symbol(s.name, (individual,)) for s in situations if s.perceived is not None and s.perceived.by == PLACE]

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
-"""The code of a primitive that was stopped: no failure, so nothing is learned from it."""
+"""The code of a primitive that was stopped: this isn't a failure, so it isn't learned from."""
 
 WITHOUT_EFFECT = "without effect"
-"""The code of a primitive that was reported as done, though none of its effects is seen."""
+"""The code of a primitive that was reported as done, though none of its effects is observed."""
 
 
 class WorldError(Exception):
-    """The world itself broke: it raised an exception, or answered with something that is no observation or verdict."""
+    """The world itself failed: it raised an exception, or returned something other than an observation or a verdict."""
 
 
 class Verdict(Protocol):
@@ -40,7 +40,7 @@ class Verdict(Protocol):
 
     @property
     def ok(self) -> bool:
-        """Whether the primitive ended as it should."""
+        """Whether the primitive ended successfully."""
 
     @property
     def code(self) -> str | None:
@@ -57,7 +57,7 @@ class Verdict(Protocol):
 
 @dataclass(frozen=True)
 class Report:
-    """A verdict as a value. `facts` are those as long as which motion planning refuted the primitive."""
+    """A verdict as a value. `facts` are those under which motion planning refuted the primitive."""
 
     ok: bool
     code: str | None = None
@@ -84,7 +84,7 @@ class World(Protocol):
 
 
 class Disturbable(World, Protocol):
-    """A simulated world, in which interventions can take place."""
+    """A simulated world in which interventions can take place."""
 
     def disturb(self, intervention: Intervention) -> None:
         """Let an intervention take place now."""
@@ -95,23 +95,23 @@ class Disturbable(World, Protocol):
 
 @runtime_checkable
 class Discoverer(Protocol):
-    """A world that comes across individuals which the scene doesn't have."""
+    """A world that finds individuals which the scene doesn't have."""
 
     def discoveries(self) -> Sequence[Discovery]:
-        """Return what was discovered since the last call. Observations may name it from then on."""
+        """Return the discoveries since the last call. Observations may name them from then on."""
 
     def free_spots(self) -> Sequence[Discovery]:
-        """Return spots at which something can be put down; called once, when the places of the scene don't suffice."""
+        """Return spots at which an object can be put down; called once, when the places of the scene don't suffice."""
 
     def why_unplaced(self, individual: str) -> str:
-        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``; an empty text if that can't be said."""
+        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``; an empty text if unknown."""
 
 
 @dataclass(frozen=True)
 class Guarded:
-    """A world whose exceptions and malformed answers become one `WorldError` that names the call.
+    """A world whose exceptions and malformed results become one `WorldError` that names the call.
 
-    A primitive that still runs at the deadline that holds (`confab.reasoner.limits`) is stopped.
+    A primitive that still runs at the current deadline (`confab.reasoner.limits`) is stopped.
     """
 
     world: World
@@ -150,7 +150,7 @@ class Guarded:
         return said
 
     def stop(self) -> None:
-        """Stop the running primitive; a world that fails to do so is none that could be told."""
+        """Stop the running primitive; ignore an error of a world that can't."""
         with suppress(WorldError), _asking("stop()"):
             self.world.stop()
 
@@ -166,14 +166,14 @@ class Guarded:
                 self._disturbable().announce(interventions)
 
     def discoveries(self) -> tuple[Discovery, ...]:
-        """Return what was discovered since the last call; nothing if the world is no `Discoverer`."""
+        """Return the discoveries since the last call; none if the world is no `Discoverer`."""
         if not isinstance(self.world, Discoverer):
             return ()
         with _asking("discoveries()"):
             return tuple(self.world.discoveries())
 
     def free_spots(self) -> tuple[Discovery, ...]:
-        """Return spots that are free to put something down."""
+        """Return spots that are free to put an object down."""
         if not isinstance(self.world, Discoverer):
             return ()
         with _asking("free_spots()"):
@@ -206,7 +206,7 @@ def _asking(call: str) -> Iterator[None]:
     """Turn an exception of the world into a `WorldError`; log the traceback at level DEBUG."""
     try:
         yield
-    except (ImpossibleStateError, WorldError):  # the first is the caller's fault, not the world's
+    except (ImpossibleStateError, WorldError):  # the first is an error of the caller, not of the world
         raise
     except Exception as error:
         logger.debug("the world failed", exc_info=True)

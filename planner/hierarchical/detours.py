@@ -134,8 +134,7 @@ class _Assembly:
     """Assembles steps from their remaining parts, by number, and replays each part on the table.
 
     A step stays as it was if all of its parts remain and it still has its effect. A step inside a stretch of a lower level
-    doesn't:
-    such a stretch ends where all symbols that the step's level doesn't see are at rest again.
+    doesn't: such a stretch ends where all symbols that the step's level doesn't see are at rest again.
     """
 
     def __init__(self, refiner: Refiner, level: int, kept: Mapping[int, RefinedStep]) -> None:

@@ -178,8 +178,7 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
     """Return the individuals together with those that their conditions depend on, though the latter don't take part.
 
     The latter are their values, the values of these and so on; where a behaviour quantifies over individuals, also the
-    individuals
-    that have one of them as a value, and those in a static relation to one of them.
+    individuals that have one of them as a value, and those in a static relation to one of them.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)

@@ -1,7 +1,7 @@
 """The facts that each step of a sequence reads and changes at its beginning, throughout, and at its end.
 
-The sequence is of steps, or of begins and ends of steps where some only exist during others. It is carried out once on paper; each
-condition notes what it looks at while it is evaluated.
+The sequence consists of steps, or of begins and ends of steps where some are possible only during others. It is simulated once on
+symbols, and the facts that each condition reads are recorded.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Event: TypeAlias = "tuple[int, Moment]"
 
 
 class InapplicableError(Exception):
-    """A step can't be done where the sequence has it; the message says which and why."""
+    """A step isn't applicable at its position in the sequence; the message says which and why."""
 
 
 @dataclass(frozen=True)
@@ -79,19 +79,19 @@ class Noting(Facts):
         self.reads: dict[Key, None] = {}
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
-        """Return the value of a symbol, and note that it was read."""
+        """Return the value of a symbol, and record the access."""
         self.reads[situation, arguments] = None
         return super().value(situation, arguments)
 
     def holders(self, situation: str, value: str) -> Iterable[Arguments]:
-        """Return the arguments of the symbols with a value, and note that they were looked for."""
+        """Return the arguments of the symbols with a value, and record the access."""
         self.reads[situation, value] = None
         return list(super().holders(situation, value))
 
     def begin(self) -> None:
-        """Forget what was read."""
+        """Discard the recorded accesses."""
         self.reads = {}
-        if self.problem.domain.rules:  # what is known to follow would be read without its reasons
+        if self.problem.domain.rules:  # cached derived facts would be read without their reasons
             self._definitions.forget()
 
     def noted(self) -> frozenset[Key]:
@@ -101,7 +101,7 @@ class Noting(Facts):
 
 
 def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event]) -> list[Activity]:
-    """Return the activities of steps that are carried out in the order of events.
+    """Return the activities of steps that are executed in the order of events.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event])
     Raises
     ------
     InapplicableError
-        A step can't be done where the events have it.
+        A step isn't applicable at its position in the events.
     """
     course = _Course(problem, steps)
     for number, moment in events:
@@ -127,12 +127,12 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event])
 
 
 def in_sequence(steps: Sequence[Step]) -> Iterator[Event]:
-    """Yield the events of steps that are done one after the other."""
+    """Yield the events of steps that are executed one after another."""
     yield from ((number, Moment.WHOLE) for number in range(len(steps)))
 
 
 class _Course:
-    """Steps carried out on paper."""
+    """Steps simulated on symbols."""
 
     def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
         self.problem, self.steps = problem, steps

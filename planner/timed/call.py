@@ -57,9 +57,9 @@ def in_time(
     seconds : float, optional
         Limit of the search for a short schedule.
     separation : Fraction
-        How long conflicting events are apart, in seconds: PDDL's epsilon.
+        The time between conflicting events, in seconds: PDDL's epsilon.
     events : sequence of Event, optional
-        In which order its primitives begin and end; one after the other if not given.
+        The order in which its primitives begin and end; one after another if not given.
     """
     until = perf_counter() + (SECONDS if seconds is None else seconds)
     steps = plan.primitives
@@ -93,7 +93,7 @@ def in_time(
         if not choices.of:
             said = faults[0].text if timed is not None else "its steps have no order"
             return Timed(reason=Reason(f"the schedule is no plan in time: {said}"))
-        choices = Choices()  # what other actors would do isn't what the plan needs
+        choices = Choices()  # a plan with required concurrency keeps its actors
 
 
 def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
@@ -120,7 +120,7 @@ def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
 def _timed(
     problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: Candidate
 ) -> TimedPlan | None:
-    """Return a schedule as a plan in time, with the turns taken by their actors; None if its levels have no order then."""
+    """Return a schedule as a timed plan, with the turns taken by their actors; None if its levels have no sequential order."""
     renamed: dict[int, dict[str, str]] = {}
     for resource, line in enumerate(found.turns):
         for own, number in line:
@@ -170,9 +170,9 @@ def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], 
 
 
 def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
-    """Return a timed plan whose tree has the order of its schedule, in which its steps can be done one after the other.
+    """Return a timed plan whose tree is in the order of its schedule, such that its steps could also be executed in sequence.
 
-    If there is no such order, the tree's own is kept if it is one; else nothing is returned.
+    If there is no such order, the tree's own order is kept if it is valid; otherwise None is returned.
     """
     own = None if validate(problem, timed.plan) else timed
     numbers = {slot.step.path: i for i, slot in enumerate(timed.slots)}

@@ -1,12 +1,12 @@
 """Plans that need concurrency: the begins and ends of steps as operators of the flat core, with a simple temporal network.
 
-A behaviour with a value that holds only while it lasts is cut into two, its begin and its end; all others stay whole, and are cut
-only where no plan is found otherwise. A first search knows no durations; what it finds is scheduled. Where that has no schedule, a
-second search keeps a network of the events since nothing was running, and gives up whatever can't be ended in time.
+A behaviour with a value that holds only during it is cut into its begin and its end. The others stay whole, and are cut
+only if no plan is found otherwise. A first search ignores durations; its plan is scheduled. If that has no schedule, a
+second search keeps a network of the events since no step was running, and drops nodes in which a step can't end in time.
 
 state       bits of the cut task, as in `confab.planner.grounded.best_first`
-window      the events since nothing was running, each with what it reads and writes
-h           relaxed-plan heuristic of a state, and one for each step that is running
+window      the events since no step was running, each with its reads and writes
+h           relaxed-plan heuristic of a state, and one for each running step
 
 Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008; Coles et al., "Extending the use of
 inference in temporal planning as forwards search", ICAPS 2009 (steps that need no cut).
@@ -50,7 +50,7 @@ from confab.reasoner.timing import only_during, projected, timing_of
 
 BEGIN, END, RUNNING, HELD = "@begin", "@end", "@running", "@held"
 FIRST = 0.5
-"""The share of the time that the search without durations is given."""
+"""Share of the time limit for the search without durations."""
 MOST_STATES = 300_000
 """Maximum number of states of the search with durations."""
 _Key: TypeAlias = "tuple[int, tuple[int, ...]]"
@@ -65,12 +65,12 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
         Of one level.
     limits : Limits
     separation : Fraction
-        How long conflicting events are apart, in seconds.
+        The time between conflicting events, in seconds.
 
     Returns
     -------
     Outcome
-        Its plan has the steps in the order of their begins; "unsolvable" is never said.
+        Its plan has the steps in the order of their begins; the status is never unsolvable.
     Timed
         The plan in time, if there is one.
     """
@@ -109,9 +109,9 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
 
 @dataclass(frozen=True)
 class _Cut:
-    """A problem some of whose behaviours are cut into begin and end.
+    """A problem with some behaviours cut into begin and end.
 
-    If `guarded`, a symbol that a cut behaviour asks for throughout can't be changed meanwhile, nor asked for throughout by another.
+    If `guarded`, a symbol that a cut behaviour requires throughout can't be changed meanwhile, nor required by another one.
     """
 
     whole: Problem
@@ -141,7 +141,7 @@ class _Cut:
         return replace(self.whole, domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}))
 
     def held(self) -> frozenset[str]:
-        """Return the situation types that cut behaviours ask for throughout and that others change."""
+        """Return the situation types that cut behaviours require throughout and that others change."""
         behaviors = self.whole.domain.behaviors
         return frozenset(
             situation
@@ -151,12 +151,12 @@ class _Cut:
         )
 
     def asked(self, name: str) -> list[tuple[str, tuple[str, ...]]]:
-        """Return the symbols that a cut behaviour asks for throughout."""
+        """Return the symbols that a cut behaviour requires throughout."""
         asked = timing_of(self.whole.domain.behaviors[name]).asked(Span.THROUGHOUT)
         return [(c.situation, c.arguments) for c in asked if isinstance(c, ValueCondition)]
 
     def guard(self, behavior: Behavior) -> Behavior:
-        """Return a behaviour that changes nothing that is held; the begin of a cut one holds symbols, and its end frees them."""
+        """Return a behaviour that changes no reserved symbol; a cut one reserves symbols at its begin until its end."""
         name, _, part = behavior.name.partition("@")
         held = self.held()
         own = [cell for cell in self.asked(name) if cell[0] in held] if part else []
@@ -217,7 +217,7 @@ def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effec
 
 @dataclass(frozen=True)
 class _Event:
-    """An event of a window: the number of its step there, whether it begins and ends it, what it reads and what it writes."""
+    """An event of a window: the number of its step, whether it begins or ends it, its reads and its writes."""
 
     step: int
     begins: bool
@@ -228,18 +228,18 @@ class _Event:
 
 @dataclass(frozen=True)
 class _Node:
-    """A state with the way to it: the events since nothing was running, and the operators that are to end what runs."""
+    """A state with its path: the events since no step was running, and the operators that will end the running steps."""
 
     state: int
     window: tuple[_Event, ...]
     lasts: tuple[int, ...]
     running: Mapping[int, int]  # the operator that ends a step, and the step's number in the window
-    held: int  # bits that what runs asks for throughout
+    held: int  # bits required throughout by running steps
 
 
 @dataclass
 class _Finder:
-    """Looks for sequences of operators of a cut task."""
+    """Searches sequences of operators of a cut task."""
 
     cut: _Cut
     task: Task
@@ -276,14 +276,14 @@ class _Finder:
         return Facts(self.cut.whole, self.cut.whole.initial)
 
     def without_durations(self, limits: Limits) -> Iterator[list[int]]:
-        """Yield a sequence of operators that leads to the goal with nothing running, if a search without durations finds one."""
+        """Yield a sequence of operators that leads to the goal with no step running, if a search without durations finds one."""
         first = search(self.task, limits, limits.end(FIRST))
         self.counts.add(first.counts)
         if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
             yield whole
 
     def ending(self, operator: int) -> int | None:
-        """Return the operator that ends what an operator begins; None if it can never end."""
+        """Return the operator that ends the step begun by an operator; None if it can never end."""
         name, arguments = self.named[operator]
         return self.end_of.get((name.partition("@")[0], arguments))
 
@@ -341,12 +341,12 @@ class _Finder:
                     break
 
     def key(self, node: _Node) -> _Key:
-        """Return what tells nodes apart: the state, and how long each running step has been busy with others."""
+        """Return the identity of a node: the state, and the time that each running step has been occupied by others."""
         busy = sorted((end, self.busy(node, step)) for end, step in node.running.items())
         return node.state, tuple(number for pair in busy for number in pair)
 
     def busy(self, node: _Node, step: int) -> int:
-        """Return the time that the events of a window take, at least, since a step of it began: those that its end waits for."""
+        """Return the minimum time taken by the events of a window since a step of it began, as far as its end waits for them."""
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
         return 0 if times is None else times[-1]
@@ -358,7 +358,7 @@ class _Finder:
         return [*preferred, *sorted(possible.difference(preferred))]
 
     def after(self, node: _Node, operator: int) -> _Node | None:
-        """Return the node after an operator; None if it isn't applicable, breaks what runs, or lets something end too late."""
+        """Return the node after an operator; None if it isn't applicable, violates a running step, or delays an end too long."""
         task = self.task
         state = task.applied(node.state, operator)
         if state is None or state == node.state:
@@ -392,7 +392,7 @@ class _Finder:
         return found if self.times(found, running) is not None else None
 
     def access(self, operator: int) -> tuple[int, int]:
-        """Return what an operator reads and writes, each a bit per symbol: also a symbol that has its old value in the end."""
+        """Return the reads and writes of an operator, a bit per symbol, including symbols that get their old value back."""
         if operator not in self.accesses:
             name, arguments = self.named[operator]
             behavior = self.cut.whole.domain.behaviors[name.partition("@")[0]]
@@ -413,7 +413,7 @@ class _Finder:
         return self.accesses[operator]
 
     def bits(self, cells: Iterable[tuple[str, tuple[str, ...]]], terms: Mapping[str, str]) -> int:
-        """Return the bits of symbols with terms put in."""
+        """Return the bits of symbols with the given individuals."""
         found = 0
         for situation, arguments in cells:
             cell = situation, tuple(terms.get(a, a) for a in arguments)
@@ -422,7 +422,7 @@ class _Finder:
 
     @cached_property
     def accesses(self) -> dict[int, tuple[int, int]]:
-        """What operators read and write, as far as was asked."""
+        """The reads and writes of the operators examined so far."""
         return {}
 
     @cached_property
@@ -431,7 +431,7 @@ class _Finder:
         return {}
 
     def held(self, end: int) -> int:
-        """Return the bits that a running step asks for throughout: those that its end asks for and its begin leaves."""
+        """Return the bits that a running step requires throughout: those that its end requires and its begin doesn't change."""
         if end not in self._held:
             whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
             asked = self.task.known(end)[0]
@@ -444,9 +444,9 @@ class _Finder:
         return {}
 
     def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest times of the steps of a window, if these running ones end next; None if they end too late.
+        """Return the earliest times of the steps of a window, if these running ones end next; None if one would end too late.
 
-        The last entry is how long it takes from the begin of the first ending step to what its end waits for.
+        The last entry is the time from the begin of the first ending step to the events that its end waits for.
         """
         events = list(node.window)
         for end, step in ending.items():

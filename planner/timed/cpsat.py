@@ -1,7 +1,7 @@
 """A shorter schedule, and a lower bound, by the constraint solver CP-SAT of OR-Tools (the extra `time`).
 
 Turns are intervals that don't overlap on their resource; a turn that several actors could take is an optional interval on each of
-them, one of which is present. The solver chooses the order of turns and their actors; begins are then the earliest that follow.
+them, one of which is present. The solver chooses the order of turns and their actors; the earliest begins follow from these.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def shorter(
     status = solver.Solve(model)
     best = max(bound, round(solver.BestObjectiveBound()))
     if network.tick > network.separation and any(network.least(*edge) > network.separation for edge in network.edges):
-        best = bound  # what is apart by a tick in this model could be apart by less
+        best = bound  # a gap of one tick in this model could be smaller
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         return found, bound if status == cp_model.INFEASIBLE else best
     turns = made.turns(solver)
@@ -84,7 +84,7 @@ class _Model:
             model.AddHint(variable, hint)
 
     def duration(self, activity: int) -> Any:
-        """Return how long an activity lasts: a number, or a variable if that depends on its actor."""
+        """Return the duration of an activity: a number, or a variable if it depends on the actor."""
         its = {m[activity] for m in self.choices.lasts.values() if activity in m} | {self.network.durations[activity]}
         return next(iter(its)) if len(its) == 1 else self.model.NewIntVar(min(its), max(its), "")
 

@@ -1,8 +1,7 @@
-"""Which actor could take which turn in place of the one that takes it in the plan.
+"""Alternative actors for the turns of a plan.
 
-The other actor is of every class of the one that it replaces, every symbol about it is at first as that about the replaced one,
-and what never changes (relations, classes, the numbers of durations) allows its steps. Whether the result is a plan, the checker
-decides.
+The other actor belongs to every class of the one that it replaces, every symbol about it has the same initial value, and the
+static facts (relations, classes, numbers of durations) allow its steps. The checker decides whether the result is a plan.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from confab.reasoner.symbols import (
 
 
 def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> Choices:
-    """Return by which actors the turns of an order could be taken.
+    """Return the actors that could take each turn of an order.
 
     Parameters
     ----------
@@ -38,7 +37,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
         Its primitives are the steps of the order's activities.
     order : Order
     network : Network
-        Of the same order; in its unit durations are told.
+        Of the same order; its unit is that of the durations.
     """
     actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
     every = _of_the_classes(problem, actors)
@@ -64,7 +63,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
 
 
 def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, str]]) -> Plan:
-    """Return a plan whose primitives have other actors, and so have the steps above them.
+    """Return a plan with other actors of its primitives, and of the steps above them.
 
     Parameters
     ----------
@@ -92,7 +91,7 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
 
 
 def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
-    """Return for each actor the others of all of its classes, about which every symbol is at first as about it."""
+    """Return for each actor the others of all of its classes whose symbols have the same initial values."""
     actors = list(actors)
     kinds: dict[str, set[str]] = {
         a: {kind for kind, members in problem.classes.items() if a in members} for a in actors
@@ -115,7 +114,7 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
 
 
 def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
-    """Return a function that tells whether all steps that name an actor lie inside some primitives, or outside of them."""
+    """Return a function that tests whether all steps that name an actor lie inside some primitives, or outside of them."""
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
     naming: dict[str, list[set[int]]] = defaultdict(list)
     for step in plan.walk():
@@ -131,7 +130,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
     def whole(actor: str, members: Sequence[int]) -> bool:
         its = set(members)
         if any(i in its and actor not in order.activities[i].step.arguments for i in its & involved[actor]):
-            return False  # it is in a step that doesn't name it
+            return False  # the actor is in a step that doesn't name it
         return all(not (inside & its & involved[actor]) or inside & involved[actor] <= its for inside in naming[actor])
 
     return whole
@@ -146,7 +145,7 @@ def _durations(
     members: Sequence[int],
     names: Mapping[str, str],
 ) -> dict[int, int] | None:
-    """Return the durations of activities with other actors; None if what never changes doesn't allow them."""
+    """Return the durations of activities with other actors; None if static facts don't allow these."""
     found = {}
     for member in members:
         step = order.activities[member].step
@@ -172,7 +171,7 @@ def _durations(
 
 
 def _static(condition: Condition) -> bool:
-    """Return whether a condition never changes."""
+    """Return whether a condition is static."""
     if isinstance(condition, RelationCondition | ClassCondition | EqualityCondition):
         return True
     return isinstance(condition, Comparison) and not (situations_in(condition.left) | situations_in(condition.right))

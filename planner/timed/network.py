@@ -1,6 +1,6 @@
-"""A simple temporal network over the begins of activities, and the earliest begins that keep it.
+"""A simple temporal network over the begins of activities, and the earliest begins that satisfy it.
 
-Times are whole numbers of a unit that divides every duration, so that nothing is rounded. An edge (i, j, c) says that `j` begins at
+Times are integers in a unit that divides every duration, so that no value is rounded. An edge (i, j, c) says that `j` begins at
 least `c` after `i` begins. Dechter, Meiri and Pearl, "Temporal constraint networks", Artificial Intelligence 49 (1991).
 """
 
@@ -20,21 +20,21 @@ Window = tuple[int, int | None]
 
 @dataclass(frozen=True)
 class Network:
-    """The constants of a network: everything but the durations, which may depend on the chosen actors.
+    """The constants of a network: all but the durations, which may depend on the chosen actors.
 
     Attributes
     ----------
     unit : Fraction
         Seconds.
     separation : int
-        How long conflicting events are apart at least.
+        The minimum time between conflicting events.
     tick : int
-        How long a begin, or the end of a later activity, is at least before an end that it has to precede: of one instant, ends
-        come first, in the order of the activities.
+        The minimum time of a begin, or of the end of a later activity, before an end that it must precede: at the same instant,
+        ends come first, in the order of the activities.
     durations : list of int
     edges : tuple of Edge
     at, latest : list of int or None
-        When an activity begins, if that is fixed; by when it ends.
+        The fixed begin of an activity; the latest end.
     windows : list of tuple of pairs
         Windows of each activity; empty for any time.
     """
@@ -49,11 +49,11 @@ class Network:
     windows: list[tuple[Window, ...]]
 
     def least(self, i: int, high: int, j: int, low: int) -> int:
-        """Return how long the begin or end of an activity is before the begin or end of another one, at least."""
+        """Return the minimum time from the begin or end of one activity to the begin or end of another."""
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
     def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
-        """Return for each activity those that begin some time after it does, with that time."""
+        """Return for each activity those that begin at least some time after it, with that time."""
         found: list[dict[int, int]] = [{} for _ in durations]
         for i, high, j, low in edges:
             apart = (
@@ -100,7 +100,7 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
 
 
 def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
-    """Return the earliest begins that keep a network and further edges; None if there are none.
+    """Return the earliest begins that satisfy a network and further edges; None if there are none.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
         for j, _ in after:
             before[j] += 1
     ready = [i for i in range(count) if not before[i]]
-    for i in ready:  # which grows
+    for i in ready:  # the list grows
         for j, apart in arcs[i]:
             before[j] -= 1
             if not before[j]:
@@ -145,7 +145,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
 def _moved(
     network: Network, lasts: Sequence[int], begins: list[int], waits: list[int], i: int, j: int, apart: int
 ) -> bool:
-    """Move the begin of `j` so that it keeps an arc from `i`; return whether there is a time for it."""
+    """Move the begin of `j` so that it satisfies an arc from `i`; return whether there is a time for it."""
     wanted = begins[i] + apart
     if wanted <= begins[j]:
         return True
@@ -163,7 +163,7 @@ def _settled(
     begins: list[int],
     waits: list[int],
 ) -> bool:
-    """Move begins until all arcs are kept, where they form circles; return whether that ends."""
+    """Move begins until all arcs of a cyclic network are satisfied; return whether that terminates."""
     waiting, count = deque(range(len(lasts))), [0] * len(lasts)
     queued = [True] * len(lasts)
     while waiting:
@@ -175,7 +175,7 @@ def _settled(
                 return False
             if begins[j] != old:
                 count[j] += 1
-                if count[j] > len(lasts):  # it moves with itself
+                if count[j] > len(lasts):  # a positive cycle
                     return False
                 if not queued[j]:
                     queued[j] = True

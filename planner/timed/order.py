@@ -1,8 +1,8 @@
-"""The order that activities need: what has to precede what, and whose turns can be exchanged.
+"""The necessary order of activities: precedences, and turns that can be exchanged.
 
 Two accesses to one key conflict unless both only read. Conflicting accesses keep the order of the sequence, so that every schedule
-is equivalent to it, with one exception: a *turn* leads a symbol away from its first value and back to it. The turns of a symbol
-(or of an actor, with all symbols about it) can be taken in any order, one at a time: a hand takes and puts down many things.
+is equivalent to it, with one exception: a *turn* changes a symbol from its first value and back again. The turns of a symbol
+(or of an actor, with all symbols about it) can be taken in any order, one at a time: a hand picks up and puts down many objects.
 
 Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998); blocks: Siddiqui and Haslum, "Block-structured plan
 deordering", AI 2012.
@@ -48,7 +48,7 @@ class Resource:
 
 @dataclass(frozen=True)
 class Order:
-    """Activities with what any schedule of them has to keep.
+    """Activities with the constraints on every schedule of them.
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ class Order:
     edges : tuple of Edge
     resources : tuple of Resource
     latest : mapping of activity to seconds
-        By when it has to end.
+        The latest end.
     windows : mapping of activity to pairs of seconds
-        When it can take place: begin and end within one of them.
+        The time windows: begin and end lie within one of them.
     """
 
     activities: tuple[Activity, ...]
@@ -80,7 +80,7 @@ class _Record:
 
 
 def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[Event]) -> Order:
-    """Return the order that activities need.
+    """Return the necessary order of activities.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     Raises
     ------
     InapplicableError
-        The events have an activity change what another one that isn't over needs throughout.
+        The events have an activity change a fact that another one, which isn't over, requires throughout.
     """
     records, touched, starts, ends = _records(activities, events)
     times = problem.times or Times()
@@ -128,7 +128,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
 def _records(
     activities: Sequence[Activity], events: Iterable[Event]
 ) -> tuple[dict[Cell, list[_Record]], dict[Key, list[_Record]], dict[int, int], dict[int, int]]:
-    """Return the accesses to each symbol, those that look for symbols with a value, where activities begin, and where they end."""
+    """Return the accesses to each symbol, the accesses to holders of each value, and the positions of begins and of ends."""
     cells: dict[Cell, list[_Record]] = defaultdict(list)
     values: dict[Key, list[_Record]] = defaultdict(list)
     starts: dict[int, int] = {}
@@ -157,7 +157,7 @@ def _records(
 
 
 def _returns(problem: Problem, cell: Cell, records: Sequence[_Record]) -> bool:
-    """Return whether a symbol comes back to its first value at the end, and is away from it in between."""
+    """Return whether a symbol returns to its first value in the end, and has other values in between."""
     written = [record.written for record in records if record.written is not None]
     first = written[0][0] if written else FALSE
     return bool(written) and written[-1][1] == first
@@ -169,7 +169,7 @@ def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
 
 
 def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
-    """Return the turns of the symbols to which groups of records are accesses."""
+    """Return the turns of the symbols that groups of records access."""
     first = [next(r.written[0] for r in records if r.written is not None) for records in groups]
     order = sorted(
         ((record.position, i, record) for i, records in enumerate(groups) for record in records),
@@ -203,14 +203,14 @@ def _actor(
     starts: Mapping[int, int],
     ends: Mapping[int, int],
 ) -> Resource:
-    """Return the turns of an actor: as long as it is busy, or a symbol about it hasn't come back to its first value."""
+    """Return the turns of an actor: while it is busy, or a symbol about it hasn't returned to its first value."""
     its = sorted((n for n, one in enumerate(activities) if actor in one.actors), key=lambda n: starts[n])
     busy = [_Record(n, BEGIN, END, ("", ""), starts[n]) for n in its]
     return Resource(_turns([busy, *cells.values()], ends), actor)
 
 
 def _idle(problem: Problem, actors: Iterable[str]) -> list[str]:
-    """Return the individuals that are of all classes of an actor and take no turn."""
+    """Return the individuals that belong to all classes of an actor and take no turn."""
     known = set(actors)
     kinds = {a: [frozenset(m) for m in problem.classes.values() if a in m] for a in known}
     others = {one for its in kinds.values() if its for one in frozenset.intersection(*its)}
@@ -251,7 +251,7 @@ def _chained(
 def _touching(
     records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]], ends: Mapping[int, int]
 ) -> Iterator[Edge]:
-    """Yield the edges between a look for all symbols with a value and whatever comes to have it or ceases to."""
+    """Yield the edges between an access to all holders of a value and the changes of its holders."""
     if not values:
         return
     touches: dict[Key, list[_Record]] = defaultdict(list)
@@ -272,7 +272,7 @@ def _touching(
 
 
 def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]) -> dict[int, Fraction]:
-    """Return by when activities have to end so that goals hold in time: those that change them last."""
+    """Return the latest ends of activities for goals with a deadline: of those that change the goals last."""
     found: dict[int, Fraction] = {}
     for symbol, seconds in times.deadlines.items():
         its = [r for r in records.get((symbol.situation, symbol.arguments), ()) if r.written is not None]
@@ -282,7 +282,7 @@ def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Rec
 
 
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
-    """Return when activities can take place, where not at any time: within a window of each individual that they name."""
+    """Return the time windows of activities, where restricted: within a window of each individual that they name."""
     found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
     for number, one in enumerate(activities):
         for individual in dict.fromkeys((*one.step.arguments, *one.actors)):

@@ -1,10 +1,10 @@
-"""A behaviour cut at its begin and its end: what is asked and made at the begin, throughout, and at the end.
+"""A behaviour cut at its begin and its end: conditions and effects at the begin, throughout, and at the end.
 
 ==========  ==========================================  =========================================================
 piece       conditions                                  effects
 ==========  ==========================================  =========================================================
 begin       at the start                                at the start
-middle      throughout                                  in the making: they are determined at the begin
+middle      throughout                                  pending: determined at the begin
 end         at the end                                  at the end
 ==========  ==========================================  =========================================================
 """
@@ -33,12 +33,12 @@ from confab.reasoner.symbols import (
 from confab.reasoner.timing import on_each, timing_of
 
 SECOND = Fraction(1)
-"""The duration of a primitive of which nothing states or measures one, in seconds."""
+"""Default duration of a primitive, in seconds."""
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """The pieces of a behaviour. Each has its parameters and, behind them, `fixed`: variables that the preconditions determine."""
+    """The pieces of a behaviour. Each has its parameters and, after them, `fixed`: variables that the preconditions determine."""
 
     whole: Behavior
     fixed: tuple[Parameter, ...]
@@ -80,7 +80,7 @@ def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
 
 
 def terms_at(rules: Rules, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
-    """Return what the parameters of a behaviour's pieces stand for where it begins."""
+    """Return the individuals of the parameters of a behaviour's pieces when it begins."""
     behavior = pieces.whole
     if not pieces.fixed:
         return arguments
@@ -90,7 +90,7 @@ def terms_at(rules: Rules, pieces: Pieces, arguments: Arguments, facts: Facts) -
 
 
 def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-    """Return the seconds that a step takes where it begins; None if its duration is no number, or negative.
+    """Return the duration of a step when it begins, in seconds; None if it isn't a number, or negative.
 
     `arguments` are terms as `terms_at` returns them.
     """
@@ -106,7 +106,7 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
 
 
 def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the actors of a step: those that its behaviour names, else the first argument that is a resting individual.
+    """Return the actors of a step: those that its behaviour names, otherwise the first argument that is a resting individual.
 
     `resting` has what `default_actors` returns.
     """

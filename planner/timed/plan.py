@@ -1,4 +1,4 @@
-"""A plan in time, as it leaves the planner."""
+"""A plan in time, as the planner returns it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from functools import cached_property
 from confab.planner.plan import Plan, Step
 
 THESE_STEPS = "these steps"
-"""A bound of schedules of the same steps: conflicting ones in the order of the plan, turns in any order, by any of the actors."""
+"""A bound on schedules of the same steps: conflicting ones in the order of the plan, turns in any order, by any of the actors."""
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A primitive in time: its begin and end in seconds, its actors, and by how much it could be later."""
+    """A primitive in time: its begin and end in seconds, its actors, and its slack."""
 
     step: Step
     begin: Fraction
@@ -25,7 +25,7 @@ class Slot:
 
     @property
     def critical(self) -> bool:
-        """Whether the makespan grows with any delay of it."""
+        """Whether any delay of it increases the makespan."""
         return not self.slack
 
 
@@ -36,17 +36,17 @@ class TimedPlan:
     Attributes
     ----------
     plan : Plan
-        The tree of steps, each level in an order in which it could be done one step after the other.
+        The tree of steps, each level in an order in which its steps could also be executed in sequence.
     slots : tuple of Slot
         Its primitives, in the order of the plan.
     bound : Fraction
         Lower bound of the makespan, in seconds.
     bounds : str
-        What is bounded: `THESE_STEPS`.
+        The schedules that are bounded: `THESE_STEPS`.
     scheduler : str
-        What made the schedule.
+        The name of the scheduler.
     arcs : tuple of (int, int)
-        Which primitive waits for which, by their numbers: the edges that the schedule keeps.
+        Pairs of primitives, by number, of which the second waits for the first.
     """
 
     plan: Plan
@@ -63,12 +63,12 @@ class TimedPlan:
 
     @cached_property
     def serial(self) -> Fraction:
-        """What the primitives take one after the other, in seconds."""
+        """The duration of the primitives in sequence, in seconds."""
         return sum((slot.end - slot.begin for slot in self.slots), Fraction(0))
 
     @cached_property
     def intervals(self) -> Mapping[tuple[int, ...], tuple[Fraction, Fraction]]:
-        """The begin and end of every step, by its path: of a step with sub-steps, from the first of them to the last."""
+        """The begin and end of every step, by its path: a step with sub-steps lasts from the first of them to the last."""
         found = {slot.step.path: (slot.begin, slot.end) for slot in self.slots}
         for step in reversed(list(self.plan.walk())):
             if step.steps:
@@ -77,7 +77,7 @@ class TimedPlan:
         return found
 
     def lanes(self) -> Iterator[tuple[str, list[Slot]]]:
-        """Yield each actor with its primitives in the order of their begins; last, under no name, those of no actor."""
+        """Yield each actor with its primitives in the order of their begins; last, under an empty name, those without an actor."""
         names = sorted({actor for slot in self.slots for actor in slot.actors})
         for name in names:
             yield name, sorted((s for s in self.slots if name in s.actors), key=lambda s: (s.begin, s.end))

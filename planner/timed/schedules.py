@@ -1,8 +1,8 @@
-"""A schedule of an order: in which order each resource takes its turns, which actor takes which turn, and when activities begin.
+"""A schedule of an order: the order of turns of each resource, the actor of each turn, and the begins of activities.
 
-Greedily at first: turns in the order of the sequence, each by the actor that is free first. Then by exchanging turns on the
-critical path (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem", Management
-Science 42, 1996). Where OR-Tools is installed, CP-SAT goes on from there (`confab.planner.timed.cpsat`).
+The first schedule is greedy: turns in the order of the sequence, each by the actor that is free first. Then turns on the critical
+path are exchanged (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem",
+Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from confab.planner.timed.network import Begins, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn
 
 ROUNDS = 100
-"""Maximum number of exchanges that are made without a shorter schedule."""
+"""Maximum number of exchanges without a shorter schedule."""
 MOST_ARCS = 400_000
-"""Maximum number of arcs that are followed while turns are exchanged."""
+"""Maximum number of arcs processed by exchanges of turns."""
 TABU = 8
-"""Number of exchanges during which an exchange isn't undone."""
+"""Number of exchanges during which an exchange can't be undone."""
 
 TurnId = tuple[int, int]
-"""The number of a resource and that of a turn of it."""
+"""The numbers of a resource and of one of its turns."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """By which actors turns can be taken: for each turn the resources, its own first, with the durations of its members there."""
+    """The possible actors of turns: for each turn the resources, its own first, with the durations of its members there."""
 
     of: Mapping[TurnId, tuple[int, ...]] = field(default_factory=dict)
     lasts: Mapping[tuple[TurnId, int], Mapping[int, int]] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class Choices:
 
 @dataclass
 class Candidate:
-    """For each resource its turns in order; `begins` is what follows from that."""
+    """The order of turns of each resource; `begins` follows from it."""
 
     turns: list[list[TurnId]]
     begins: Begins
@@ -50,7 +50,7 @@ class Candidate:
 def shortest(order: Order, network: Network, choices: Choices, until: float, bound: int = 0) -> Candidate | None:
     """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`; None if none is found.
 
-    A schedule as short as a lower bound is the last that is tried.
+    The search ends with a schedule as short as the lower bound.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def shortest(order: Order, network: Network, choices: Choices, until: float, bou
 
 
 def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
-    """Yield the edges by which turns are taken one after the other; those that only read, at the same time."""
+    """Yield the edges by which turns are taken one after another; turns that only read are taken at the same time."""
     for line in turns:
         last: Turn | None = None
         readers: list[Turn] = []
@@ -85,7 +85,7 @@ def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge
 
 
 def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
-    """Return the durations of activities where turns are taken by certain actors."""
+    """Return the durations of activities for a choice of actors."""
     found = list(network.durations)
     for resource, line in enumerate(turns):
         for turn in line:
@@ -105,7 +105,7 @@ class _Search:
                     self.turns_of[member].append((resource, number))
 
     def evaluated(self, turns: list[list[TurnId]]) -> Candidate | None:
-        """Return what follows from turns; None if they can't be taken so."""
+        """Return the schedule of some turns; None if they have none."""
         durations = durations_with(self.network, self.choices, turns)
         begins = earliest(self.network, turn_edges(self.order, turns), durations)
         return None if begins is None else Candidate(turns, begins)
@@ -118,9 +118,9 @@ class _Search:
             yield self.shared()
 
     def shared(self) -> list[list[TurnId]]:
-        """Return the turns in the order of the sequence, each with the actor on which it can begin first.
+        """Return the turns in the order of the sequence, each with the actor that can begin it first.
 
-        Only the work of each actor is added up here; an actor whose turn isn't over takes no other one.
+        Only the work of each actor is counted here; an actor takes no other turn before its turn is over.
         """
         work = [0] * len(self.order.resources)
         lines: list[list[TurnId]] = [[] for _ in self.order.resources]
@@ -223,16 +223,16 @@ class _Search:
 
 
 def least(order: Order, network: Network, choices: Choices) -> int:
-    """Return a lower bound of the makespan of any schedule of these activities by any of the actors that may take their turns.
+    """Return a lower bound of the makespan of any schedule of these activities by any of their possible actors.
 
-    The longest chain that every schedule has; or the work of actors that may replace each other, divided by their number.
+    It is the longest chain of every schedule, or the work of exchangeable actors divided by their number, if larger.
     """
     lasts = list(network.durations)
     for its in choices.lasts.values():
         for member, other in its.items():
             lasts[member] = min(lasts[member], other)
     edges = network.edges
-    if lasts != network.durations:  # what ends no earlier than another one could begin later if it were shorter
+    if lasts != network.durations:  # a shorter activity could begin later and still end in order
         edges = tuple(edge for edge in edges if edge[3] == BEGIN)
     free = replace(network, edges=edges, tick=network.separation, latest=[None] * len(lasts))
     chain = earliest(free, (), lasts)
@@ -250,7 +250,7 @@ def least(order: Order, network: Network, choices: Choices) -> int:
 
 
 def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
-    """Return how long a turn lasts at least: for an actor as long as it is busy, for a symbol as its longest activity."""
+    """Return the minimum duration of a turn: for an actor while it is busy, for a symbol its longest activity."""
     resource = order.resources[turn[0]]
     its = resource.turns[turn[1]]
     if resource.actor is not None:

@@ -1,8 +1,8 @@
-"""Is this a plan in time? A checker that shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
+"""The checker of plans in time. It shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
 
-The primitives are carried out on paper at their times: at each instant what ends does so first. Every condition is evaluated where
-its span asks for it, those of `throughout` again after every event. What is in the making belongs to its step: a step that reads
-or changes it meanwhile is at fault.
+The primitives are simulated on symbols at their times: at each instant, ends come first. Every condition is evaluated at the times
+that its span requires, those of `throughout` again after every event. Pending values belong to their step: a step that reads
+or changes them meanwhile is a fault.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from confab.reasoner.timing import only_during
 
 
 def validate_timed(problem: Problem, timed: TimedPlan, separation: Fraction = Fraction(0)) -> list[Fault]:
-    """Return what is wrong with a plan in time; nothing if it is one.
+    """Return the faults of a plan in time; none if it is valid.
 
     Parameters
     ----------
     problem : Problem
     timed : TimedPlan
     separation : Fraction
-        How long conflicting events have to be apart at least, in seconds: PDDL's epsilon.
+        The minimum time between conflicting events, in seconds: PDDL's epsilon.
     """
     faults: list[Fault] = []
     if only_during(problem):
-        sequence = None  # what holds only during a step no sequence of whole steps shows
+        sequence = None  # a sequence of whole steps has no values that hold only during a step
     else:
         faults += validate(problem, timed.plan)
         sequence = _in_sequence(problem, timed.plan.primitives)
@@ -44,7 +44,7 @@ def validate_timed(problem: Problem, timed: TimedPlan, separation: Fraction = Fr
 
 @dataclass
 class _Running:
-    """A step that has begun: its slot, its pieces and their terms, and the cells in the making with their values to come."""
+    """A step that has begun: its slot, its pieces and their terms, and the pending cells with their values."""
 
     slot: Slot
     pieces: Pieces
@@ -54,7 +54,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """Facts that note which cells, and which holders of which value, they are asked for."""
+    """Facts that record the cells, and the holders of values, that are read."""
 
     def __init__(self, problem: Problem, rules: Rules) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -79,7 +79,7 @@ Effects = tuple[tuple[Cell, str], ...]
 
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
-    """Return what each step changes if they are done one after the other, and which one changes a cell last."""
+    """Return the changes of each step in sequence, and the step that changes each cell last."""
     rules, facts = Rules(problem), Facts(problem, problem.initial)
     found, last = list[Effects](), dict[Cell, int]()
     for number, step in enumerate(steps):
@@ -93,7 +93,7 @@ def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects]
 
 
 class _Clock:
-    """A timed plan carried out on paper."""
+    """A timed plan simulated on symbols."""
 
     def __init__(
         self,
@@ -111,17 +111,17 @@ class _Clock:
         self.pieces: dict[str, Pieces] = {}
         self.made: dict[int, dict[Cell, str]] = {}
         self.last: dict[Cell, int] = {}
-        self.since: dict[Cell, Fraction] = {}  # when a cell was changed last
+        self.since: dict[Cell, Fraction] = {}  # time of the last change of a cell
         self.asked: dict[
             Cell, Fraction
-        ] = {}  # when a cell was asked last, by another step than the one that changes it
+        ] = {}  # time of the last read of a cell by another step than the one that changes it
         self.read_by: dict[Cell, int] = {}
 
     def run(self) -> Iterator[Fault]:
-        """Yield what is wrong, until something can't be done at all."""
+        """Yield the faults, until a step is inapplicable."""
         yield from self.actors()
         slots = self.timed.slots
-        # Of the events of one instant what ends comes first; what takes no time begins and ends at once, in the plan's order.
+        # Among events of one instant, ends come first; a step without duration begins and ends at once, in the plan's order.
         events = sorted(
             [(s.begin, 1, n, 0) for n, s in enumerate(slots)]
             + [(s.end, 1 if s.begin == s.end else 0, n, 1) for n, s in enumerate(slots)]
@@ -143,7 +143,7 @@ class _Clock:
         return self.pieces[name]
 
     def actors(self) -> Iterator[Fault]:
-        """Yield where an actor is in two steps at once, or a step takes place where one that it names isn't available."""
+        """Yield a fault where an actor is in two steps at once, or an individual that a step names isn't available."""
         lanes: dict[str, list[Slot]] = {}
         for slot in self.timed.slots:
             behavior = self.problem.domain.behaviors[slot.step.behavior]
@@ -203,7 +203,7 @@ class _Clock:
                 yield Fault(one.slot.step.path, f"{one.slot.step}: it changes {cells[0][0]} otherwise than in sequence")
 
     def done(self, one: _Running, piece: Behavior, time: Fraction) -> Iterator[Fault]:
-        """Do the begin or the end of a step."""
+        """Execute the begin or the end of a step."""
         if not piece.preconditions and not piece.effects and not piece.amounts:
             return
         self.facts.clear()
@@ -217,14 +217,14 @@ class _Clock:
             self.put(one, (name, key), value, time)
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
-        """Give a cell a value."""
+        """Set the value of a cell."""
         self.facts.put(*cell, value)
         self.made[one.number][cell] = value
         self.last[cell] = one.number
         self.since[cell] = time
 
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
-        """Yield where a step reads or changes what is in the making in another one, or was touched a moment ago."""
+        """Yield a fault where a step reads or changes a pending value of another one, or a value touched a moment ago."""
         read, values = set(self.facts.cells), set(self.facts.values)
         for other in self.running.values():
             if other.number == one.number:
@@ -249,14 +249,14 @@ class _Clock:
             self.asked[cell], self.read_by[cell] = time, one.number
 
     def holds(self, one: _Running) -> Iterator[Fault]:
-        """Yield where what a running step asks throughout doesn't hold any more."""
+        """Yield a fault where a condition that a running step requires throughout no longer holds."""
         if one.pieces.middle.preconditions:
             self.facts.clear()
             if self.rules.changes(one.pieces.middle, one.terms, self.facts) is None:
                 yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks throughout ceases to hold")
 
     def in_the_end(self) -> Iterator[Fault]:
-        """Yield the goals that aren't reached, or not in time, and the cells that another step than in sequence changes last."""
+        """Yield the goals not reached, or not in time, and the cells that another step than in sequence changes last."""
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
             if not meets(got, wanted):
