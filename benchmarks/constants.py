@@ -22,7 +22,7 @@ from time import process_time
 from typing import TypeAlias
 
 from benchmarks.execution import KINDS, Trial, after_intervention, random_intervention, rest_after, served
-from confab.planner.acting.repair import mend
+from confab.planner.acting.repair import repair_or_replan
 from confab.planner.experience import advice
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.hierarchical.call import compiled
@@ -138,7 +138,7 @@ def led() -> Iterator[Row]:
                 yield row(advice.plan(family(name, n, 1), memory, mode, Limits(expansions=20_000)))
 
 
-def mended() -> Iterator[Row]:
+def repaired() -> Iterator[Row]:
     """Repair a plan after interventions of all kinds; what counts of a repair is its cost, and whether all was planned anew."""
     trial = Trial.of(served(10))
     for seed in range(80):
@@ -148,7 +148,7 @@ def mended() -> Iterator[Row]:
         assert happening is not None
         before = replace(trial.problem, initial=trial.states[position])
         now, rest = after_intervention(before, happening), rest_after(trial.plan, position)
-        done = mend(now, rest, before, None, compiled(now), True, Limits(expansions=20_000))
+        done = repair_or_replan(now, rest, before, None, compiled(now), True, Limits(expansions=20_000))
         yield ("gave-up" if done.steps is None else "solved"), round(done.cost), int(done.kind == "replan")
 
 
@@ -168,7 +168,7 @@ INSTRUMENTS: Mapping[str, tuple[Callable[[], Iterator[Row]], ...]] = {
     "hierarchical": (planned,),
     "grounded": (planned, flat),
     "experience": (led,),
-    "acting": (mended,),
+    "acting": (repaired,),
     "paper": (on_paper,),
     "": (planned,),
 }

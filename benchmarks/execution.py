@@ -22,13 +22,13 @@ from confab.execution import execute
 from confab.gantt import save_gantt
 from confab.labels import labels_of
 from confab.planner.acting.episode import Change, End, Episode, Intervention
-from confab.planner.acting.executive import Patience, act
+from confab.planner.acting.executive import RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
-from confab.planner.acting.repair import difference, mend, replan
+from confab.planner.acting.repair import difference, repair_or_replan, replan
 from confab.planner.acting.symbolic_world import SymbolicWorld, disturbed, with_individual
 from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import compiled
-from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import successor
@@ -55,7 +55,7 @@ class Trial:
     @classmethod
     def of(cls, problem: Problem) -> Trial:
         """Plan, and go through the plan."""
-        found = fast_plan(problem).plan
+        found = hierarchical_plan(problem).plan
         assert found is not None
         states = [problem.initial]
         for step in found.primitives:
@@ -243,16 +243,16 @@ def _repair_row(objects: int, count: int) -> None:
         now = after_intervention(before, intervention)
         ours, theirs = (compiled(now), compiled(now)) if kind == "add" else (own, other)
         begin = process_time()
-        mended = mend(now, rest, before, None, ours, True, limits)
+        repaired = repair_or_replan(now, rest, before, None, ours, True, limits)
         middle = process_time()
         scratch, _ = replan(now, None, theirs, limits)
         end = process_time()
-        if mended.steps is None or scratch is None:
-            assert mended.steps is None and scratch is None
+        if repaired.steps is None or scratch is None:
+            assert repaired.steps is None and scratch is None
             continue
-        anew += mended.kind == "replan"
-        costs.append((mended.cost, cost_of(problem, Plan(scratch))))
-        distances.append((sum(difference(rest, mended.steps)), sum(difference(rest, scratch))))
+        anew += repaired.kind == "replan"
+        costs.append((repaired.cost, cost_of(problem, Plan(scratch))))
+        distances.append((sum(difference(rest, repaired.steps)), sum(difference(rest, scratch))))
         seconds.append((middle - begin, end - middle))
     worst = max((a / b for a, b in costs if b), default=1.0)
     over = sum(a > 1.1 * b for a, b in costs)
@@ -303,19 +303,19 @@ def rest_after(plan: Plan, count: int) -> list[Step]:
 def learning() -> None:
     """Print success over episodes with a planted obstacle, with and without learning from failure."""
     scene = confab.load("beverage-serving")
-    patience = Patience(failures=2)
+    retry_policy = RetryPolicy(failures=2)
     curves: dict[str, list[float]] = {}
     print("| world | learning | goal reached, by episode | failures | simulated s |\n|---|---|---|---|---|")
     for learns in (False, True):
-        ends = [_obstructed(scene.problem, learns, seed, EPISODES, patience) for seed in range(SYMBOLIC_ROBOTS)]
+        ends = [_obstructed(scene.problem, learns, seed, EPISODES, retry_policy) for seed in range(SYMBOLIC_ROBOTS)]
         rates = [sum(run[i] for run in ends) / SYMBOLIC_ROBOTS for i in range(EPISODES)]
         print(
-            f"| symbolic, obstacle fails 9 of 10, {SYMBOLIC_ROBOTS} robots, ends at failure {patience.failures} | {learns} "
+            f"| symbolic, obstacle fails 9 of 10, {SYMBOLIC_ROBOTS} robots, ends at failure {retry_policy.failures} | {learns} "
             f"| {' '.join(f'{100 * r:.0f} %' for r in rates)} | | |",
             flush=True,
         )
         curves[f"symbolic, {SYMBOLIC_ROBOTS} robots" + (", learning" if learns else "")] = rates
-    for robots, episodes, limit in ((ROBOTS, EPISODES, patience), (1, EPISODES // 2, Patience())):
+    for robots, episodes, limit in ((ROBOTS, EPISODES, retry_policy), (1, EPISODES // 2, RetryPolicy())):
         for learns in (False, True):
             runs = [_beside_a_post(scene, learns, 100 * robot, episodes, limit) for robot in range(1, robots + 1)]
             columns = list(zip(*runs, strict=True))
@@ -328,12 +328,12 @@ def learning() -> None:
                 f"| {' '.join(f'{t:.0f}' for t in seconds)} |",
                 flush=True,
             )
-            if limit is patience:
+            if limit is retry_policy:
                 curves[f"PyBullet, {robots} robots" + (", learning" if learns else "")] = rates
     print(f"\nThe picture: {_save_curves(curves, OUT / 'learning.png')}")
 
 
-def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, patience: Patience) -> list[Episode]:
+def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, retry_policy: RetryPolicy) -> list[Episode]:
     """Return perturbed episodes of a robot with a post that it doesn't perceive where its left arm reaches for bottle2."""
     caution, found = Caution(), list[Episode]()
     for number in range(episodes):
@@ -343,7 +343,7 @@ def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, patienc
             world="pybullet",
             seed=seed + number,
             prepare=hidden_post,
-            patience=patience,
+            retry_policy=retry_policy,
             caution=caution,
             perturb=True,
         )
@@ -385,7 +385,7 @@ def _save_curves(curves: Mapping[str, Sequence[float]], path: Path) -> Path:
     return path
 
 
-def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, patience: Patience) -> list[bool]:
+def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, retry_policy: RetryPolicy) -> list[bool]:
     """Return which episodes of a robot succeed if its first way to the plan's last object is mostly blocked."""
     random, caution, found = Random(seed), Caution(), list[bool]()
     reach = next(
@@ -407,7 +407,7 @@ def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, patien
         return Report(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
 
     for _ in range(episodes):
-        episode = act(problem, SymbolicWorld(problem, fault=fault), patience=patience, caution=caution)
+        episode = act(problem, SymbolicWorld(problem, fault=fault), retry_policy=retry_policy, caution=caution)
         found.append(episode.status is End.REACHED)
         caution = caution.learned(episode) if learns else caution
     return found

@@ -107,13 +107,13 @@ def another_hand(draw: random.Random) -> Callable[[Any], str]:
 def run(scene: Scene, problem: int, worlds: Path, seed: int, disturbed: bool) -> dict[str, Any]:
     """Return what came of one run."""
     file = worlds / f"world{problem}.yaml"
-    inner, patience = connected(scene, scene.problem, f"pyrobosim:{file}", seed)
+    inner, retry_policy = connected(scene, scene.problem, f"pyrobosim:{file}", seed)
     world = Watched(inner.interface, inner.transport, scene.problem)
     draw = random.Random(seed)
     if disturbed:
         world.due, world.hand = draw.randint(2, REFERENCE[problem]), another_hand(draw)
     wall, cpu = perf_counter(), process_time()
-    done: Execution = execute(scene, scene.problem, world=world, patience=replace(patience, planning=PLANNING))
+    done: Execution = execute(scene, scene.problem, world=world, retry_policy=replace(retry_policy, planning=PLANNING))
     episode = done.episode
     truth = at_goal(inner.transport.world, problem)  # type: ignore[attr-defined]
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from confab.planner.acting.executive import Patience
+from confab.planner.acting.executive import RetryPolicy
 from confab.reasoner.embodiment.interfaces import Interface, read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import Problem
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml"
 
 
-def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[InterfaceWorld, Patience]:
+def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[InterfaceWorld, RetryPolicy]:
     """Return the world of a robot, and the patience that its interface states.
 
     Parameters
@@ -46,11 +46,11 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
             f"no action of {name} carries {', '.join(lacking)} out; state e:carriesOut of one of its actions"
         )
     world = InterfaceWorld(interface, reached(interface, where, seed), problem)
-    patience = Patience()
+    retry_policy = RetryPolicy()
     return world, replace(
-        patience,
-        attempts=interface.attempts or patience.attempts,
-        failures=interface.failures or patience.failures,
+        retry_policy,
+        attempts=interface.attempts or retry_policy.attempts,
+        failures=interface.failures or retry_policy.failures,
     )
 
 

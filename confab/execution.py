@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
 from confab.planner.acting.episode import Change, End, Episode, Intervention
-from confab.planner.acting.executive import Moment, Patience, act
+from confab.planner.acting.executive import Event, RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
 from confab.planner.acting.world import World
@@ -387,7 +387,7 @@ class Options(TypedDict, total=False):
     """What else `execute` takes."""
 
     prepare: Callable[[Physics], None] | None
-    patience: Patience
+    retry_policy: RetryPolicy
     caution: Caution | None
     perturb: bool
     noise: float
@@ -403,7 +403,7 @@ def carry_out(
     memory: Memory | Links | str | Path | None = None,
     mode: Mode = DEFAULT_MODE,
     seed: int = 0,
-    tell: Callable[[Moment], None] | None = None,
+    observer: Callable[[Event], None] | None = None,
     watch: bool = False,
     time_limit: float | None = None,
     **options: Unpack[Options],
@@ -427,7 +427,7 @@ def carry_out(
     number("seed", seed, "an integer")
     texts = several(interventions)
     number("time_limit", time_limit, "seconds as a number, e.g. 5")
-    with within(time_limit), spectator(watch, tell) as heard:
+    with within(time_limit), spectator(watch, observer) as heard:
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 
 
@@ -467,9 +467,9 @@ def execute(
     world: str | World = "symbolic",
     planner: Planner | None = None,
     seed: int = 0,
-    tell: Callable[[Moment], None] | None = None,
+    observer: Callable[[Event], None] | None = None,
     prepare: Callable[[Physics], None] | None = None,
-    patience: Patience = Patience(),  # noqa: B008 - frozen
+    retry_policy: RetryPolicy = RetryPolicy(),  # noqa: B008 - frozen
     caution: Caution | None = None,
     perturb: bool = False,
     noise: float = 0.0,
@@ -492,11 +492,11 @@ def execute(
         Plans from scratch; the fast planner if left out.
     seed : int
         Of everything random in physics.
-    tell : callable, optional
+    observer : callable, optional
         Is told what happens, as it happens.
     prepare : callable, optional
         Called with the PyBullet world before it begins: plants a fault, say.
-    patience : Patience
+    retry_policy : RetryPolicy
     caution : Caution, optional
         What failed in earlier episodes.
     perturb : bool
@@ -524,10 +524,10 @@ def execute(
         from confab.connecting import connected
 
         world, stated = connected(scene, problem, world, seed)
-        patience = stated if patience == Patience() else patience
+        retry_policy = stated if retry_policy == RetryPolicy() else retry_policy
     if not isinstance(world, str):
         with possible():
-            return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
+            return Execution(scene, act(problem, world, plan, wanted, planner, retry_policy, observer, True, caution))
     if world != "pybullet":
         raise KnowledgeError(
             f"unknown world '{world}'; wanted {', '.join(WORLDS)}, or a robot like pyrobosim:world.yaml"
@@ -548,8 +548,8 @@ def execute(
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
         if both_hands:
-            return Execution(scene, _with_both_hands(problem, live, plan, planner, patience, tell, caution))
-        return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell, True, caution))
+            return Execution(scene, _with_both_hands(problem, live, plan, planner, retry_policy, observer, caution))
+        return Execution(scene, act(problem, live, plan, wanted, planner, retry_policy, observer, True, caution))
 
 
 def _reach_of(scene: Known) -> str:
@@ -567,17 +567,17 @@ def _with_both_hands(
     live: LiveWorld,
     plan: Plan | None,
     planner: Planner | None,
-    patience: Patience,
-    tell: Callable[[Moment], None] | None,
+    retry_policy: RetryPolicy,
+    observer: Callable[[Event], None] | None,
     caution: Caution | None,
 ) -> Episode:
     """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
-    from confab.planner.acting.episode import Event, Failure
-    from confab.planner.hierarchical.planner import plan as fast_plan
+    from confab.planner.acting.episode import ExecutedPrimitive, Failure
+    from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together
 
     if plan is None:
-        begin, limits = planner or fast_plan, patience.planning
+        begin, limits = planner or hierarchical_plan, retry_policy.planning
         end = limits.end()
         known = problem if caution is None else caution.applied(problem, begin, limits)
         plan = begin(known, limits=limits.until(end)).plan or Plan(())
@@ -585,7 +585,7 @@ def _with_both_hands(
     if not done.ok:
         live.take_stock()
     before = [
-        Event(slot.step, slot.begin, slot.end, verdict.ok, verdict.code)
+        ExecutedPrimitive(slot.step, slot.begin, slot.end, verdict.ok, verdict.code)
         for slot, verdict in zip(done.slots, done.verdicts, strict=True)
     ]
     now = live.observe()
@@ -594,7 +594,7 @@ def _with_both_hands(
         for slot, verdict in zip(done.slots, done.verdicts, strict=True)
         if not verdict.ok
     ]
-    rest = act(replace(problem, initial=now), live, None, (), planner, patience, tell, True, caution)
+    rest = act(replace(problem, initial=now), live, None, (), planner, retry_policy, observer, True, caution)
     carried = {event.step.path for event in before if event.ok}
     steps = (*_only(plan.steps, carried), *renumbered(rest.done.steps, len(plan.steps)))
     return replace(

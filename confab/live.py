@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from confab.planner.acting.executive import Moment
+from confab.planner.acting.executive import Event
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-Tell = Callable[[Moment], None]
+Observer = Callable[[Event], None]
 LOG = 6
 """Number of recent events that are shown."""
 
@@ -22,30 +22,30 @@ LOG = 6
 class View:
     """The view of the last event and of earlier ones."""
 
-    moment: Moment | None = None
+    event: Event | None = None
     log: list[str] = field(default_factory=list)
 
-    def take(self, moment: Moment) -> None:
+    def take(self, event: Event) -> None:
         """Record an event."""
-        self.moment = moment
-        if moment.what == "intervention":
-            self.log.append(f"✋ {moment.text}")
-        elif moment.what == "discovery":
-            self.log.append(f"👁 {moment.text}")
-        elif moment.what in ("repair", "replan"):
-            self.log.append(f"↻ {moment.what}: {moment.text}")
-        elif moment.what == "over":
-            self.log.append(moment.text)
-        for surprise in moment.surprises:
+        self.event = event
+        if event.what == "intervention":
+            self.log.append(f"✋ {event.text}")
+        elif event.what == "discovery":
+            self.log.append(f"👁 {event.text}")
+        elif event.what in ("repair", "replan"):
+            self.log.append(f"↻ {event.what}: {event.text}")
+        elif event.what == "over":
+            self.log.append(event.text)
+        for surprise in event.surprises:
             self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return what is to be said of each step: done, or being done."""
-        if self.moment is None:
+        if self.event is None:
             return {}
-        notes = {step.path: "✓" for step in self.moment.plan.walk() if _is_done(step, self.moment)}
-        if self.moment.what == "begin" and self.moment.step is not None:
-            notes[self.moment.step.path] = "◀ " + "; ".join(map(str, self.moment.expected))
+        notes = {step.path: "✓" for step in self.event.plan.walk() if _is_done(step, self.event)}
+        if self.event.what == "begin" and self.event.step is not None:
+            notes[self.event.step.path] = "◀ " + "; ".join(map(str, self.event.expected))
         return notes
 
     def __repr__(self) -> str:
@@ -54,11 +54,11 @@ class View:
 
     def headline(self) -> str:
         """Return what is being done, in one line."""
-        if self.moment is None:
+        if self.event is None:
             return "planning"
-        primitives = self.moment.plan.primitives
-        done = sum(step.path in self.moment.done for step in primitives)
-        return f"{done} of {len(primitives)} primitives" + (f": {self.moment.step}" if self.moment.step else "")
+        primitives = self.event.plan.primitives
+        done = sum(step.path in self.event.done for step in primitives)
+        return f"{done} of {len(primitives)} primitives" + (f": {self.event.step}" if self.event.step else "")
 
     def __rich__(self) -> Group:
         """Return the plan from the current step on, and the last happenings."""
@@ -69,9 +69,9 @@ class View:
         from confab.show import plan_tree
 
         parts: list[Any] = [Text(line) for line in self.log[-LOG:]]
-        if self.moment is not None:
-            now = next((s for s in self.moment.plan.steps if not _is_done(s, self.moment)), None)
-            later = [s for s in self.moment.plan.steps if now is not None and s.path > now.path]
+        if self.event is not None:
+            now = next((s for s in self.event.plan.steps if not _is_done(s, self.event)), None)
+            later = [s for s in self.event.plan.steps if now is not None and s.path > now.path]
             parts.insert(0, plan_tree(Plan((now,) if now else ()), self.headline(), self.notes()))
             parts.insert(1, Text("then " + ", ".join(map(str, later)) if later else "then nothing more", style="dim"))
         return Group(*parts)
@@ -80,42 +80,42 @@ class View:
         from confab.page.markup import styled, tag
         from confab.page.pieces import tree
 
-        expected = self.moment.expected if self.moment is not None else ()
+        expected = self.event.expected if self.event is not None else ()
         shall = [" → ", tag("i", "; ".join(map(str, expected)))] if expected else None
         happened = tag("ul", [tag("li", line) for line in self.log[-LOG:]])
-        plan = tree(self.moment.plan, None, self.notes()) if self.moment is not None else None
+        plan = tree(self.event.plan, None, self.notes()) if self.event is not None else None
         return styled(tag("p", self.headline(), shall), happened, plan)
 
 
 @contextmanager
-def spectator(watch: bool = True, other: Tell | None = None) -> Iterator[Tell | None]:
+def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
     """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither.
 
     `other` is told, too.
     """
     if watch and _in_notebook():
-        with in_notebook() as tell:
-            yield both(other, tell)
+        with in_notebook() as observer:
+            yield both(other, observer)
     elif watch and sys.stderr.isatty():
-        with in_terminal() as tell:
-            yield both(other, tell)
+        with in_terminal() as observer:
+            yield both(other, observer)
     else:
         yield other
 
 
-def both(one: Tell | None, other: Tell) -> Tell:
+def both(one: Observer | None, other: Observer) -> Observer:
     """Return what tells two spectators."""
 
-    def tell(moment: Moment) -> None:
+    def observer(event: Event) -> None:
         if one is not None:
-            one(moment)
-        other(moment)
+            one(event)
+        other(event)
 
-    return tell
+    return observer
 
 
 @contextmanager
-def in_terminal(console: Any = None) -> Iterator[Tell]:
+def in_terminal(console: Any = None) -> Iterator[Observer]:
     """Show an episode on a rich console, stderr if none is given."""
     from rich.console import Console
     from rich.live import Live
@@ -123,30 +123,30 @@ def in_terminal(console: Any = None) -> Iterator[Tell]:
     view = View()
     with Live(view, console=console or Console(stderr=True), refresh_per_second=8, transient=True) as live:
 
-        def tell(moment: Moment) -> None:
-            view.take(moment)
-            live.update(view, refresh=moment.what != "end")
+        def observer(event: Event) -> None:
+            view.take(event)
+            live.update(view, refresh=event.what != "end")
 
-        yield tell
+        yield observer
 
 
 @contextmanager
-def in_notebook() -> Iterator[Tell]:
+def in_notebook() -> Iterator[Observer]:
     """Show an episode in the output of a notebook's cell."""
     from IPython.display import display
 
     view = View()
     handle = display(view, display_id=True)  # type: ignore[no-untyped-call]
 
-    def tell(moment: Moment) -> None:
-        view.take(moment)
+    def observer(event: Event) -> None:
+        view.take(event)
         handle.update(view)
 
-    yield tell
+    yield observer
 
 
-def _is_done(step: Any, moment: Moment) -> bool:
-    return all(below.path in moment.done for below in step.walk() if not below.steps)
+def _is_done(step: Any, event: Event) -> bool:
+    return all(below.path in event.done for below in step.walk() if not below.steps)
 
 
 def _in_notebook() -> bool:

@@ -15,7 +15,7 @@ from confab.planner.acting.episode import (
     Change,
     End,
     Episode,
-    Event,
+    ExecutedPrimitive,
     Failure,
     Intervention,
     Replan,
@@ -189,10 +189,10 @@ def _plan(steps: Sequence[object], path: Path, problem: Problem) -> Plan:
     return Plan(tuple(step_from(one, (number,), path, problem) for number, one in enumerate(steps)))
 
 
-def _event(one: Data, symbols: Mapping[str, Symbol], path: Path, problem: Problem) -> Event:
+def _event(one: Data, symbols: Mapping[str, Symbol], path: Path, problem: Problem) -> ExecutedPrimitive:
     step = step_from({**one, "bindings": {}, "steps": []}, tuple(one["path"]), path, problem)
     surprises = tuple(Surprise(symbols[s["symbol"]], s["expected"], s["observed"]) for s in one["surprises"])
-    return Event(step, float(one["begin"]), float(one["end"]), bool(one["ok"]), one["code"], surprises)
+    return ExecutedPrimitive(step, float(one["begin"]), float(one["end"]), bool(one["ok"]), one["code"], surprises)
 
 
 def _replan(one: Data, path: Path, problem: Problem) -> Replan:

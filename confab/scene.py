@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
-    from confab.planner.acting.executive import Moment
+    from confab.planner.acting.executive import Event
     from confab.planner.acting.world import World
     from confab.reasoner.graph.query_process import QueryLimits
     from confab.why import Account
@@ -119,7 +119,7 @@ class Scene(Known):
         memory: Memory | Links | str | Path | None = None,
         mode: Mode = DEFAULT_MODE,
         seed: int = 0,
-        tell: Callable[[Moment], None] | None = None,
+        observer: Callable[[Event], None] | None = None,
         watch: bool = False,
         time_limit: float | None = None,
         **options: Unpack[execution.Options],
@@ -127,7 +127,7 @@ class Scene(Known):
         """Execute the task in a closed loop: see `confab.execution.execute`.
 
         It begins with `plan`: a plan, a result, or the name of a file that ``confab plan --json`` wrote. New plans are made with
-        `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal; `tell` is a
+        `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal; `observer` is a
         display of your own. After `time_limit` seconds the episode gives up.
 
         Examples
@@ -139,7 +139,7 @@ class Scene(Known):
         from confab.execution import carry_out
 
         return carry_out(
-            self, plan, interventions, world, goals, memory, mode, seed, tell, watch, time_limit, **options
+            self, plan, interventions, world, goals, memory, mode, seed, observer, watch, time_limit, **options
         )
 
     @contextmanager

@@ -54,7 +54,7 @@ from confab.table import Table
 
 if TYPE_CHECKING:
     from confab.known import Known
-    from confab.planner.acting.executive import Moment
+    from confab.planner.acting.executive import Event
 
 log = logging.getLogger(__name__)
 transport_log = log.getChild("transport")
@@ -152,11 +152,11 @@ class Service:
                 lane.put_nowait(worker)
         raise AssertionError("the last lane has no time limit of its own")
 
-    def take(self, moment: Moment) -> None:
+    def take(self, event: Event) -> None:
         """Note an event of an execution: the page shows it, and queries see what was observed."""
         from confab.reasoner.reading.observed import assert_observed
 
-        self.following.take(moment)
+        self.following.take(event)
         names, known = self.scene.names, self.following.known
         strange = {one for symbol in known for one in symbol.arguments if one not in names}  # objects that were added
         if known:

@@ -13,7 +13,7 @@ from time import perf_counter, sleep
 from typing import Any
 
 from confab.planner.acting.world import INTERRUPTED, Guarded, Verdict, World, WorldError
-from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Step
 from confab.planner.validation import successor
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
@@ -98,7 +98,7 @@ def check_world(
         first = _observed(guarded, problem, checks)
         if steps is None:
             now = {**problem.initial, **first}
-            plan = fast_plan(replace(problem, initial=now), limits=Limits(seconds=20.0)).plan
+            plan = hierarchical_plan(replace(problem, initial=now), limits=Limits(seconds=20.0)).plan
             steps = plan.primitives if plan is not None else ()
         checks.append(_refusal(guarded, first))
         rest = _stopped(guarded, problem, steps, stopped_within, checks)

@@ -322,13 +322,13 @@ def execute(
             raise KnowledgeError(
                 "--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)"
             )
-        tell = stack.enter_context(spectator())
+        observer = stack.enter_context(spectator())
         if serve_at is not None:
             from confab.serving import serving
 
             server = stack.enter_context(serving(loaded, serve_at))
             remark(f"{server.url} shows what happens, {server.url}sparql answers SPARQL 1.1")
-            tell = both(tell, server.service.take)
+            observer = both(observer, server.service.take)
         execution = loaded.execute(
             plan,
             intervene or (),
@@ -337,7 +337,7 @@ def execute(
             remembered,
             mode,
             seed,
-            tell,
+            observer,
             perturb=perturb,
             noise=noise,
             both_hands=both_hands,

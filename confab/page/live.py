@@ -10,7 +10,7 @@ from confab.known import Known
 from confab.labels import Labels
 from confab.page.data import PageData, page_labels, timeline_data
 from confab.page.timeline import Bar, Period, Timeline
-from confab.planner.acting.executive import Moment
+from confab.planner.acting.executive import Event
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem, Symbol
 
@@ -25,7 +25,7 @@ class Following:
         self._periods = {symbol: [(0.0, value)] for symbol, value in self.known.items()}
         self._bars: list[Bar] = []
         self._marks: list[tuple[float, str]] = []
-        self._moment: Moment | None = None
+        self._event: Event | None = None
         self._wanted = self.problem
         self._begun: tuple[Step, float] | None = None
         self._lock = threading.Lock()
@@ -38,25 +38,25 @@ class Following:
     @property
     def begun(self) -> bool:
         """Whether an execution has begun."""
-        return self._moment is not None
+        return self._event is not None
 
-    def take(self, moment: Moment) -> None:
+    def take(self, event: Event) -> None:
         """Record an event."""
         with self._lock:
-            self._moment, self.version = moment, self.version + 1
-            if moment.belief is not None:
-                self._believe(moment.belief, moment.seconds)
-            if moment.what == "begin" and moment.step is not None:
-                self._begun = moment.step, moment.seconds
-            elif moment.what == "end" and moment.step is not None:
-                step, begin = self._begun or (moment.step, moment.seconds)
-                done = moment.step.path in moment.done
-                note = "; ".join(f"{s.symbol}: expected {s.expected}, seen {s.observed}" for s in moment.surprises)
-                self._bars.append(Bar(step, begin, moment.seconds, done, note))
+            self._event, self.version = event, self.version + 1
+            if event.belief is not None:
+                self._believe(event.belief, event.seconds)
+            if event.what == "begin" and event.step is not None:
+                self._begun = event.step, event.seconds
+            elif event.what == "end" and event.step is not None:
+                step, begin = self._begun or (event.step, event.seconds)
+                done = event.step.path in event.done
+                note = "; ".join(f"{s.symbol}: expected {s.expected}, seen {s.observed}" for s in event.surprises)
+                self._bars.append(Bar(step, begin, event.seconds, done, note))
                 self._begun = None
-            elif moment.what in ("intervention", "discovery", "repair", "replan"):
-                text = moment.text if moment.what in ("intervention", "discovery") else f"{moment.what}: {moment.text}"
-                self._marks.append((moment.seconds, text))
+            elif event.what in ("intervention", "discovery", "repair", "replan"):
+                text = event.text if event.what in ("intervention", "discovery") else f"{event.what}: {event.text}"
+                self._marks.append((event.seconds, text))
 
     def _believe(self, belief: Problem, now: float) -> None:
         """Record the symbols that have changed, and the goals."""
@@ -68,16 +68,16 @@ class Following:
     def data(self) -> PageData:
         """Return the present data of the page."""
         with self._lock:
-            moment, now = self._moment, self._moment.seconds if self._moment is not None else 0.0
+            event, now = self._event, self._event.seconds if self._event is not None else 0.0
             bars, marks = list(self._bars), tuple(self._marks)
             seen = {symbol: list(periods) for symbol, periods in self._periods.items()}
             begun, version, wanted = self._begun, self.version, self._wanted
-        assert moment is not None
+        assert event is not None
         begun_path = None if begun is None else begun[0].path
-        left = [s for s in moment.plan.primitives if s.path not in moment.done]
+        left = [s for s in event.plan.primitives if s.path not in event.done]
         length = sum(bar.end - bar.begin for bar in bars) / len(bars) if bars else 1.0
         at = now
-        for step in left if moment.what != "over" else []:
+        for step in left if event.what != "over" else []:
             running = step.path == begun_path
             start = begun[1] if running and begun is not None else at
             at = max(now, start + length)
@@ -92,20 +92,20 @@ class Following:
         final = {symbol: periods[-1][1] for symbol, periods in seen.items()}
         unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
         lived = replace(self.problem, goal=wanted.goal, classes=wanted.classes)
-        timeline = Timeline(lived, moment.plan, tuple(bars), phases, at, unit, final, marks)
+        timeline = Timeline(lived, event.plan, tuple(bars), phases, at, unit, final, marks)
         notes = {begun[0].path: "◀ being done"} if begun is not None else {}
         data = timeline_data(self.scene, timeline, self.labels, notes, reasons=False)
-        done = sum(step.path in moment.done for step in moment.plan.primitives)
-        over = moment.what == "over"
+        done = sum(step.path in event.done for step in event.plan.primitives)
+        over = event.what == "over"
         data |= {
             "live": True,
             "version": version,
             "now": now,
-            "good": moment.text == "reached" if over else None,
-            "status": moment.text if over else "acting",
-            "headline": moment.text,
+            "good": event.text == "reached" if over else None,
+            "status": event.text if over else "acting",
+            "headline": event.text,
             "tiles": [
-                {"name": "primitives done", "text": f"{done} of {len(moment.plan.primitives)}"},
+                {"name": "primitives done", "text": f"{done} of {len(event.plan.primitives)}"},
                 {"name": "interventions and changes of plan", "text": str(len(marks))},
             ],
             "goals": [],

@@ -103,7 +103,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Event:
+class ExecutedPrimitive:
     """An executed primitive: its times, its verdict, and the surprises after it.
 
     `relied_on` are the static facts, as relation and individuals, that it or the behaviour above it relied on.
@@ -160,7 +160,7 @@ class Episode:
         The situation in the beginning, and as it was observed in the end.
     goal : State
         The goal in the end.
-    events : tuple of Event
+    events : tuple of ExecutedPrimitive
         Every primitive that was begun, in order.
     interventions : tuple of (Intervention, float)
         The interventions that took place, with the times of their beginning.
@@ -185,7 +185,7 @@ class Episode:
     initial: State
     observed: State
     goal: State
-    events: tuple[Event, ...] = ()
+    events: tuple[ExecutedPrimitive, ...] = ()
     interventions: tuple[tuple[Intervention, float], ...] = ()
     replans: tuple[Replan, ...] = ()
     failures: tuple[Failure, ...] = ()

@@ -25,7 +25,7 @@ from confab.planner.acting.episode import (
     Change,
     End,
     Episode,
-    Event,
+    ExecutedPrimitive,
     Failure,
     Intervention,
     Replan,
@@ -33,11 +33,11 @@ from confab.planner.acting.episode import (
 )
 from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_by
 from confab.planner.acting.record import Record
-from confab.planner.acting.repair import difference, mend, replan, vanished
+from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.step_trees import all_steps, first_chain, tree_of, without_first
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Report, Verdict, World, WorldError
 from confab.planner.hierarchical.planner import compiled
-from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.validation import open_goals, successor
 from confab.reasoner.limits import LimitError, check
@@ -46,7 +46,7 @@ from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 
 @dataclass(frozen=True)
-class Patience:
+class RetryPolicy:
     """Limits of an episode: attempts per primitive, total failures, primitives begun per primitive planned, and planning limits.
 
     `rounds` is the number of times that failed steps are tried once no alternative is left, since the situation may have changed
@@ -62,7 +62,7 @@ class Patience:
 
 
 @dataclass(frozen=True)
-class Moment:
+class Event:
     """An event for observers of the execution.
 
     `seconds` is the time on the world's clock, `belief` the task as the executive believes it to be, with the present situation as
@@ -86,9 +86,9 @@ def act(
     plan: Plan | None = None,
     interventions: Sequence[Intervention] = (),
     planner: Planner | None = None,
-    patience: Patience = Patience(),
-    tell: Callable[[Moment], None] | None = None,
-    mending: bool = True,
+    retry_policy: RetryPolicy = RetryPolicy(),
+    observer: Callable[[Event], None] | None = None,
+    repairs: bool = True,
     caution: Caution | None = None,
 ) -> Episode:
     """Execute a task in a world until it is done, proved impossible, or a limit is reached.
@@ -105,10 +105,10 @@ def act(
         The interventions by people during the episode.
     planner : callable, optional
         Plans from scratch, from a situation of rest; the default planner if left out.
-    patience : Patience
-    tell : callable, optional
-        Called with every `Moment`.
-    mending : bool
+    retry_policy : RetryPolicy
+    observer : callable, optional
+        Called with every `Event`.
+    repairs : bool
         False replans from scratch instead of repairing.
     caution : Caution, optional
         Failures in earlier episodes: unreliable facts and behaviours are avoided where there is an alternative.
@@ -118,8 +118,8 @@ def act(
     Episode
     """
     if caution is not None and plan is None:
-        problem = caution.applied(problem, planner or fast_plan, patience.planning)
-    run = _Run(Belief(problem), Guarded(world), list(interventions), planner, patience, tell, mending)
+        problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
+    run = _Run(Belief(problem), Guarded(world), list(interventions), planner, retry_policy, observer, repairs)
     try:
         run.look(run.belief.state)
         run.start(plan)
@@ -131,7 +131,7 @@ def act(
             elif not run.agenda:
                 run.finish()
             elif (expected := run.expected()) is None:
-                run.doubt("the next primitive's precondition doesn't hold")
+                run.request_replan("the next primitive's precondition doesn't hold")
             else:
                 chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
@@ -153,9 +153,9 @@ class _Run:
     world: Guarded
     waiting: list[Intervention]
     planner: Planner | None
-    patience: Patience
-    tell: Callable[[Moment], None] | None
-    mending: bool
+    retry_policy: RetryPolicy
+    observer: Callable[[Event], None] | None
+    repairs: bool
     agenda: tuple[Step, ...] = ()
     going: bool = True
     puzzled: str = ""
@@ -180,7 +180,7 @@ class _Run:
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
-        begun, outcome, limits = plan, None, self.patience.planning
+        begun, outcome, limits = plan, None, self.retry_policy.planning
         if begun is None:
             self.puzzled = ""
             self.set_aside_the_vanished()
@@ -189,16 +189,16 @@ class _Run:
             record.seconds["planning"] += perf_counter() - begin
             begun = Plan(renumbered(steps or ()))
         self.agenda, record.planned, self.planned_for = begun.steps, begun, self.belief.problem
-        self.most = self.patience.primitives * max(len(begun.primitives), 20)
+        self.most = self.retry_policy.primitives * max(len(begun.primitives), 20)
         if outcome is not None and outcome.plan is None:
-            self.despair(outcome, limits)
+            self.on_no_plan(outcome, limits)
         self.say("plan", text="; ".join(reason.text for _, reason in self.aside.values()))
 
     def finish(self) -> None:
         """End the episode, check the agenda again, or take up a goal that was put off: no step is left."""
         record = self.record
         if missing := open_goals(self.belief.problem):
-            self.doubt(f"{missing[0]} doesn't hold yet")
+            self.request_replan(f"{missing[0]} doesn't hold yet")
             return
         if self.put_off and self.try_anew("the rest is done"):
             return
@@ -226,7 +226,7 @@ class _Run:
 
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
         """Notify the observer, if there is one."""
-        if self.tell is None:
+        if self.observer is None:
             return
         done, events = self.record.done, self.record.events
         surprises = events[-1].surprises if events and what == "end" else ()
@@ -234,8 +234,8 @@ class _Run:
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
-        self.tell(
-            Moment(what, whole, frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
+        self.observer(
+            Event(what, whole, frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
         )
 
     # --------------------------------------------------------------------------------------------------- acting
@@ -267,12 +267,14 @@ class _Run:
         done = verdict.ok or (there and verdict.code != INTERRUPTED)
         surprises = self.look(expected if done else dict(before), seen)
         relied_on = tuple(relied_on_by(self.belief.problem, chain))
-        record.events.append(Event(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on))
+        record.events.append(
+            ExecutedPrimitive(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on)
+        )
         if done:
             record.done.update((above.path, above) for above in chain)
             self.agenda = without_first(self.agenda)
         if surprises:
-            self.doubt("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
         self.say("end", step, changes)
         if len(record.events) >= self.most:
             self.give_up(Reason(f"stopped at the limit of {self.most} primitives"))
@@ -301,7 +303,7 @@ class _Run:
         for found in self.world.discoveries():
             self.belief.meet(found)
             self.record.discovered.append((found, self.world.seconds))
-            self.doubt(found.text or f"there is {found.individual}")
+            self.request_replan(found.text or f"there is {found.individual}")
             self.say("discovery", text=found.text)
 
     # ------------------------------------------------------------------------------------------------------- interventions
@@ -324,7 +326,7 @@ class _Run:
             self.note(intervention, now)
         if any(i.of_world for i in due):
             surprises = self.look(self.belief.state)
-            self.doubt("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
 
     def note_what_happened_by_the_clock(self) -> None:
         """Record announced interventions whose time has passed."""
@@ -347,7 +349,7 @@ class _Run:
             self.belief.add(intervention.individual, (intervention.kind,))
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
-            self.doubt("something else is wanted")
+            self.request_replan("something else is wanted")
         self.say("intervention", text=intervention.text)
 
     def forget(self, symbols: Iterable[Symbol]) -> None:
@@ -356,7 +358,7 @@ class _Run:
             self.aside.pop(symbol, None)
             self.put_off.pop(symbol, None)
 
-    def doubt(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
+    def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
         """Request another check of the agenda."""
         if why not in self.puzzled:
             self.puzzled = f"{self.puzzled}; {why}" if self.puzzled else why
@@ -380,18 +382,18 @@ class _Run:
         doubts = len(belief.withdrawn), len(belief.refuted), self.rounds
         standing = (*counted, *doubts, record.status, *belief.problem.goal)
         self.pondered[standing] += 1
-        if self.pondered[standing] > self.patience.rounds:
-            text = f"planned {self.patience.rounds} times in the same situation, and no step could be done: {why}"
+        if self.pondered[standing] > self.retry_policy.rounds:
+            text = f"planned {self.retry_policy.rounds} times in the same situation, and no step could be done: {why}"
             self.give_up(Reason(text))
             return
         begin = perf_counter()
-        limits, old = self.patience.planning, self.agenda
+        limits, old = self.retry_policy.planning, self.agenda
         end = limits.end()
-        if self.mending:
+        if self.repairs:
             expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
             planned = replace(self.planned_for, initial=expected)
-            mended = mend(belief.problem, old, planned, self.planner, belief.using, self.sound, limits)
-            kind, steps, cost, outcome = mended.kind, mended.steps, mended.cost, mended.outcome
+            repaired = repair_or_replan(belief.problem, old, planned, self.planner, belief.using, self.sound, limits)
+            kind, steps, cost, outcome = repaired.kind, repaired.steps, repaired.cost, repaired.outcome
         else:
             steps, outcome = replan(belief.problem, self.planner, belief.using, limits)
             kind, cost = "replan", float(len(Plan(steps or ()).primitives))
@@ -399,7 +401,7 @@ class _Run:
         record.seconds["repairing"] += seconds
         self.planned_for, self.sound, self.missed = belief.problem, True, {}
         if steps is None:
-            self.despair(outcome, limits.until(end))
+            self.on_no_plan(outcome, limits.until(end))
             return
         self.agenda = self.numbered(steps)
         dropped, added = difference(old, steps)
@@ -435,7 +437,7 @@ class _Run:
         """Drop the goals about an object that has vanished, or that is at no place of the scene."""
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
-    def despair(self, outcome: Outcome | None, limits: Limits) -> None:
+    def on_no_plan(self, outcome: Outcome | None, limits: Limits) -> None:
         """Look for free spots; otherwise set aside or put off the goals unreachable even alone; otherwise retry, or stop.
 
         A goal that needs facts in doubt is put off until everything else is done.
@@ -455,10 +457,10 @@ class _Run:
             goal = belief.goal
             self.put_off |= {symbol: (goal[symbol], self.blamed(symbol, goal[symbol])) for symbol in hopeless}
             belief.want({s: v for s, v in goal.items() if s not in hopeless})
-            self.doubt("what can't be reached is put off")
+            self.request_replan("what can't be reached is put off")
         elif hopeless:
             self.set_aside(hopeless)
-            self.doubt("what can't be reached is set aside")
+            self.request_replan("what can't be reached is set aside")
         elif not (belief.doubted and self.try_anew("no other way is left")):
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
@@ -472,7 +474,7 @@ class _Run:
             self.belief.meet(spot)
             self.record.discovered.append((spot, self.world.seconds))
         if spots:
-            self.doubt(f"no place is free; {', '.join(spot.individual for spot in spots)} would be")
+            self.request_replan(f"no place is free; {', '.join(spot.individual for spot in spots)} would be")
         return bool(spots)
 
     def blocked(self, fact: Fact, limits: Limits) -> Reason | None:
@@ -516,7 +518,7 @@ class _Run:
         self.belief.want({})
         self.aside.clear()
         self.put_off.clear()
-        self.most = len(self.record.events) + self.patience.primitives
+        self.most = len(self.record.events) + self.retry_policy.primitives
         self.puzzled = reason.text
 
     # ---------------------------------------------------------------------------------------------------- failures
@@ -525,12 +527,12 @@ class _Run:
         """Retry, then use an alternative: a behaviour that failed repeatedly counts as impossible for the rest of the episode."""
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
-            self.doubt(verdict.message)
+            self.request_replan(verdict.message)
             return
         record.failures.append(Failure(step, code, verdict.objects, verdict.message, before))
         if step.path not in record.done:
             self.attempts[step.behavior, step.arguments] += 1
-        if len(record.failures) >= self.patience.failures:
+        if len(record.failures) >= self.retry_policy.failures:
             text = f"stopped after {len(record.failures)} failures, the last of {step}: {verdict.message or code}"
             self.give_up(Reason(text, verdict.objects))
             return
@@ -539,9 +541,9 @@ class _Run:
         if refuted and not belief.refuted.keys() >= {*refuted}:
             record.refuted |= dict.fromkeys(refuted)
             self.rethink(f"{refuted[-1]}", refutations=refuted)
-        elif self.attempts[step.behavior, step.arguments] >= self.patience.attempts:
+        elif self.attempts[step.behavior, step.arguments] >= self.retry_policy.attempts:
             relied_on = relied_on_by(belief.problem, chain)
-            why = f"{step} failed {self.patience.attempts} times ({code})"
+            why = f"{step} failed {self.retry_policy.attempts} times ({code})"
             never = () if relied_on else (Refutation(step.behavior, step.arguments, (), code),)
             self.rethink(why, relied_on, never)
 
@@ -554,18 +556,18 @@ class _Run:
         """Doubt static facts or the applicability of behaviours, and plan the step in progress again."""
         self.belief.doubt(facts, refutations)
         self.sound = False
-        self.doubt(why)
+        self.request_replan(why)
 
     def try_anew(self, why: str) -> bool:
         """Drop all doubts and take up goals that were put off, if a round is left; return whether one was."""
-        if self.rounds >= self.patience.rounds:
+        if self.rounds >= self.retry_policy.rounds:
             return False
         self.rounds += 1
         self.attempts.clear()
         self.belief.trust_again()
         self.want_again(self.put_off)
         self.sound = False
-        self.doubt(f"tried anew: {why}")
+        self.request_replan(f"tried anew: {why}")
         return True
 
 

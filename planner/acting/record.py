@@ -8,7 +8,7 @@ from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
     End,
     Episode,
-    Event,
+    ExecutedPrimitive,
     Failure,
     Intervention,
     Replan,
@@ -28,7 +28,7 @@ class Record:
     planned: Plan = Plan(())  # noqa: RUF009 - frozen
     status: End = End.REACHED
     reasons: list[Reason] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
+    events: list[ExecutedPrimitive] = field(default_factory=list)
     interventions: list[tuple[Intervention, float]] = field(default_factory=list)
     course: list[Seen] = field(default_factory=list)
     replans: list[Replan] = field(default_factory=list)

@@ -22,7 +22,7 @@ from confab.planner.certified import certified
 from confab.planner.hierarchical.agenda import Agenda, order
 from confab.planner.hierarchical.call import Call, Compiled, compiled, settle
 from confab.planner.hierarchical.effort import ONE_STEP
-from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
@@ -44,7 +44,7 @@ SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class Mended:
+class RepairResult:
     """The steps to do from now on, and how they were found. `steps` is None if nothing was found."""
 
     kind: str
@@ -62,7 +62,7 @@ class Repaired:
     least: float
 
 
-def mend(
+def repair_or_replan(
     problem: Problem,
     rest: Sequence[Step],
     planned: Problem,
@@ -70,7 +70,7 @@ def mend(
     using: Compiled | None = None,
     in_progress: bool = True,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-) -> Mended:
+) -> RepairResult:
     """Return the steps from a situation that differs from the one for which a plan was made.
 
     Parameters
@@ -96,11 +96,11 @@ def mend(
         repaired = None
     fewer = planned.goal.keys() - problem.goal.keys()  # then steps needed before may be needless
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
-        return Mended("repair", repaired.steps, repaired.cost)
+        return RepairResult("repair", repaired.steps, repaired.cost)
     anew, outcome = replan(problem, planner, using, limits.until(end))
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
-        return Mended("repair", repaired.steps, repaired.cost)
-    return Mended("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
+        return RepairResult("repair", repaired.steps, repaired.cost)
+    return RepairResult("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
 
 
 def repair(
@@ -170,7 +170,7 @@ def replan(
             return None, Outcome(Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}"))
         first, problem = call.tree().steps, replace(problem, initial=call.table.state())
     left = limits.until(end)
-    outcome = planner(problem, limits=left) if planner else fast_plan(problem, limits=left, using=using)
+    outcome = planner(problem, limits=left) if planner else hierarchical_plan(problem, limits=left, using=using)
     if outcome.plan is None:
         with within(left.seconds):
             return None, certified(now, outcome)

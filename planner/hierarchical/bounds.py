@@ -22,7 +22,7 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.shortest import Bound, shortest, ways
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import SEARCHING, Call, Compiled, compiled
-from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.hierarchical.shortening import ORDERS
 from confab.planner.hierarchical.unsolvability import closed, refusal
@@ -60,7 +60,7 @@ def plan(
     begin = perf_counter()
     deadline = limits.end(SEARCHING)
     using = using or compiled(problem)
-    best = fast_plan(problem, limits=limits.until(deadline), using=using)
+    best = hierarchical_plan(problem, limits=limits.until(deadline), using=using)
     best = _shortened(problem, best, limits, using, deadline)
     if best.status is Status.UNSOLVABLE:
         return best
@@ -85,7 +85,7 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
     while best.plan is not None and improve <= 64 * ORDERS:
         if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
             break
-        again = fast_plan(problem, limits=limits.until(deadline), using=using, improve=improve)
+        again = hierarchical_plan(problem, limits=limits.until(deadline), using=using, improve=improve)
         improve *= 4
         if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again

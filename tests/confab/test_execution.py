@@ -14,7 +14,7 @@ from confab import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
 from confab.planner.acting.episode import Change, Intervention
-from confab.planner.acting.executive import Moment
+from confab.planner.acting.executive import Event
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.memory.episodes import assert_episode
@@ -221,15 +221,15 @@ def test_any_world_with_observe_and_execute_will_do() -> None:
 
 
 def test_the_live_view_shows_step_expectation_intervention_and_change() -> None:
-    scene, view, moments = confab.load("beverage-serving"), View(), list[Moment]()
-    scene.execute(interventions=FIGURE_8, tell=moments.append)
+    scene, view, events = confab.load("beverage-serving"), View(), list[Event]()
+    scene.execute(interventions=FIGURE_8, observer=events.append)
     shown = []
-    for moment in moments:
-        view.take(moment)
+    for event in events:
+        view.take(event)
         console = Console(file=StringIO(), width=150)
         console.print(view)
         shown.append(console.file.getvalue())  # type: ignore[attr-defined]
-    first = next(text for text, moment in zip(shown, moments, strict=True) if moment.what == "begin")
+    first = next(text for text, event in zip(shown, events, strict=True) if event.what == "begin")
     assert "◀ left_hand HAND_POSITION cup1" in first
     assert "✋ after=28 cup2 LOCATION location8" in "".join(shown)
     assert "↻ repair" in "".join(shown)
@@ -238,8 +238,8 @@ def test_the_live_view_shows_step_expectation_intervention_and_change() -> None:
 
 def test_the_terminal_view_takes_every_moment() -> None:
     console = Console(file=StringIO(), force_terminal=True, width=120)
-    with in_terminal(console) as tell:
-        confab.load("beverage-serving").execute(interventions=FIGURE_8, tell=tell)
+    with in_terminal(console) as observer:
+        confab.load("beverage-serving").execute(interventions=FIGURE_8, observer=observer)
     assert "B1_POUR" in console.file.getvalue()  # type: ignore[attr-defined]
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from confab.planner.acting.episode import Change, End, Episode, Intervention
-from confab.planner.acting.executive import Moment, Patience, act
+from confab.planner.acting.executive import Event, RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import Report
@@ -113,7 +113,7 @@ def test_in_the_papers_mode_after_a_demonstration_the_whole_course_is_that_of_th
 
 
 def test_replanning_from_scratch_comes_to_the_same() -> None:
-    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), mending=False)
+    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), repairs=False)
     assert tree(episode.done) == SERVED_AS_IN_FIGURE_8
 
 
@@ -280,7 +280,7 @@ def test_the_number_of_primitives_is_bounded() -> None:
                 self.state[Symbol("HOLDS", ("left_hand",))] = "nothing"
             return said
 
-    episode = act(serving(), Stubborn(serving()), planned(), patience=Patience(primitives=2))
+    episode = act(serving(), Stubborn(serving()), planned(), retry_policy=RetryPolicy(primitives=2))
     assert episode.status is End.GAVE_UP
     assert len(episode.events) <= 2 * 32 + 10
 
@@ -297,7 +297,7 @@ def test_the_second_attempt_in_the_same_situation_chooses_better_only_if_it_lear
     caution, ends = Caution(), []
     for _ in range(3):
         world = SymbolicWorld(serving(), fault=blocked)
-        episode = act(serving(), world, patience=Patience(failures=2), caution=caution)
+        episode = act(serving(), world, retry_policy=RetryPolicy(failures=2), caution=caution)
         ends.append(episode.status)
         caution = caution.learned(episode) if learning else caution
     assert ends == [End.GAVE_UP, *[End.REACHED if learning else End.GAVE_UP] * 2]
@@ -360,9 +360,9 @@ def test_the_same_course_of_events_gives_the_same_episode() -> None:
 
 
 def test_a_spectator_is_told_of_every_primitive_and_every_change() -> None:
-    moments: list[Moment] = []
-    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), tell=moments.append)
-    said = [moment.what for moment in moments]
+    events: list[Event] = []
+    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), observer=events.append)
+    said = [event.what for event in events]
     assert said.count("begin") == said.count("end") == len(episode.events)
     assert said.count("intervention") == 2
     assert said.count("repair") == 1

@@ -40,7 +40,7 @@ def test_an_episode_in_which_planning_changes_nothing_gives_up(monkeypatch: pyte
     problem = confab.load(CASES / "endless-h2.ttl").problem
     nothing = (), Outcome(Status.SOLVED, Plan(()))
     monkeypatch.setattr(executive, "replan", lambda *_: nothing)
-    episode = executive.act(problem, SymbolicWorld(problem), Plan(()), mending=False)
+    episode = executive.act(problem, SymbolicWorld(problem), Plan(()), repairs=False)
     assert episode.status.value == "gave-up"
     assert "planned 3 times in the same situation" in episode.reasons[0].text
 

@@ -9,7 +9,15 @@ from time import sleep
 import pytest
 
 from benchmarks.execution import Trial, rest_after
-from confab.planner.acting.repair import CLOSE, changed_individuals, difference, mend, rejected, replan, vanished
+from confab.planner.acting.repair import (
+    CLOSE,
+    changed_individuals,
+    difference,
+    rejected,
+    repair_or_replan,
+    replan,
+    vanished,
+)
 from confab.planner.hierarchical.call import Compiled, compiled
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Plan, Status, Step
@@ -53,48 +61,48 @@ def location(individual: str) -> Symbol:
 @pytest.mark.parametrize("changes", [{}, {location("bottle1"): "location8"}, {location("cup1"): "location7"}])
 def test_what_comes_out_leads_to_the_goal_from_the_situation_as_it_is(changes: State) -> None:
     now = replace(serving(), initial={**serving().initial, **changes})
-    mended = mend(now, planned().steps, serving(), using=using())
-    assert mended.steps is not None
-    end = carried_out(now, now.initial, mended.steps)
+    repaired = repair_or_replan(now, planned().steps, serving(), using=using())
+    assert repaired.steps is not None
+    end = carried_out(now, now.initial, repaired.steps)
     assert all(end[symbol] == value for symbol, value in now.goal.items())
 
 
 def test_where_nothing_that_matters_has_changed_nothing_changes() -> None:
-    mended = mend(serving(), planned().steps, serving(), using=using())
-    assert mended.steps is not None
-    assert mended.steps == planned().steps
+    repaired = repair_or_replan(serving(), planned().steps, serving(), using=using())
+    assert repaired.steps is not None
+    assert repaired.steps == planned().steps
     for done in range(1, len(planned().primitives)):
         now, rest = in_the_hand(done)
-        mended = mend(now, rest, now, using=using())
-        assert mended.steps is not None
-        left, found = Plan(rest).primitives, Plan(mended.steps).primitives
+        repaired = repair_or_replan(now, rest, now, using=using())
+        assert repaired.steps is not None
+        left, found = Plan(rest).primitives, Plan(repaired.steps).primitives
         assert [(str(step), step.bindings) for step in found] == [(str(step), step.bindings) for step in left]
 
 
 def test_what_somebody_else_has_done_is_dropped_and_no_more() -> None:
     now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
-    mended = mend(now, planned().steps, serving(), using=using())
-    assert mended.steps is not None
-    assert difference(planned().steps, mended.steps) == (6, 0)
+    repaired = repair_or_replan(now, planned().steps, serving(), using=using())
+    assert repaired.steps is not None
+    assert difference(planned().steps, repaired.steps) == (6, 0)
 
 
 def test_another_place_is_gone_to_in_place_of_the_old_one() -> None:
     now = replace(serving(), goal={**serving().goal, location("cup2"): "location6"})
-    mended = mend(now, planned().steps, serving(), using=using())
-    assert mended.steps is not None
-    assert mended.kind == "repair"
-    assert sum(difference(planned().steps, mended.steps)) < 14
+    repaired = repair_or_replan(now, planned().steps, serving(), using=using())
+    assert repaired.steps is not None
+    assert repaired.kind == "repair"
+    assert sum(difference(planned().steps, repaired.steps)) < 14
 
 
 def test_it_costs_at_most_a_tenth_more_than_replanning() -> None:
     for place in ("location6", "location8"):
         for individual in ("cup1", "cup2", "bottle1"):
             now = replace(serving(), goal={**serving().goal, location(individual): place})
-            mended = mend(now, planned().steps, serving(), using=using())
+            repaired = repair_or_replan(now, planned().steps, serving(), using=using())
             scratch, _ = replan(now, None, using(), Limits())
-            assert (mended.steps is None) == (scratch is None)
+            assert (repaired.steps is None) == (scratch is None)
             if scratch is not None:
-                assert mended.cost <= CLOSE * cost_of(now, Plan(scratch))
+                assert repaired.cost <= CLOSE * cost_of(now, Plan(scratch))
 
 
 def test_what_is_not_there_is_named() -> None:
@@ -145,27 +153,29 @@ def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
     pick, place = first.steps
     begun = replace(serving(), initial=carried_out(serving(), serving().initial, (pick,)))
     rest = (replace(first, steps=(place,)), *others)
-    mended = mend(begun, rest, begun, using=using())
-    assert (mended.kind, mended.steps is not None) == ("repair", True)
-    assert mended.steps is not None
-    assert difference(rest, mended.steps) == (0, 0)
-    anew = mend(begun, rest, begun, using=using(), in_progress=False)
+    repaired = repair_or_replan(begun, rest, begun, using=using())
+    assert (repaired.kind, repaired.steps is not None) == ("repair", True)
+    assert repaired.steps is not None
+    assert difference(rest, repaired.steps) == (0, 0)
+    anew = repair_or_replan(begun, rest, begun, using=using(), in_progress=False)
     assert anew.steps is not None
     end = carried_out(begun, begun.initial, anew.steps)
     assert all(end[symbol] == value for symbol, value in begun.goal.items())
-    assert mended.cost == cost_of(begun, Plan(mended.steps))
+    assert repaired.cost == cost_of(begun, Plan(repaired.steps))
 
 
 def test_a_limit_of_time_is_kept_to() -> None:
     now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
-    late = mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=-1.0))
+    late = repair_or_replan(now, planned().steps, serving(), using=using(), limits=Limits(seconds=-1.0))
     assert late.steps is None
     assert late.outcome is not None
     assert late.outcome.status is Status.GAVE_UP
     assert late.cost == 0
     begun = replace(serving(), initial=carried_out(serving(), serving().initial, planned().steps[0].steps[:1]))
-    assert mend(begun, (), begun, using=using(), limits=Limits(seconds=-1.0)).steps is None
-    assert mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None
+    assert repair_or_replan(begun, (), begun, using=using(), limits=Limits(seconds=-1.0)).steps is None
+    assert (
+        repair_or_replan(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None
+    )
 
 
 def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,12 +190,14 @@ def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.Mon
         sleep(0.05)
 
     monkeypatch.setattr("confab.planner.acting.repair.repair", in_vain)
-    mended = mend(now, planned().steps, serving(), planner, using(), limits=Limits(seconds=60.0))
-    assert mended.kind == "replan"
-    assert mended.steps is not None
+    repaired = repair_or_replan(now, planned().steps, serving(), planner, using(), limits=Limits(seconds=60.0))
+    assert repaired.kind == "replan"
+    assert repaired.steps is not None
     begun = replace(serving(), initial=carried_out(serving(), serving().initial, planned().steps[0].steps[:1]))
-    mend(begun, (), begun, planner, using(), limits=Limits(seconds=60.0))  # something is brought to rest first
-    mend(now, planned().steps, serving(), planner, using())
+    repair_or_replan(
+        begun, (), begun, planner, using(), limits=Limits(seconds=60.0)
+    )  # something is brought to rest first
+    repair_or_replan(now, planned().steps, serving(), planner, using())
     first, second, unlimited = left
     assert first is not None
     assert second is not None
@@ -203,24 +215,24 @@ def in_the_hand(done: int, goal: State | None = None) -> tuple[Problem, tuple[St
 def test_what_a_hand_holds_goes_where_it_is_wanted_also_where_nothing_is_left_of_the_plan() -> None:
     now, rest = in_the_hand(3)
     for left in ((), rest[1:]):
-        mended = mend(now, left, now, using=using(), in_progress=False)
-        assert mended.steps is not None
-        end = carried_out(now, now.initial, mended.steps)
+        repaired = repair_or_replan(now, left, now, using=using(), in_progress=False)
+        assert repaired.steps is not None
+        end = carried_out(now, now.initial, repaired.steps)
         assert all(end[symbol] == value for symbol, value in now.goal.items())
-        assert mended.cost == cost_of(now, Plan(rest))
+        assert repaired.cost == cost_of(now, Plan(rest))
 
 
 def test_what_is_in_progress_is_not_finished_if_nobody_wants_it_any_more() -> None:
     goal = {s: v for s, v in serving().goal.items() if s.arguments != ("cup1",)}
     now, rest = in_the_hand(3, goal=goal)
     assert rest[0].arguments[0] == "cup1"
-    mended = mend(now, rest, serving(), using=using())
-    assert mended.steps is not None
-    end = carried_out(now, now.initial, mended.steps)
+    repaired = repair_or_replan(now, rest, serving(), using=using())
+    assert repaired.steps is not None
+    end = carried_out(now, now.initial, repaired.steps)
     assert all(end[symbol] == value for symbol, value in goal.items())
     assert end[location("cup1")] != "in_hand"
     others = sum(cost_of(serving(), Plan((step,))) for step in rest[1:] if "cup1" not in step.arguments)
-    assert mended.cost <= others + cost_of(serving(), Plan(rest[:1]))
+    assert repaired.cost <= others + cost_of(serving(), Plan(rest[:1]))
 
 
 def test_what_was_undone_is_done_again_first_and_what_was_planned_stays() -> None:
@@ -231,10 +243,10 @@ def test_what_was_undone_is_done_again_first_and_what_was_planned_stays() -> Non
     moved = {symbol: place for symbol, place in moved.items() if place not in now.initial.values()}
     assert moved
     back = replace(now, initial={**now.initial, **moved})
-    mended = mend(back, rest, now, using=using())
-    assert mended.steps is not None
-    assert difference(rest, mended.steps)[0] == 0
-    assert {s.arguments[0] for s in mended.steps[: len(moved)]} == {symbol.arguments[0] for symbol in moved}
+    repaired = repair_or_replan(back, rest, now, using=using())
+    assert repaired.steps is not None
+    assert difference(rest, repaired.steps)[0] == 0
+    assert {s.arguments[0] for s in repaired.steps[: len(moved)]} == {symbol.arguments[0] for symbol in moved}
 
 
 def after_somebody(problem: Problem, draw: random.Random) -> Problem:
@@ -287,17 +299,17 @@ def test_whatever_happens_whenever_little_is_done_otherwise(
             anew.append(there)
             return plan(there, limits=limits, using=uses)
 
-        mended = mend(now, rest, before, planner, uses)
-        if mended.steps is None:
-            assert mended.outcome is not None
-            assert mended.outcome.status is not Status.GAVE_UP
+        repaired = repair_or_replan(now, rest, before, planner, uses)
+        if repaired.steps is None:
+            assert repaired.outcome is not None
+            assert repaired.outcome.status is not Status.GAVE_UP
             continue
-        end = carried_out(now, now.initial, mended.steps)
+        end = carried_out(now, now.initial, repaired.steps)
         assert all(end[symbol] == value for symbol, value in now.goal.items())
-        assert mended.cost == cost_of(now, Plan(mended.steps))
-        repaired += mended.kind == "repair"
-        spent += mended.cost
-        different += sum(difference(rest, mended.steps))
+        assert repaired.cost == cost_of(now, Plan(repaired.steps))
+        repaired += repaired.kind == "repair"
+        spent += repaired.cost
+        different += sum(difference(rest, repaired.steps))
     assert repaired >= kept
     assert spent <= cost
     assert different <= changed
