@@ -94,7 +94,7 @@ def instead_of(
     return replace(asked, plan=whole, cost=cost_of(problem, whole))
 
 
-def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask) -> Contrast:
+def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
     """Return the result if an individual takes part wherever it can in changes of a symbol.
 
     Raises
@@ -102,9 +102,9 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask
     NoChoiceError
         No behaviour that changes such a symbol could take the individual.
     """
-    behaviors = {b.name: _bound_to(problem, b, symbol, who) for b in problem.domain.behaviors.values()}
+    behaviors = {b.name: _bound_to(problem, b, symbol, individual) for b in problem.domain.behaviors.values()}
     if behaviors == problem.domain.behaviors:
-        raise NoChoiceError(f"no behaviour that changes {symbol} has a part for {who}")
+        raise NoChoiceError(f"no behaviour that changes {symbol} has a part for {individual}")
     outcome = ask(replace(problem, domain=replace(problem.domain, behaviors=behaviors)))
     before = cost_of(problem, plan)
     if outcome.plan is None:
@@ -112,9 +112,9 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask
     return Contrast(before, plan=outcome.plan, cost=cost_of(problem, outcome.plan))
 
 
-def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) -> Behavior:
+def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
     """Return a behaviour that changes a symbol only with an individual in one of its roles, if it has such a role."""
-    parts = [name for name, kind in behavior.kinds.items() if who in problem.members(kind)]
+    parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip
     if not parts:
@@ -126,7 +126,7 @@ def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) ->
         ]
         if effect.situation != symbol.situation or any(term not in behavior.kinds for term, _ in pairs):
             continue
-        taken = tuple((EqualityCondition(part, who),) for part in parts)
+        taken = tuple((EqualityCondition(part, individual),) for part in parts)
         inner = tuple(substituted(condition, dict(pairs)) for condition in effect.when)
         if inner:  # the change is made only under these conditions, these may determine the terms
             asks.append(AnyOf((*taken, (AnyOf((inner,), negated=True),))))

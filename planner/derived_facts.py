@@ -30,7 +30,7 @@ class Rules:
             stratum = Stratum(table)
             for name in group:
                 table.now[name] = Derived(name, len(self.domain.situations[name].arguments), stratum)
-        tests = self._bind(table.now, table.who)
+        tests = self._bind(table.now, table.holders)
         for name in self.domain.rules:
             cells = table.now[name]
             assert isinstance(cells, Derived)

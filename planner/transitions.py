@@ -1,14 +1,14 @@
 """A state as a table that is changed in place, and Python code generated for conditions and effects.
 
-now    situation type → key → value. The key is the individual, or the tuple of individuals if the type has several arguments
-who    situation type → value → the keys that have the value, in order of assignment; not kept for `FALSE`
-trail  the overwritten values, oldest first; `undo` restores them down to a mark
-age    number of changes, undoing included; values derived from the table at this age are still valid
+now      situation type → key → value. The key is the individual, or the tuple of individuals if the type has several arguments
+holders  situation type → value → the keys that have the value, in order of assignment; not kept for `FALSE`
+trail    the overwritten values, oldest first; `undo` restores them down to a mark
+age      number of changes, undoing included; values derived from the table at this age are still valid
 
 The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
 
 Copying a state would take time in the size of the world; a change and its undoing take a microsecond in any world. A condition
-becomes one Python expression over `now` and `who`. A behaviour becomes a function ``forward(arguments)`` that returns the values
+becomes one Python expression over `now` and `holders`. A behaviour becomes a function ``forward(arguments)`` that returns the values
 of its variables and its changes, or None if it isn't applicable. A new kind of condition gets its case in `Writer.expression`.
 """
 
@@ -73,14 +73,14 @@ class Table:
 
     def __init__(self, situations: Iterable[str], state: State) -> None:
         self.now: dict[str, dict[Key, str]] = {name: {} for name in situations}
-        self.who: dict[str, dict[str, dict[Key, None]]] = {name: {} for name in self.now}
+        self.holders: dict[str, dict[str, dict[Key, None]]] = {name: {} for name in self.now}
         self.trail: list[tuple[str, Key, str]] = []
         self.age = 0
         for symbol, value in state.items():
             key = key_of(symbol.arguments)
             self.now[symbol.situation][key] = value
             if value != FALSE:
-                self.who[symbol.situation].setdefault(value, {})[key] = None
+                self.holders[symbol.situation].setdefault(value, {})[key] = None
 
     def put(self, situation: str, key: Key, value: str) -> None:
         """Set the value of a symbol, and record the old one."""
@@ -88,13 +88,13 @@ class Table:
         cells = self.now[situation]
         old = cells.get(key, FALSE)
         cells[key] = value
-        who = self.who[situation]
+        holders = self.holders[situation]
         if old != FALSE:
-            del who[old][key]
+            del holders[old][key]
         if value != FALSE:
-            keys = who.get(value)
+            keys = holders.get(value)
             if keys is None:
-                who[value] = {key: None}
+                holders[value] = {key: None}
             else:
                 keys[key] = None
         self.trail.append((situation, key, old))
@@ -149,15 +149,15 @@ class Writer:
         self.variables: dict[str, tuple[str, ...]] = {}
         self._fan: dict[str, float] = {}
         self._tables = {
-            identifier(table, s): f"{table}[{s!r}]" for s in problem.domain.situations for table in ("now", "who")
+            identifier(table, s): f"{table}[{s!r}]" for s in problem.domain.situations for table in ("now", "holders")
         }
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
-        """Return a function of a table's `now` and `who` (and further given names) that runs lines and returns a result."""
+        """Return a function of a table's `now` and `holders` (and further given names) that runs lines and returns a result."""
         body = [f"    {line}" for line in (*lines, f"return {result}")]
         text = "\n".join(body)
         names = [f"    {name} = {table}" for name, table in self._tables.items() if name in text]
-        exec(code("\n".join([f"def bind(now, who{given}):", *names, text])), self.constants)
+        exec(code("\n".join([f"def bind(now, holders{given}):", *names, text])), self.constants)
         return self.constants.pop("bind")  # type: ignore[return-value]
 
     def forward(self, behavior: Behavior) -> Iterator[str]:
@@ -259,7 +259,7 @@ class Writer:
             match c:
                 case ValueCondition(situation, (only,), value, False) if only == term and value != term:
                     if self.listed(situation, value) and (value in bound or not value.startswith("?")):
-                        found.append((1.0, c, f"{identifier('who', situation)}.get({written(value)}, ())"))
+                        found.append((1.0, c, f"{identifier('holders', situation)}.get({written(value)}, ())"))
                 case RelationCondition(relation, arguments, False) if arguments.count(term) == 1:
                     if not {a for a in arguments if a.startswith("?")} - bound - {term}:
                         text, fan = self.adjacent(relation, arguments, term)

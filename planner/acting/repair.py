@@ -21,9 +21,9 @@ from difflib import SequenceMatcher
 from confab.planner.certified import certified
 from confab.planner.hierarchical.agenda import Agenda, order
 from confab.planner.hierarchical.call import Call, Compiled, compiled, settle
-from confab.planner.hierarchical.effort import ONE_STEP
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.refinement import RefinedStep
+from confab.planner.hierarchical.search_budget import ONE_STEP
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps

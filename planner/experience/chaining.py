@@ -173,14 +173,16 @@ class Chains:
         found, which = self.picked.get((id(candidates), situation)), id(candidates)
         if found is None:
             self.spent += len(candidates)
-            table, alike, wanted = self.call.table, self.call.program.alike, self.call.space.wants.wanted
+            table, symmetry, wanted = self.call.table, self.call.program.symmetry, self.call.space.subgoals.wanted
             found = free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
             if len(free) > FEW:
                 if which not in self.cells:
                     among = set(candidates)
                     self.cells[which] = [cells for cells in table.now.values() if not among.isdisjoint(cells)]
-                first = representatives(alike.groups(free), table.who.get(situation, {}), wanted.get(situation, {}))
-                sort, cells = alike.sort.get, self.cells[which]
+                first = representatives(
+                    symmetry.groups(free), table.holders.get(situation, {}), wanted.get(situation, {})
+                )
+                sort, cells = symmetry.class_of.get, self.cells[which]
                 unlike = {(sort(w), *[sort(its.get(w, "")) for its in cells]): w for w in (*free[::-1], *first[::-1])}
                 found = list(unlike.values())[::-1]
             self.picked[which, situation] = found
@@ -206,7 +208,7 @@ class Chains:
             key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
             if key in self.call.table.now[asked.situation]:
                 return [((asked.situation, key), env.get(asked.value, asked.value))]
-        wants = self.call.space.wants.of(achiever, asked, env, level)
+        wants = self.call.space.subgoals.of(achiever, asked, env, level)
         return [((situation, key), value) for situation, key, values in wants for value in values]
 
     # --------------------------------------------------------------------------------------------------------- distance
@@ -349,7 +351,7 @@ class Chains:
         """Return by how much an amount isn't as wanted, or in how many respects what is defined isn't; nothing of others."""
         (situation, key), value = goal
         if situation in self.call.program.rules:
-            return len(self.call.space.wants.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
+            return len(self.call.space.subgoals.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
         if self.call.program.domain.situations[situation].quantity is None:
             return 0.0
         now = float(number(self.call.table.now[situation].get(key)))
@@ -519,7 +521,7 @@ class Chains:
             return True
         mark, fresh = len(table.trail), self.age == table.age
         table.put(*goal[0], goal[1])
-        holds = self.call.space.wants.holds(achiever, achiever.soft[number], way.named)
+        holds = self.call.space.subgoals.holds(achiever, achiever.soft[number], way.named)
         table.undo(mark)
         if fresh:
             self.age = table.age  # all is as it was

@@ -98,7 +98,7 @@ class View:
         return "as it is" if self.table.now[situation].get(who, FALSE) == wanted else "not yet"
 
     def _holders(self, situation: str, who: str, named: Named) -> str:
-        keys = self.table.who[situation].get(who)
+        keys = self.table.holders[situation].get(who)
         if not keys:
             return "nobody"
         return next((role[1:] for one, role in named.items() if one in keys), "somebody")

@@ -182,12 +182,14 @@ class Guide:
 
     def another(self, targets: Mapping[Cell, str]) -> tuple[Cell, str] | None:
         """Return another open goal of a target's kind to which chains lead now, if that wasn't asked of the kind before."""
-        alike = self.call.program.alike.sort
-        kinds = {(cell[0], *map(alike.get, arguments_of(cell[1]))) for cell in targets if cell[0] not in self.reached}
+        symmetry = self.call.program.symmetry.class_of
+        kinds = {
+            (cell[0], *map(symmetry.get, arguments_of(cell[1]))) for cell in targets if cell[0] not in self.reached
+        }
         for cell, value in reversed(self.call.goal.items()) if kinds else ():
             if (
                 cell not in targets
-                and (cell[0], *map(alike.get, arguments_of(cell[1]))) in kinds
+                and (cell[0], *map(symmetry.get, arguments_of(cell[1]))) in kinds
                 and not self.call.met(cell)
             ):
                 return (cell, value) if self.chains.far(self.first, (cell, value)) < inf else None

@@ -45,7 +45,7 @@ def finder(rule: Rule, writer: Writer, asks: Sequence[Condition]) -> Bind | None
     if lines is None:
         return None
     bind = writer.function(lines, "find", ", pick")
-    return lambda table, pick: bind(table.now, table.who, pick)
+    return lambda table, pick: bind(table.now, table.holders, pick)
 
 
 def known(rule: Rule, problem: Problem) -> bool:
@@ -165,14 +165,14 @@ class _Join:
                     and c.arguments.count(role) == 1
                     and writer.listed(c.situation, c.value)
                 ):
-                    who, place = (
-                        f"{identifier('who', c.situation)}.get({written(c.value)}, ())",
+                    holders, place = (
+                        f"{identifier('holders', c.situation)}.get({written(c.value)}, ())",
                         c.arguments.index(role),
                     )
                     if len(c.arguments) > 1:
                         same = (f"k[{i}] == {written(a)}" for i, a in enumerate(c.arguments) if i != place)
-                        who = f"[k[{place}] for k in {who} if {' and '.join(same)}]"
-                    now.append(f"*{who}")
+                        holders = f"[k[{place}] for k in {holders} if {' and '.join(same)}]"
+                    now.append(f"*{holders}")
             elif isinstance(c, RelationCondition) and not c.negated and c.arguments.count(role) == 1:
                 if _variables(c.arguments) - self.bound != {role}:
                     continue

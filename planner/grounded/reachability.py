@@ -12,10 +12,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.grounded.alike import lifted
 from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.formulas import Formulas
 from confab.planner.grounded.joins import Ints, Table, pack
+from confab.planner.grounded.merged_effects import lifted
 from confab.planner.grounded.schemas import Atom, Schema, rules_apart, schemas
 from confab.planner.grounded.separation import in_parts
 from confab.reasoner.language import mentions

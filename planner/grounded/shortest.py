@@ -175,10 +175,10 @@ def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], ND
     setter, after = setter[here], task.adds.items[here]
     starts = task.needs.starts[: len(task) + 1]
     needed = task.needs.items[: starts[-1]]
-    who = np.repeat(np.arange(len(task)), np.diff(starts))
+    operator = np.repeat(np.arange(len(task)), np.diff(starts))
     here = symbol[needed] >= 0
     symbols = int(symbol.max(initial=0)) + 1
-    keys, needed = who[here] * symbols + symbol[needed[here]], needed[here]
+    keys, needed = operator[here] * symbols + symbol[needed[here]], needed[here]
     order = np.argsort(keys, kind="stable")
     keys, needed = keys[order], needed[order]
     asked = setter * symbols + symbol[after]

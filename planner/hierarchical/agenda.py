@@ -5,7 +5,7 @@ asleep   goals that are blocked; a goal wakes when a symbol that it waits for ch
 kept     achieved goals: later steps may violate them temporarily, but must restore them
 before   ordering constraints: a goal that would make another one unreachable waits for it (a full cup isn't moved)
 
-Where no goal is achieved in one step, the search effort is raised, rung by rung, on each level from the top. An attempt isn't
+Where no goal is achieved in one step, the search budget is raised, step by step, on each level from the top. An attempt isn't
 repeated unless a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
 """
 
@@ -17,9 +17,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.call import ADVISED, Call, settle
-from confab.planner.hierarchical.effort import FEW_STEPS, MOST_OPERATORS, ONE_STEP, WHOLE, WIDER, Effort, scopes
 from confab.planner.hierarchical.operators import Achiever
 from confab.planner.hierarchical.relevance import waits_for
+from confab.planner.hierarchical.search_budget import (
+    FEW_STEPS,
+    MOST_OPERATORS,
+    ONE_STEP,
+    WHOLE,
+    WIDER,
+    SearchBudget,
+    scopes,
+)
 from confab.planner.hierarchical.unsolvability import PAIRS, TEST, impossible, looked_at, proved
 from confab.planner.plan import Reason
 from confab.planner.transitions import Cell, arguments_of
@@ -72,10 +80,10 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
-        """Achieve the goals one after another, with more effort where goals get stuck; return whether all goals hold."""
+        """Achieve the goals one after another, with larger budgets where goals get stuck; return whether all goals hold."""
         call = self.call
         if not self.solvable:
-            call.space.doubt = self.doubt
+            call.space.dead_end_check = self.check_unsolvable
         self.begin()
         while self._open or self._asleep:
             mark = len(call.table.trail)
@@ -152,13 +160,13 @@ class Agenda:
             elif cell in asleep and call.met(cell):
                 opened(cell)
 
-    # ------------------------------------------------------------------------------------------------------- more effort
+    # ------------------------------------------------------------------------------------------------------- larger budgets
 
     def harder(self) -> bool:
-        """Achieve one of the sleeping goals by more effort, or on a lower level; return whether that succeeded."""
+        """Achieve one of the sleeping goals with a larger budget, or on a lower level; return whether that succeeded."""
         call = self.call
         if not self.solvable:
-            self._doubt()
+            self._check_cheaply()
         if call.advice is not None and self.singly(call.program.levels[0], ADVISED):
             return True
         for level in call.program.levels:
@@ -167,7 +175,7 @@ class Agenda:
                 return True
             if self.quickly:
                 continue
-            if self.restart(level) or self.singly(level, large) or self.together(level):
+            if self.restart(level) or self.singly(level, large) or self.all_goals(level):
                 return True
             if not self.solvable and self.allowed(level):
                 self._prove()
@@ -181,8 +189,8 @@ class Agenda:
         """Return whether steps of a level may be used for a goal."""
         return self.levels is None or level in self.levels or cell in self.call.unseen
 
-    def singly(self, level: int, *efforts: Effort) -> bool:
-        """Achieve one of the sleeping goals with the given efforts on a level; return whether that succeeded."""
+    def singly(self, level: int, *budgets: SearchBudget) -> bool:
+        """Achieve one of the sleeping goals with the given budgets on a level; return whether that succeeded."""
         call = self.call
         last = call.unseen.issuperset(self._asleep)
         for cell in self._ready():
@@ -190,12 +198,12 @@ class Agenda:
                 return True
             if not self.allowed(level, cell) or (cell in call.unseen and not last):
                 continue
-            if efforts == (ADVISED,) or (level, *efforts) in call.failed.get(cell, ()):
+            if budgets == (ADVISED,) or (level, *budgets) in call.failed.get(cell, ()):
                 continue
-            if call.achieve(level, cell, *efforts):
+            if call.achieve(level, cell, *budgets):
                 return True
-            call.failed.setdefault(cell, set()).add((level, *efforts))
-            if not efforts[0].steps and not self.solvable:
+            call.failed.setdefault(cell, set()).add((level, *budgets))
+            if not budgets[0].steps and not self.solvable:
                 self._prove()
         return False
 
@@ -245,19 +253,19 @@ class Agenda:
             return False
         self.forward = True
         steps, given_up, kept = call.steps, call.given_up, call.kept
-        call.redo(())
+        call.replace_steps(())
         call.steps, call.given_up = [], []
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         refiner.careful = True
-        if self.together(level):
+        if self.all_goals(level):
             self.begin()
             return True
         refiner.careful = False
-        call.redo(steps)
+        call.replace_steps(steps)
         call.steps, call.given_up, call.kept = steps, given_up, kept
         return False
 
-    def together(self, level: int) -> bool:
+    def all_goals(self, level: int) -> bool:
         """Achieve all goals together on a level from the present state, at most once per state; return whether that succeeded."""
         call = self.call
         if (
@@ -272,14 +280,14 @@ class Agenda:
 
     # ------------------------------------------------------------------------------------------------------------ proofs
 
-    def _doubt(self) -> None:
+    def _check_cheaply(self) -> None:
         """Raise `UnsolvableError` if a cheap test shows that there is no plan."""
         if not self._doubted:
             self._doubted = True
             if proof := impossible(self.call.problem, deadline=self.call.space.deadline):
                 raise proof
 
-    def doubt(self) -> None:
+    def check_unsolvable(self) -> None:
         """Raise `UnsolvableError` if there is no plan and the lowest level is small enough to examine its states cheaply."""
         call = self.call
         if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
@@ -322,7 +330,7 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
             call.space.check_time()
             for other in cells:
                 if cell is not other:
-                    pattern = cell[0], other[0], call.program.alike.sort.get(arguments_of(cell[1])[0], -1)
+                    pattern = cell[0], other[0], call.program.symmetry.class_of.get(arguments_of(cell[1])[0], -1)
                     if pattern not in known:
                         known[pattern] = rules_out(call, other, cell)
                     if known[pattern]:
@@ -350,7 +358,7 @@ def rules_out(call: Call, first: Cell, then: Cell) -> bool:
 
 def attainable(call: Call, level: int, condition: Condition, achiever: Achiever, env: Mapping[str, str | None]) -> bool:
     """Return whether an effect of a behaviour of the level could make an unmet condition hold."""
-    for situation, key, values in call.space.wants.of(achiever, condition, env, level):
+    for situation, key, values in call.space.subgoals.of(achiever, condition, env, level):
         for other in call.program.achievers.get((level, situation), ()):
             for value in values:
                 achieve = call.space.achieve[other.behavior, other.effect]

@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from confab.planner.hierarchical.effort import REFINING, Effort
 from confab.planner.hierarchical.methods import Ranked
 from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.refinement import Advice, RefinedStep, Refiner
+from confab.planner.hierarchical.search_budget import REFINING, SearchBudget
 from confab.planner.hierarchical.workspace import Workspace
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell, Table, arguments_of, key_of
@@ -20,8 +20,8 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
-ADVISED = Effort(steps=0, questions=0)
-"""Effort that follows advice and searches nothing."""
+ADVISED = SearchBudget(steps=0, questions=0)
+"""SearchBudget that follows advice and searches nothing."""
 
 
 @dataclass
@@ -79,7 +79,7 @@ class Call:
         self.given_up: list[str] = []
         self.aim: dict[Cell, str] = {}
         """The goals that were last aimed at."""
-        self.failed: dict[Cell, set[tuple[int | Effort, ...]]] = {}
+        self.failed: dict[Cell, set[tuple[int | SearchBudget, ...]]] = {}
         self.progressed = False
         self.redone = 0
         """Number of times that steps were applied from the initial state."""
@@ -93,18 +93,18 @@ class Call:
         self.advice = self.refiner.advice = advice
         self.refiner.methods.ranked = advice.ranked
 
-    def redo(self, steps: Sequence[RefinedStep]) -> None:
+    def replace_steps(self, steps: Sequence[RefinedStep]) -> None:
         """Replace the steps applied so far by other steps from the initial state; earlier marks of the trail become invalid."""
         self.redone += 1
         self.table.undo(0)
         for step in steps:
-            self.refiner.again(step)
+            self.refiner.replay_checked(step)
 
-    def achieve(self, level: int, cell: Cell, *efforts: Effort) -> bool:
+    def achieve(self, level: int, cell: Cell, *budgets: SearchBudget) -> bool:
         """Achieve one goal by refined steps of a level and keep the other goals; return whether that succeeded."""
-        return self.reach(level, {cell: self.goal[cell]}, *efforts)
+        return self.reach(level, {cell: self.goal[cell]}, *budgets)
 
-    def reach(self, level: int, targets: dict[Cell, str], *efforts: Effort) -> bool:
+    def reach(self, level: int, targets: dict[Cell, str], *budgets: SearchBudget) -> bool:
         """Apply refined steps of a level after which the targets and all achieved goals hold; return whether steps were found."""
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
@@ -117,10 +117,10 @@ class Call:
         if inside:
             above = self.space.refining(first)
             keep = lambda cell, value: kept.get(cell) or above(cell, value)  # noqa: E731
-        if efforts == (ADVISED,):
+        if budgets == (ADVISED,):
             steps: Sequence[RefinedStep] | None = self.advice.follow(level, targets, keep) if self.advice else None
         else:
-            steps = self.refiner.achieve(level, targets, keep, efforts)
+            steps = self.refiner.achieve(level, targets, keep, budgets)
         if steps is None:
             return False
         if inside and last is not None:

@@ -78,7 +78,7 @@ def _lasting(
     for number, step in steps.items():
         refiner.space.check_time()
         mark = len(table.trail)
-        refiner.again(step)
+        refiner.replay_checked(step)
         one = _Done(number, step, table.changes(mark), mark)
         done.append(one)
         for cell in one.changes[0]:
@@ -115,7 +115,7 @@ def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> b
     again: list[tuple[RefinedStep, int]] = []
     for one in between:
         begin = len(table.trail)
-        step = refiner.again(one.step)
+        step = refiner.replay_checked(one.step)
         if step is None:
             break
         again.append((step, begin))
@@ -126,7 +126,7 @@ def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> b
         return True
     table.undo(mark)
     for one in done[first:]:
-        refiner.again(one.step)
+        refiner.replay_checked(one.step)
     return False
 
 
@@ -156,7 +156,7 @@ class _Assembly:
         at_rest = not any(situations[cell[0]].level > step.level for cell in self.restless)
         if part or (at_rest and all(number in self.kept for number in range(begin, end))):
             gone = part and begin not in self.kept
-            again = None if gone else self.refiner.again(self.kept[begin] if part else step)
+            again = None if gone else self.refiner.replay_checked(self.kept[begin] if part else step)
             if again is not None or gone:
                 self.number = end
                 for situation, key, _ in table.trail[mark:]:

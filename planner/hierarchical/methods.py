@@ -52,15 +52,15 @@ class Methods:
 
     def ways(self, method: Method, individuals: tuple[str, ...]) -> Iterable[Roles]:
         """Return the ways to fill the roles of a method: the step's individuals, None for determined roles, other candidates."""
-        wants = self.space.wants
+        subgoals = self.space.subgoals
         choices: list[Sequence[str | None]] = []
         for role in method.open:
             if role.source is not None:
                 choices.append((None,))
             elif role.becomes is not None:
-                choices.append(wants.candidates(role.becomes, "", role.kind))
+                choices.append(subgoals.candidates(role.becomes, "", role.kind))
             else:
-                choices.append(wants.one_of_each(role.kind))
+                choices.append(subgoals.one_of_each(role.kind))
         ways: list[Roles] = [individuals + chosen for chosen in islice(product(*choices), CHOICES)]
         return self.ranked(method, ways) if len(ways) > 1 else ways
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
-from confab.planner.hierarchical.effort import Effort
+from confab.planner.hierarchical.search_budget import SearchBudget
 from confab.planner.hierarchical.workspace import Keep, Workspace
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.symbols import State
@@ -27,10 +27,10 @@ class Nogoods:
         self.space = space
         self.known: dict[object, list[list[Held]]] = {}
 
-    def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> bool:
-        """Return whether the search for such targets failed with this effort in a scope in the same state."""
+    def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> bool:
+        """Return whether the search for such targets failed with this budget in a scope in the same state."""
         roles = individuals(targets)
-        known = self.known.get(self.key(level, targets, roles, effort))
+        known = self.known.get(self.key(level, targets, roles, budget))
         if not known:
             return False
         now, names = self.space.table.now, list(roles)
@@ -46,8 +46,8 @@ class Nogoods:
 
         return any(all(map(holds, nogood)) for nogood in known)
 
-    def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort, around: State) -> None:
-        """Record that the search for targets failed with an effort, in a scope in the given state."""
+    def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget, around: State) -> None:
+        """Record that the search for targets failed with an budget, in a scope in the given state."""
         roles = individuals(targets)
 
         def lifted(term: str) -> Term:
@@ -59,16 +59,16 @@ class Nogoods:
             arguments = tuple([lifted(a) for a in symbol.arguments])
             held.append((symbol.situation, arguments, lifted(value), None if kept is None else lifted(kept)))
         held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # the most specific facts first
-        self.known.setdefault(self.key(level, targets, roles, effort), []).append(held)
+        self.known.setdefault(self.key(level, targets, roles, budget), []).append(held)
 
-    def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], effort: Effort) -> object:
+    def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], budget: SearchBudget) -> object:
         """Return the identity of targets, the same for symmetric individuals."""
         pattern = tuple(
             (situation, tuple([roles[a] for a in arguments_of(key)]), roles.get(value, value))
             for (situation, key), value in targets.items()
         )
-        alike = self.space.program.alike.sort
-        return level, effort, pattern, tuple([alike.get(individual, individual) for individual in roles])
+        symmetry = self.space.program.symmetry.class_of
+        return level, budget, pattern, tuple([symmetry.get(individual, individual) for individual in roles])
 
 
 def individuals(targets: Mapping[Cell, str]) -> dict[str, int]:

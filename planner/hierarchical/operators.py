@@ -19,7 +19,7 @@ from typing import TypeAlias
 from confab.planner.amount_transitions import comes_nearer
 from confab.planner.derived_facts import Rules
 from confab.planner.generated import identifier, tuple_written, written
-from confab.planner.hierarchical.symmetry import Alike, representatives
+from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
 from confab.planner.transitions import Forward, Key, Table, Writer, ready_condition
 from confab.reasoner.amounts import Amount, inside, terms_of
 from confab.reasoner.language import measures, mentions, terms, walk
@@ -94,7 +94,7 @@ class Program:
         self.named = named(problem)
         rules = [rule.behavior for its in self.domain.rules.values() for rule in its]
         self.measures = measures([*self.domain.behaviors.values(), *rules])
-        self.alike = Alike(problem, self.named)
+        self.symmetry = SymmetryClasses(problem, self.named)
         self.writer = Writer(problem)
         self.variables = self.writer.variables
         self.writer.constants |= {"pick": self._picked}
@@ -105,21 +105,21 @@ class Program:
         """Return the functions bound to a table; of more than `few` interchangeable candidates, they try one."""
         if self._rules is not None:
             self._rules.define(table)
-        return Bound(*self._bind(table.now, table.who, few))
+        return Bound(*self._bind(table.now, table.holders, few))
 
     def _picked(
         self,
         candidates: tuple[str, ...],
-        who: Mapping[str, Mapping[Key, None]],
+        holders: Mapping[str, Mapping[Key, None]],
         few: int,
         now: Mapping[str, Mapping[Key, str]],
     ) -> Sequence[str]:
         if len(candidates) <= few:
             return candidates
-        groups = self.alike.groups(candidates)
+        groups = self.symmetry.groups(candidates)
         if len(groups) == len(candidates):
             return candidates  # no two are interchangeable
-        return self.alike.unlike(candidates, representatives(groups, who, {}), now)
+        return self.symmetry.unlike(candidates, representatives(groups, holders, {}), now)
 
     def size(self, level: int) -> int:
         """Return an upper bound on the number of quantified behaviours of a level."""
@@ -273,8 +273,8 @@ class Program:
                 case ValueCondition(situation, (term,), value, False) if term.startswith("?") and term not in hard:
                     constant = self.writer.listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):
-                        who = f"{identifier('who', situation)}.get({written(value)}, ())"
-                        found.append((4.0, term, f"list({who})"))
+                        holders = f"{identifier('holders'', situation)}.get({written(value)}, ())"
+                        found.append((4.0, term, f"list({holders})"))
         for term in free:
             members = self.writer.constant(("members", kinds[term]), self.problem.classes.get(kinds[term], ()))
             found.append((len(self.problem.members(kinds[term])) + 1.0, term, self._pick(members, term, behavior)))
@@ -285,7 +285,7 @@ class Program:
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
         """Return an iterable expression of the candidates; of many, free ones of each symmetry class and state."""
-        taken = next((identifier("who", e.situation) for e in behavior.effects if e.value == term), "{}")
+        taken = next((identifier("holders", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:

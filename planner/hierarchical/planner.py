@@ -3,7 +3,7 @@
 ======  =========================================================================  =========================================
 word    meaning                                                                    module
 ======  =========================================================================  =========================================
-agenda  goals one after another, with more effort where goals get stuck            `confab.planner.hierarchical.agenda`
+agenda  goals one after another, with larger budgets where goals get stuck         `confab.planner.hierarchical.agenda`
 call    achieve a goal: its steps are applied to the table and kept                `confab.planner.hierarchical.call`
 chains  relevant achievers of a value, and a few relevant steps                    `confab.planner.hierarchical.chains`
 scope   a part of the world is cut out, grounded and searched without levels       `confab.planner.hierarchical.scope`

@@ -15,10 +15,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from confab.planner.hierarchical.chains import Chain
-from confab.planner.hierarchical.effort import REFINING, SMALL, Effort, scopes
 from confab.planner.hierarchical.methods import Methods, Roles
 from confab.planner.hierarchical.nogoods import Nogoods
 from confab.planner.hierarchical.scope import Scope
+from confab.planner.hierarchical.search_budget import REFINING, SMALL, SearchBudget, scopes
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.transitions import Cell, Change, Changes
 from confab.reasoner.amounts import meets
@@ -99,14 +99,14 @@ class Refiner:
             self.space.apply(changes)
             return RefinedStep(level, name, arguments, bindings, ())
         below = self.levels[self.levels.index(level) + 1]
-        efforts = (REFINING, SMALL) if self.hasty else (REFINING, *scopes(self.space.program.size(below)))
+        budgets = (REFINING, SMALL) if self.hasty else (REFINING, *scopes(self.space.program.size(below)))
         targets = self.targets(changes)
         self.at = (name, arguments) if level == self.levels[0] else self.at
         steps = None
         for careful in (True, False) if self.careful else (False,):
             if steps is None:
                 task = Task(name, arguments + bindings, careful)
-                steps = self.achieve(below, targets, self.space.refining(level, careful), efforts, task)
+                steps = self.achieve(below, targets, self.space.refining(level, careful), budgets, task)
         if steps is None:
             return None
         self.at = None if level == self.levels[0] else self.at
@@ -117,7 +117,7 @@ class Refiner:
         level: int,
         targets: Mapping[Cell, str],
         keep: Keep,
-        efforts: Sequence[Effort],
+        budgets: Sequence[SearchBudget],
         task: Task | None = None,
     ) -> Sequence[RefinedStep] | None:
         """Apply steps of a level after which the targets hold and the rest is kept; on failure return None, the table unchanged.
@@ -127,7 +127,7 @@ class Refiner:
         level : int
         targets : mapping of cell to value
         keep : function of a cell and its first value
-        efforts : sequence of Effort
+        budgets : sequence of SearchBudget
             Tried one after the other.
         task : Task, optional
             The step to be refined; without one the targets are goals.
@@ -135,7 +135,7 @@ class Refiner:
         here: object = None
         if task is not None:
             for method, roles in self.methods.of(task.behavior, task.individuals):
-                steps = self.replay(level, method, roles, targets, keep)
+                steps = self.replay_method(level, method, roles, targets, keep)
                 if steps is not None:
                     self.hits += 1
                     self.methods.prefer(method)
@@ -144,12 +144,12 @@ class Refiner:
             if here in self.found:
                 self.hits += 1
                 for step in self.found[here]:
-                    self.redo(step)
+                    self.replay(step)
                 return self.found[here]
             self.misses += 1
         found = self.advice.follow(level, targets, keep) if task is not None and self.advice is not None else None
-        for effort in efforts if found is None else ():
-            found = self.searched(level, targets, keep, effort)
+        for budget in budgets if found is None else ():
+            found = self.searched(level, targets, keep, budget)
             if found is not None:
                 break
         if found is not None and task is not None:
@@ -157,15 +157,17 @@ class Refiner:
             self.methods.learn(task.behavior, [(step.behavior, step.arguments) for step in found], task.individuals)
         return found
 
-    def searched(self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> list[RefinedStep] | None:
-        """Search steps of a level with one effort and apply them; on failure return None and leave the table unchanged.
+    def searched(
+        self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
+    ) -> list[RefinedStep] | None:
+        """Search steps of a level with one budget and apply them; on failure return None and leave the table unchanged.
 
         If steps leave a touched symbol with a wrong value, the search is repeated with that symbol as an additional target.
         """
-        if effort.steps == 0 and self.nogoods.apply(level, targets, keep, effort):
+        if budget.steps == 0 and self.nogoods.apply(level, targets, keep, budget):
             return None
         table, mark, wanted = self.table, len(self.table.trail), dict(targets)
-        search = first_search = begun(self.space, level, wanted, keep, effort)
+        search = first_search = begun(self.space, level, wanted, keep, budget)
         for _ in range(FEW_ATTEMPTS if self.hasty else ATTEMPTS):
             found = search.search()
             if found is None:
@@ -188,10 +190,10 @@ class Refiner:
                     break
                 wanted[wrong] = value
                 table.undo(mark)
-                search = begun(self.space, level, wanted, keep, effort)
+                search = begun(self.space, level, wanted, keep, budget)
             table.undo(mark)
         if isinstance(first_search, Scope):
-            self.nogoods.learn(level, targets, keep, effort, first_search.held)
+            self.nogoods.learn(level, targets, keep, budget, first_search.held)
         return None
 
     # ---------------------------------------------------------------------------------------------------- required values
@@ -218,7 +220,7 @@ class Refiner:
 
     # ------------------------------------------------------------------------------------------------------ replayed steps
 
-    def replay(
+    def replay_method(
         self, level: int, method: Method, roles: Roles, targets: Mapping[Cell, str], keep: Keep
     ) -> list[RefinedStep] | None:
         """Apply the steps of a method; return None, the table unchanged, if a step fails or a symbol gets a wrong value."""
@@ -239,15 +241,15 @@ class Refiner:
         """Return the steps done since a mark without needless ones: single steps, or pairs that undo each other."""
         for dropped in self._idle(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
-            if self._redone(rest, mark) and self.left_wrong(mark, targets, keep) is None:
+            if self._replayed(rest, mark) and self.left_wrong(mark, targets, keep) is None:
                 return self.pruned(rest, mark, targets, keep)
-        self._redone(steps, mark)
+        self._replayed(steps, mark)
         return steps
 
-    def _redone(self, steps: Sequence[RefinedStep], mark: int) -> bool:
+    def _replayed(self, steps: Sequence[RefinedStep], mark: int) -> bool:
         """Replace the steps applied since a mark by other steps; return whether all are applicable."""
         self.table.undo(mark)
-        return all(self.again(step) is not None for step in steps)
+        return all(self.replay_checked(step) is not None for step in steps)
 
     def _idle(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
         """Return single steps that change only symbols whose final values don't matter, and pairs that undo each other."""
@@ -255,14 +257,14 @@ class Refiner:
         changes: list[Changes] = []
         for step in steps:
             begin = len(self.table.trail)
-            self.again(step)
+            self.replay_checked(step)
             changes.append(self.table.changes(begin))
         alone = [
             {i} for i, (old, _) in enumerate(changes) if all(keep(cell, value) is None for cell, value in old.items())
         ]
         return alone + [{i, j} for j, (old, new) in enumerate(changes) for i in range(j) if changes[i] == (new, old)]
 
-    def again(self, step: RefinedStep) -> RefinedStep | None:
+    def replay_checked(self, step: RefinedStep) -> RefinedStep | None:
         """Replay a step with the same sub-steps and return it with its present bindings; None if it isn't applicable."""
         level, name, arguments, _, below = step
         done = self.space.forward[name](*arguments)
@@ -275,7 +277,7 @@ class Refiner:
         targets = self.targets(done[1])
         inner = []
         for child in below:
-            again = self.again(child)
+            again = self.replay_checked(child)
             if again is None:
                 self.table.undo(mark)
                 return None
@@ -285,18 +287,18 @@ class Refiner:
             return None
         return RefinedStep(level, name, arguments, done[0], tuple(inner))
 
-    def redo(self, step: RefinedStep) -> bool:
+    def replay(self, step: RefinedStep) -> bool:
         """Apply the primitives of a step that was applied in this same state before; return whether all were applicable."""
         if step.steps:
-            return all(self.redo(child) for child in step.steps)
+            return all(self.replay(child) for child in step.steps)
         done = self.space.forward[step.behavior](*step.arguments)
         if done is not None:
             self.space.apply(done[1])
         return done is not None
 
 
-def begun(space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> Chain | Scope:
-    """Return the search that an effort specifies."""
-    if effort.steps:
-        return Chain(space, level, targets, keep, effort.steps)
-    return Scope(space, level, targets, keep, effort)
+def begun(space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> Chain | Scope:
+    """Return the search for a budget."""
+    if budget.steps:
+        return Chain(space, level, targets, keep, budget.steps)
+    return Scope(space, level, targets, keep, budget)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
 from confab.planner.hierarchical.operators import Achiever
-from confab.planner.hierarchical.subgoals import Env, Want
+from confab.planner.hierarchical.subgoals import Env, Subgoal
 from confab.planner.hierarchical.workspace import Ground, Workspace
 from confab.planner.transitions import Cell, Key, arguments_of
 from confab.reasoner.symbols import TRUE
@@ -49,19 +49,19 @@ def chains(
     Individuals on the way are added to `met`, values to `asked`.
     """
     asked = set() if asked is None else asked
-    space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
-    wants: Iterable[Want] = [(*cell, (value,))]
+    space.subgoals.concern(frozenset((*arguments_of(cell[1]), value)))
+    subgoals: Iterable[Subgoal] = [(*cell, (value,))]
     if cell[0] in space.program.rules:
-        wants = space.wants.defining(*cell, value == TRUE, level)
+        subgoals = space.subgoals.defining(*cell, value == TRUE, level)
     blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
     length = 0
     while (blocked or not length) and len(asked) < questions:
         length += 1
         yield length, None
         if blocked:  # calculated late: a caller that needs no longer chains has stopped
-            wants = _lacking(space, level, blocked)
+            subgoals = _lacking(space, level, blocked)
         blocked = []
-        for situation, key, values in wants:
+        for situation, key, values in subgoals:
             for wanted in values:
                 if (question := (situation, key, wanted)) in asked:
                     continue
@@ -79,26 +79,26 @@ def chains(
                             yield length, (achiever.behavior, arguments)
 
 
-def _lacking(space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]) -> list[Want]:
+def _lacking(space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]) -> list[Subgoal]:
     """Return the subgoals of achievers that aren't applicable."""
-    found: list[Want] = []
+    found: list[Subgoal] = []
     for achiever, unmet, env in blocked:
         space.check_time()
         for number in unmet:
-            found += space.wants.towards(achiever, number, env, level)
+            found += space.subgoals.towards(achiever, number, env, level)
     return found
 
 
 def waits_for(space: Workspace, level: int, cell: Cell, value: str) -> list[Cell]:
     """Return the symbols whose change could make a value reachable in one step."""
     found: dict[Cell, None] = {}
-    space.wants.concern(frozenset((*arguments_of(cell[1]), value)))
+    space.subgoals.concern(frozenset((*arguments_of(cell[1]), value)))
     if cell[0] in space.program.rules:
-        return [want[:2] for want in space.wants.defining(*cell, value == TRUE, level)]
+        return [subgoal[:2] for subgoal in space.subgoals.defining(*cell, value == TRUE, level)]
     for achiever in space.program.achievers.get((level, cell[0]), ()):
         for _, unmet, env in space.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
             space.look()
             for number in unmet:
-                for situation, key, _ in space.wants.towards(achiever, number, env, level):
+                for situation, key, _ in space.subgoals.towards(achiever, number, env, level):
                     found[situation, key] = None
     return list(found)

@@ -20,8 +20,8 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.effort import Effort
 from confab.planner.hierarchical.relevance import chains
+from confab.planner.hierarchical.search_budget import SearchBudget
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.plan import Counts, Limits, Reason, Status, UngroundableError
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -55,21 +55,23 @@ isn't grounded if the budget would allow fewer than a fifth of that number of st
 class Scope:
     """A scope on one level in the present state: a grounded task, searched again whenever a step can't be refined."""
 
-    def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> None:
-        self.space, self.level, self.effort = space, level, effort
+    def __init__(
+        self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
+    ) -> None:
+        self.space, self.level, self.budget = space, level, budget
         self.plan: tuple[int, ...] = ()
         self.task: Task | None = None
         self.held: State = {}
         with suppress(UngroundableError, OutOfTimeError, MemoryError):
-            task = self._grounded(targets, keep, effort)
+            task = self._grounded(targets, keep, budget)
             self.task = None if isinstance(task, Reason) else task
         space.check_time()
 
-    def _grounded(self, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> Task | Reason:
+    def _grounded(self, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> Task | Reason:
         from confab.planner.grounded.grounding import ground
 
         space, level = self.space, self.level
-        inside = focus(space, level, targets, effort)
+        inside = focus(space, level, targets, budget)
         small = problem_of(space, level, inside, with_frozen(space, level, inside) if inside else frozenset())
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
@@ -81,7 +83,7 @@ class Scope:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
         self.held = small.initial
-        return ground(small, level, goal=goal, most=5 * effort.work // MAKING, deadline=space.deadline, apart=True)
+        return ground(small, level, goal=goal, most=5 * budget.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `bar` excludes one of them."""
@@ -91,7 +93,7 @@ class Scope:
             self.space.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
-        limits, most = Limits(self.effort.work // LEAST), BITS * self.effort.work
+        limits, most = Limits(self.budget.work // LEAST), BITS * self.budget.work
         found = search(self.task, limits, self.space.deadline, most_work=most)
         work = max(LEAST * found.counts.expanded, found.work // BITS)
         self.space.spend(self.level, found.counts, MAKING * size + work)
@@ -110,28 +112,28 @@ class Scope:
         self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 
 
-def focus(space: Workspace, level: int, targets: Mapping[Cell, str], effort: Effort) -> set[str] | None:
+def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: SearchBudget) -> set[str] | None:
     """Return the individuals relevant to reaching the targets; None stands for all."""
-    if effort.questions is None:
+    if budget.questions is None:
         return None
     program, table = space.program, space.table
     met: dict[str, None] = dict.fromkeys(program.named)
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
     for cell, value in targets.items():
-        for _ in chains(space, level, cell, value, effort.questions, met):
+        for _ in chains(space, level, cell, value, budget.questions, met):
             pass
     for members in program.problem.classes.values():
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
-    met.update(dict.fromkeys(space.wants.spare(met, level, effort.spares)))
+    met.update(dict.fromkeys(space.subgoals.spare(met, level, budget.spares)))
     for individual in tuple(met):  # their values, and holders of them where these are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
                 continue
             if individual in cells:
                 met[cells[individual]] = None
-            holders = table.who[situation].get(individual, ())
+            holders = table.holders[situation].get(individual, ())
             if len(holders) <= FEW:
                 for key in holders:
                     met.update(dict.fromkeys(arguments_of(key)))
@@ -189,7 +191,7 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
         met: set[str] = set()
         for condition, kind in ((c, witness.kind) for witness in witnesses for c in witness.conditions):
             if isinstance(condition, ValueCondition):
-                holders = table.who[condition.situation]
+                holders = table.holders[condition.situation]
                 keys = [key for one in fresh for key in tuple(holders.get(one, ()))[: FEW + 1]]
                 met.update(argument for key in keys for argument in arguments_of(key))
             elif isinstance(condition, RelationCondition):

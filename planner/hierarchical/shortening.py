@@ -34,7 +34,7 @@ SHUFFLES = 3
 LEAST_EFFORT = 400_000
 """Minimum effort assumed for a first plan, in states times operators: length of plans found at once, against CPU time."""
 DOING = 20
-"""Effort of replaying a primitive, in states times operators."""
+"""SearchBudget of replaying a primitive, in states times operators."""
 MANY = 1.25
 """Minimum number of steps per goal from which on other orders are tried: plan length against CPU time."""
 KEPT = 1.5
@@ -88,7 +88,7 @@ def puts_aside(call: Call) -> bool:
     for level, name, arguments, bindings, below in call.steps:
         call.space.check_time()
         mark = len(table.trail)
-        call.refiner.redo(RefinedStep(level, name, arguments, bindings, below))
+        call.refiner.replay(RefinedStep(level, name, arguments, bindings, below))
         touched = {
             (situation, key)
             for situation, key, _ in table.trail[mark:]

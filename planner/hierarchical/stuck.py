@@ -44,7 +44,7 @@ def lacking(call: Call) -> Iterator[str]:
         Limits().end(),
         space.looked + LOOKED,
     )  # the limits of the search may be reached
-    call.redo(call.steps)
+    call.replace_steps(call.steps)
     told: dict[Cell, str] = {}
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:
         asked: Asked = set()

@@ -36,14 +36,14 @@ from confab.reasoner.symbols import (
     Witness,
 )
 
-Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
+Subgoal: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
 """Situation type, key, and alternative values."""
 DEEPEST = 8
 """Maximum depth of nested rules examined for missing facts."""
 Env: TypeAlias = "Mapping[str, str | None]"
 
 
-class Wants:
+class Subgoals:
     """Turns unmet conditions into subgoals, for one table and goal.
 
     Parameters
@@ -66,7 +66,7 @@ class Wants:
         self._entered: dict[tuple[str, Key, bool], int] | None = None  # defined situation type, and depth of nesting
         self._depth = 0
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
-        self._fresh: dict[tuple[object, ...], list[Want]] = {}
+        self._fresh: dict[tuple[object, ...], list[Subgoal]] = {}
         self._free: dict[tuple[str, str], list[str]] = {}
         self._tests: dict[tuple[int, ...], tuple[Callable[..., Any], Sequence[str]]] = {}
         self._worths: dict[int, Callable[..., Any]] = {}
@@ -77,7 +77,7 @@ class Wants:
         for (situation, _), value in goal.items():
             self.wanted.setdefault(situation, {})[value] = None
 
-    def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Want]:
+    def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Subgoal]:
         """Return alternative subgoals for the soft condition `number`, as `of` does; cached until the table changes."""
         self._forget()
         scope = self._scopes.get((id(achiever), number))
@@ -104,7 +104,7 @@ class Wants:
                 found.update(dict.fromkeys(a for a in achiever.determined[term][1] if a.startswith("?")))
         return tuple(found)
 
-    def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
+    def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Subgoal]:
         """Yield alternative subgoals, each of which may contribute to an achiever's unmet condition."""
         match condition:
             case ValueCondition(situation, arguments, value, negated) if situation in self.program.rules:
@@ -145,7 +145,7 @@ class Wants:
                 pass
         yield from self._redetermined(achiever, condition, env, level)
 
-    def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Want]:
+    def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Subgoal]:
         """Yield the missing facts of the individuals that could satisfy a witness."""
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
@@ -158,7 +158,7 @@ class Wants:
             for c in unmet:
                 yield from self.of(achiever, c, {**env, witness.variable: individual}, level)
 
-    def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
+    def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Subgoal]:
         """Return alternative subgoals that may make a defined situation true, or false."""
         if self._entered is not None and situation in self._circular:  # the result depends on the rules entered before
             return list(self._defining(situation, key, wanted, level))
@@ -173,7 +173,7 @@ class Wants:
                 self._entered, self._depth = outside
         return found
 
-    def _defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:
+    def _defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Subgoal]:
         cell = situation, key, wanted
         assert self._entered is not None
         if self._entered.get(cell, DEEPEST) <= self._depth:
@@ -214,7 +214,7 @@ class Wants:
             return found in self.program.members.get(rule.kinds[condition.value], ())
         return self.holds(rule, condition, env)
 
-    def _amounts(self, condition: Comparison, env: Env) -> Iterator[Want]:
+    def _amounts(self, condition: Comparison, env: Env) -> Iterator[Subgoal]:
         """Yield for each amount in a comparison the value that would satisfy it if the other amounts stayed the same."""
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
@@ -243,11 +243,11 @@ class Wants:
             difference = Calculation("-", condition.left, condition.right)
             text = amount(difference, self.program.problem.relations, writer.constant)
             bind = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
-            function = self._worths[id(condition)] = bind(self.table.now, self.table.who)
+            function = self._worths[id(condition)] = bind(self.table.now, self.table.holders)
         found: Number = function(*[env.get(name) for name in names])
         return found
 
-    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
+    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Subgoal]:
         """Yield subgoals for other values of the symbols that determine a condition's variables.
 
         With another value a witness only has to be possible (that room has a door, which is shut): its unmet conditions become
@@ -313,9 +313,9 @@ class Wants:
         static, compares, others, _ = self._about(condition)
         if not static:
             return self.holds(achiever, condition, {**env, term: value})
-        sort = {} if compares else self.program.alike.sort
+        classes = {} if compares else self.program.symmetry.class_of
         bound = [value if other == term else env.get(other) for other in others]
-        key = id(condition), *[None if who is None else sort.get(who, who) for who in bound]
+        key = id(condition), *[None if one is None else classes.get(one, one) for one in bound]
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self.holds(achiever, condition, {**env, term: value})
@@ -329,13 +329,13 @@ class Wants:
         self._forget()
         found = self._free.get((situation, kind))
         if found is None:
-            groups, wanted, who = (
-                self.program.alike.groups(members),
+            groups, wanted, holders = (
+                self.program.symmetry.groups(members),
                 self.wanted.get(situation, {}),
-                self.table.who[situation],
+                self.table.holders[situation],
             )
 
-            found = representatives(groups, who, wanted, self._cursors, lambda value: self.burden(situation, value))
+            found = representatives(groups, holders, wanted, self._cursors, lambda value: self.burden(situation, value))
             self._free[situation, kind] = found
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
@@ -344,7 +344,7 @@ class Wants:
 
     def burden(self, situation: str, value: str) -> int:
         """Return the availability of a value: least for values that no object holds, most for values held as a goal requires."""
-        keys = self.table.who[situation].get(value, ())
+        keys = self.table.holders[situation].get(value, ())
         return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
 
     def spare(self, beside: Collection[str], level: int, number: int) -> Iterator[str]:
@@ -353,7 +353,7 @@ class Wants:
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
                 continue
-            for group in self.program.alike.groups(members):
+            for group in self.program.symmetry.groups(members):
                 if not set(group).isdisjoint(beside):
                     others = (value for value in group if value not in beside)
                     yield from nsmallest(number, others, key=lambda value: self.burden(situation.name, value))
@@ -370,12 +370,12 @@ class Wants:
 
         Of a symmetry class of an individual in `beside`, one more is returned, since a different individual may be needed.
         """
-        members, alike = self.program.problem.classes.get(kind, ()), self.program.alike
+        members, symmetry = self.program.problem.classes.get(kind, ()), self.program.symmetry
         if len(members) <= FEW:
             return list(members)
-        found = alike.unlike(members, (), self.table.now)
-        for sort in sorted({alike.sort.get(one, -1) for one in beside if one in found}):
-            found += islice((one for one in alike.members[sort] if one not in beside and one not in found), 1)
+        found = symmetry.unlike(members, (), self.table.now)
+        for number in sorted({symmetry.class_of.get(one, -1) for one in beside if one in found}):
+            found += islice((one for one in symmetry.members[number] if one not in beside and one not in found), 1)
         return found
 
     def _boolean(self, situation: str) -> bool:
@@ -412,5 +412,5 @@ class Wants:
             else:
                 text = writer.expression(condition, bound, achiever.kinds, achiever.behavior)
             function = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
-            known = self._tests[key] = function(self.table.now, self.table.who), names
+            known = self._tests[key] = function(self.table.now, self.table.holders), names
         return known

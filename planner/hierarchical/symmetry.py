@@ -12,7 +12,7 @@ ENDS = 8
 """Number of individuals at each end of a large class that are examined for a different state."""
 
 
-class Alike:
+class SymmetryClasses:
     """The symmetry classes of a problem's individuals.
 
     Two individuals are symmetric if they belong to the same classes, exist from the same level on, and exchanging them leaves
@@ -41,9 +41,11 @@ class Alike:
         for individual in named:
             marks.setdefault(individual, []).append(individual)
         numbers: dict[tuple[object, ...], int] = {}
-        self.sort = {who: numbers.setdefault(tuple(what), len(numbers)) for who, what in marks.items()}
+        self.class_of = {
+            individual: numbers.setdefault(tuple(what), len(numbers)) for individual, what in marks.items()
+        }
         self.members: dict[int, list[str]] = {}
-        for individual, number in self.sort.items():
+        for individual, number in self.class_of.items():
             self.members.setdefault(number, []).append(individual)
         self._groups: dict[tuple[str, ...], list[list[str]]] = {}
         self._named = frozenset(named)
@@ -55,10 +57,10 @@ class Alike:
         """Return `members` grouped by symmetry class, in their order."""
         found = self._groups.get(members)
         if found is None:
-            by_sort: dict[int, list[str]] = {}
+            by_class: dict[int, list[str]] = {}
             for member in members:
-                by_sort.setdefault(self.sort.get(member, -1), []).append(member)
-            found = self._groups[members] = list(by_sort.values())
+                by_class.setdefault(self.class_of.get(member, -1), []).append(member)
+            found = self._groups[members] = list(by_class.values())
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
@@ -67,14 +69,14 @@ class Alike:
         Of a large group only the first and the last few are examined, since values are used up from one end.
         """
         found = list(known)
-        sorts = {self.sort.get(one) for one in known}
+        classes = {self.class_of.get(one) for one in known}
         for group in self.groups(members):
-            sort = self.sort.get(group[0])
+            number = self.class_of.get(group[0])
             if len(group) == 1:
-                found += group if sort not in sorts else ()
+                found += group if number not in classes else ()
                 continue
             cells = [its for name, its in now.items() if group[0] in self._whose.get(name, ())]
-            seen = {self._state(one, cells) for one in known if self.sort.get(one) == sort}
+            seen = {self._state(one, cells) for one in known if self.class_of.get(one) == number}
             if seen and not cells:
                 continue
             for one in group if len(group) <= 2 * ENDS else (*group[:ENDS], *group[-ENDS:]):
@@ -92,7 +94,7 @@ class Alike:
 
 def representatives(
     groups: Sequence[Sequence[str]],
-    who: Mapping[str, Mapping[Key, None]],
+    holders: Mapping[str, Mapping[Key, None]],
     wanted: Mapping[str, object],
     cursors: dict[int, int] | None = None,
     burden: Callable[[str], int] = lambda value: 0,
@@ -112,12 +114,12 @@ def representatives(
         start = cursors.get(id(group), 0) if cursors is not None else 0
         for position in chain(range(start, len(group)), range(start)):
             value = group[position]
-            if not who.get(value) and value not in wanted:
+            if not holders.get(value) and value not in wanted:
                 found.append(value)
                 if cursors is not None:
                     cursors[id(group)] = position
                 break
         else:
-            free = [value for value in group if not who.get(value)][:4]
+            free = [value for value in group if not holders.get(value)][:4]
             found.extend(free or [min(group, key=burden)])
     return found

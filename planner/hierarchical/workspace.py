@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import TypeAlias
 
 from confab.planner.hierarchical.operators import Program
-from confab.planner.hierarchical.subgoals import Wants
+from confab.planner.hierarchical.subgoals import Subgoals
 from confab.planner.plan import Counts, Limits
 from confab.planner.transitions import Cell, Change, Table, arguments_of
 from confab.reasoner.limits import LimitError
@@ -30,7 +30,7 @@ EXPANSION = 100
 """The cost of an expansion in the unit of the budget."""
 
 
-def trusting() -> None:
+def no_check() -> None:
     """Run no test for dead ends."""
 
 
@@ -50,7 +50,7 @@ class Workspace:
         Maximum number of expansions of all searches together; more raise `LimitError`.
     most_work : float
         Maximum work in scopes, in states times operators; more raises `LimitError`.
-    doubt : function
+    dead_end_check : function
         Called each time that the effort has doubled, to test whether the problem is unsolvable.
     """
 
@@ -60,18 +60,18 @@ class Workspace:
     deadline: float | None = None
     most: int = 200_000
     most_work: float = math.inf
-    doubt: Callable[[], None] = trusting
+    dead_end_check: Callable[[], None] = no_check
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.expanded = self.worked = self.doubted = self.looked = 0
+        self.expanded = self.worked = self.checked_at = self.looked = 0
         self.most_looked = EXPANSION * self.most
         """Maximum number of achievers that are examined, inapplicable ones included."""
         if self.deadline is None:
             self.deadline = Limits().end()
         bound = self.program.bind(self.table)
         self.forward, self.achieve = bound.forward, bound.achieve
-        self.wants = Wants(self.program, self.table, self.goal)
+        self.subgoals = Subgoals(self.program, self.table, self.goal)
         self.counts = {level: Counts() for level in self.program.levels}
         self.defined = [cell for cell in self.goal if cell[0] in self.program.rules]
         self.rest = {s.name: s.rest for s in self.program.domain.situations.values() if s.rest is not None}
@@ -153,9 +153,9 @@ class Workspace:
     def _limited(self) -> None:
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
-        if self.effort > self.doubted:
-            self.doubted = 2 * self.effort
-            self.doubt()
+        if self.effort > self.checked_at:
+            self.checked_at = 2 * self.effort
+            self.dead_end_check()
         self.check_time()
 
     def check_time(self) -> None:

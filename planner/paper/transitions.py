@@ -50,7 +50,7 @@ class Model:
         bind = self.writer.function(["forward, prices = {}, {}", *lines], "(forward, prices)")
         self.forward: Mapping[str, Forward]
         self.prices: Mapping[str, Callable[..., Number]]
-        self.forward, self.prices = bind(self.table.now, self.table.who)
+        self.forward, self.prices = bind(self.table.now, self.table.holders)
 
     def values(self, state: State) -> Values:
         """Return a state as a tuple of values."""

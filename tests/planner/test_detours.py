@@ -64,5 +64,5 @@ def test_what_comes_to_nothing_is_left_out_from_the_inside_out(items: int) -> No
     left = without_detours(call.refiner, call.steps, 2)
     assert call.table.state() == problem.initial
     assert [step.behavior for step in left] == ["UNLOCK", "OPEN", *["TAKE"] * items, "SHUT", "LOCK"]
-    call.redo(left)
+    call.replace_steps(left)
     assert call.table.state() == end

@@ -1,4 +1,4 @@
-"""Search efforts: a few relevant steps first, then scopes, each of which costs about as much as all efforts before it."""
+"""Search budgets: a few relevant steps first, then scopes, each of which costs about as much as all searches before it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MOST_OPERATORS = 3_000
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchBudget:
     """The limits of one search for steps towards some targets.
 
     Attributes
@@ -32,12 +32,12 @@ class Effort:
     work: int = 200_000
 
 
-ONE_STEP, FEW_STEPS, REFINING = Effort(steps=1), Effort(steps=3), Effort(steps=4)
+ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), SearchBudget(steps=4)
 """One step; maximum number of relevant steps towards goals, and in refinements: CPU time against that of scopes."""
-SMALL, WIDER = Effort(questions=10, spares=0, work=50_000), Effort(questions=20)
-WIDE, WHOLE = Effort(questions=160, spares=4, work=MUCH), Effort(work=MUCH)
+SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)
+WIDE, WHOLE = SearchBudget(questions=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
 
 
-def scopes(size: int) -> tuple[Effort, ...]:
-    """Return the efforts that search scopes of a level with `size` quantified behaviours, cheapest first."""
+def scopes(size: int) -> tuple[SearchBudget, ...]:
+    """Return the budgets that search scopes of a level with `size` quantified behaviours, cheapest first."""
     return (SMALL, WIDER, WHOLE if size <= MOST_OPERATORS else WIDE)

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from confab.planner.hierarchical.call import Call, Compiled
-from confab.planner.hierarchical.effort import WIDER
 from confab.planner.hierarchical.operators import Achiever, Program
 from confab.planner.hierarchical.planner import plan
 from confab.planner.hierarchical.relevance import relevant
 from confab.planner.hierarchical.scope import focus
-from confab.planner.hierarchical.subgoals import Env, Wants
+from confab.planner.hierarchical.search_budget import WIDER
+from confab.planner.hierarchical.subgoals import Env, Subgoals
 from confab.planner.plan import Limits, Status
 from confab.planner.transitions import Cell
 from confab.reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
@@ -24,7 +24,7 @@ CASES = [("served", family("served", 6)), ("full", family("full", 6)), ("handove
 CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_006)] + [("rooms", rooms(6, 1))]
 
 
-def ask_anew(wants: Wants, monkeypatch: pytest.MonkeyPatch) -> None:
+def ask_anew(wants: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let nothing be kept of what was asked before."""
 
     def would_hold(achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
@@ -42,7 +42,7 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
     program = Program(problem)
     for level in problem.domain.levels:
         kept, fresh = (Call(problem, Compiled(program), None, 100_000) for _ in range(2))
-        ask_anew(fresh.space.wants, monkeypatch)
+        ask_anew(fresh.space.subgoals, monkeypatch)
         for _ in range(12):
             for (at, situation), achievers in program.achievers.items():
                 cells = [cell for cell in kept.goal.items() if cell[0][0] == situation]
@@ -52,9 +52,9 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
                         achieve = kept.space.achieve[achiever.behavior, achiever.effect]
                         for _, unmet, env in achieve(*arguments, value):
                             for number in unmet:
-                                anew = list(fresh.space.wants.of(achiever, achiever.soft[number], env, level))
-                                assert list(kept.space.wants.towards(achiever, number, env, level)) == anew
-                                assert list(kept.space.wants.towards(achiever, number, env, level)) == anew
+                                anew = list(fresh.space.subgoals.of(achiever, achiever.soft[number], env, level))
+                                assert list(kept.space.subgoals.towards(achiever, number, env, level)) == anew
+                                assert list(kept.space.subgoals.towards(achiever, number, env, level)) == anew
                                 asked += 1
             off = {cell: value for cell, value in kept.goal.items() if not kept.met(cell)}
             found = list(relevant(kept.space, level, off, 3))
