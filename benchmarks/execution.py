@@ -21,7 +21,7 @@ import confab
 from confab.execution import execute
 from confab.gantt import save_gantt
 from confab.labels import labels_of
-from confab.planner.acting.episode import Change, End, Episode, Intervention
+from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
 from confab.planner.acting.executive import RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.repair import difference, repair_or_replan, replan
@@ -93,29 +93,29 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
     standing = [s for s in problem.goal if s.situation == where.name and s in state]
     one, place = Symbol(where.name, (random.choice(movable),)), random.choice(places)
     if kind == "move":
-        return Intervention(Change.WORLD, (Fact(one, place),))
+        return Intervention(InterventionKind.WORLD, (Fact(one, place),))
     if kind == "remove":
-        return Intervention(Change.REMOVE, individual=one.arguments[0])
+        return Intervention(InterventionKind.REMOVE, individual=one.arguments[0])
     if kind == "add":
         sort = min(
             (k for k, m in problem.classes.items() if one.arguments[0] in m), key=lambda k: len(problem.classes[k])
         )
         facts = (Fact(Symbol(where.name, ("newcomer",)), place), Fact(Symbol(content.name, ("newcomer",)), empty))
-        return Intervention(Change.ADD, facts, individual="newcomer", kind=sort)
+        return Intervention(InterventionKind.ADD, facts, individual="newcomer", kind=sort)
     if kind == "empty":
-        return Intervention(Change.WORLD, (Fact(random.choice(receivers), empty),))
+        return Intervention(InterventionKind.WORLD, (Fact(random.choice(receivers), empty),))
     if kind == "fill":
-        return Intervention(Change.WORLD, (Fact(random.choice(receivers), random.choice(drinks)),))
+        return Intervention(InterventionKind.WORLD, (Fact(random.choice(receivers), random.choice(drinks)),))
     if kind == "goal changed":
-        return Intervention(Change.GOAL, (Fact(random.choice(standing), place),))
+        return Intervention(InterventionKind.GOAL, (Fact(random.choice(standing), place),))
     if kind == "goal added":
         free = [s for o in movable if (s := Symbol(where.name, (o,))) not in problem.goal]
         return (
-            Intervention(Change.GOAL, (Fact(random.choice(free), place),))
+            Intervention(InterventionKind.GOAL, (Fact(random.choice(free), place),))
             if free
-            else (Intervention(Change.GOAL, (Fact(random.choice(receivers), random.choice(drinks)),)))
+            else (Intervention(InterventionKind.GOAL, (Fact(random.choice(receivers), random.choice(drinks)),)))
         )
-    return Intervention(Change.DROP_GOAL, symbol=random.choice(sorted(problem.goal)))
+    return Intervention(InterventionKind.DROP_GOAL, symbol=random.choice(sorted(problem.goal)))
 
 
 def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
@@ -271,11 +271,11 @@ def _repair_row(objects: int, count: int) -> None:
 def after_intervention(before: Problem, intervention: Intervention) -> Problem:
     """Return the situation and the goal after an intervention; goals about removed objects are dropped."""
     goal = dict(before.goal)
-    if intervention.change is Change.GOAL:
+    if intervention.change is InterventionKind.GOAL:
         goal.update((fact.symbol, fact.value) for fact in intervention.facts)
-    elif intervention.change is Change.DROP_GOAL and intervention.symbol is not None:
+    elif intervention.change is InterventionKind.DROP_GOAL and intervention.symbol is not None:
         del goal[intervention.symbol]
-    elif intervention.change is Change.REMOVE:
+    elif intervention.change is InterventionKind.REMOVE:
         goal = {s: v for s, v in goal.items() if intervention.individual not in s.arguments}
     else:
         wider = with_individual(before, intervention.individual, intervention.kind) if intervention.kind else before

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
-from confab.planner.acting.episode import Change, End, Episode, Intervention
+from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
 from confab.planner.acting.executive import Event, RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
@@ -96,13 +96,13 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     if verb == "goal":
         if not words:
             raise KnowledgeError(f"'{text}': wanted 'goal object SITUATION value'")
-        return Intervention(Change.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
+        return Intervention(InterventionKind.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
     if verb == "drop-goal":
-        return Intervention(Change.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
+        return Intervention(InterventionKind.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
     if verb in ("remove", "knock"):
         if len(words) != 1:
             raise KnowledgeError(f"'{text}': wanted '{verb} OBJECT', one object; got {len(words)}")
-        return Intervention(Change(verb), individual=_placed(problem, words[0], text, verb), **when)
+        return Intervention(InterventionKind(verb), individual=_placed(problem, words[0], text, verb), **when)
     if verb == "push":
         return _push(problem, words, text, when)
     if verb == "box":
@@ -112,7 +112,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     fact = Fact(*parse_fact(problem, match[3]))
     with possible():
         refuse_impossible(problem, {}, {fact.symbol: fact.value}, f"'{text}'")
-    return Intervention(Change.WORLD, (fact,), **when)
+    return Intervention(InterventionKind.WORLD, (fact,), **when)
 
 
 def _position(text: str) -> int:
@@ -164,7 +164,9 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
         numbers = ()
     if len(numbers) != 2 or not all(map(math.isfinite, numbers)) or not any(numbers):
         raise KnowledgeError(f"'{text}': wanted 'push OBJECT X Y', centimetres away from the robot and to its left")
-    return Intervention(Change.PUSH, individual=_placed(problem, individual, text, "push"), numbers=numbers, **when)
+    return Intervention(
+        InterventionKind.PUSH, individual=_placed(problem, individual, text, "push"), numbers=numbers, **when
+    )
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
@@ -186,7 +188,9 @@ def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
         number += 1
         name = f"box{number}"
     fact = Fact(Symbol(wheres[0].name, (name,)), place)
-    return Intervention(Change.BOX, (fact,), individual=name, kind=wheres[0].arguments[0], numbers=numbers, **when)
+    return Intervention(
+        InterventionKind.BOX, (fact,), individual=name, kind=wheres[0].arguments[0], numbers=numbers, **when
+    )
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
@@ -207,7 +211,7 @@ def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
     ]
     with possible():
         refuse_impossible(wider, {}, {fact.symbol: fact.value for fact in facts}, f"'{text}'")
-    return Intervention(Change.ADD, tuple(facts), individual=individual, kind=kind, **when)
+    return Intervention(InterventionKind.ADD, tuple(facts), individual=individual, kind=kind, **when)
 
 
 def episode_json(episode: Episode) -> dict[str, Any]:

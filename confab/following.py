@@ -8,8 +8,8 @@ from itertools import product
 
 import pyoxigraph as ox
 
-from confab.planner.derived_facts import Rules
-from confab.planner.transitions import Table, Writer, key_of
+from confab.planner.derived_facts import CompiledRules
+from confab.planner.transitions import PythonWriter, Table, key_of
 from confab.reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
 from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
@@ -57,7 +57,7 @@ def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol
     if not situations:
         return
     table = Table(problem.domain.situations, problem.initial)
-    Rules(Writer(problem)).define(table)
+    CompiledRules(PythonWriter(problem)).define(table)
     for name in situations:
         for arguments in product(
             *(problem.classes.get(kind, ()) for kind in problem.domain.situations[name].arguments)

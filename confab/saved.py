@@ -12,12 +12,12 @@ from confab.interchange import step_from
 from confab.known import Known
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
-    Change,
     End,
     Episode,
     ExecutedPrimitive,
     Failure,
     Intervention,
+    InterventionKind,
     Replan,
     Seen,
     Surprise,
@@ -175,7 +175,7 @@ def _interventions(
     for text, at in (*texts, *((text, None) for text in data["never_came"])):
         intervention = parse_intervention(problem, text)
         found.append((intervention, at))
-        if intervention.change is Change.ADD:
+        if intervention.change is InterventionKind.ADD:
             problem = with_individual(problem, intervention.individual, intervention.kind)
     came = tuple((one, at) for one, at in found if at is not None)
     return came, tuple(one for one, at in found if at is None), problem

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from confab.planner.generated import identifier, written
-from confab.planner.transitions import Cell, Key, Table, Writer, arguments_of
+from confab.planner.transitions import Cell, Key, PythonWriter, Table, arguments_of
 from confab.reasoner.derivation import strata
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, TRUE
 
 
-class Rules:
+class CompiledRules:
     """The rules of a problem as Python, compiled once for any table.
 
     Parameters
     ----------
-    writer : Writer
+    writer : PythonWriter
         Of the problem.
     """
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: PythonWriter) -> None:
         self.domain = writer.problem.domain
         self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
 
@@ -37,7 +37,7 @@ class Rules:
             cells.stratum.tests[name] = tests[name]
 
 
-def _lines(writer: Writer) -> Iterator[str]:
+def _lines(writer: PythonWriter) -> Iterator[str]:
     """Yield the lines that define a function for each defined situation type in `rules`."""
     for name, rules in writer.problem.domain.rules.items():
         arguments = [f"a{i}" for i in range(len(writer.problem.domain.situations[name].arguments))]

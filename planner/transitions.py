@@ -8,8 +8,9 @@ age      number of changes, undoing included; values derived from the table at t
 The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
 
 Copying a state would take time in the size of the world; a change and its undoing take a microsecond in any world. A condition
-becomes one Python expression over `now` and `holders`. A behaviour becomes a function ``forward(arguments)`` that returns the values
-of its variables and its changes, or None if it isn't applicable. A new kind of condition gets its case in `Writer.expression`.
+becomes one Python expression over `now` and `holders`. A behaviour becomes a function ``forward(arguments)`` that returns the
+values of its variables and its changes, or None if it isn't applicable. A new kind of condition gets a case in
+`PythonWriter.expression`.
 """
 
 from __future__ import annotations
@@ -134,7 +135,7 @@ class Table:
         return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
 
 
-class Writer:
+class PythonWriter:
     """Writes conditions and behaviours of one problem as Python over the dictionaries of a table.
 
     Parameters

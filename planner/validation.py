@@ -37,7 +37,7 @@ from confab.reasoner.symbols import (
 
 Cell: TypeAlias = "tuple[str, Arguments]"
 """A cell of a state: a symbol as its situation type and arguments."""
-Change: TypeAlias = "tuple[str, Arguments, str]"
+NewValue: TypeAlias = "tuple[str, Arguments, str]"
 
 
 @dataclass(frozen=True)
@@ -349,7 +349,7 @@ class Rules:
         members = self.read(behavior).members
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 
-    def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[Change] | None:
+    def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[NewValue] | None:
         """Return the values that a behaviour gives to arguments that fit, in order; None if it isn't applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]

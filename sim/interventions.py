@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pybullet
 
-from confab.planner.acting.episode import Change
+from confab.planner.acting.episode import InterventionKind
 from confab.reasoner.embodiment.values import PerceiverUse, Shape
 from confab.reasoner.symbols import Symbol
 from confab.sim.bodies import KINDS, center_height, outer_radius
@@ -121,10 +121,10 @@ def _set(world: World, body: int, position: Array, orientation: Sequence[float] 
     pybullet.changeDynamics(body, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=world.client)
 
 
-HANDLED: Mapping[Change, Callable[[World, str, Sequence[float]], None]] = {
-    Change.REMOVE: take_away,
-    Change.KNOCK: knock,
-    Change.PUSH: push,
+HANDLED: Mapping[InterventionKind, Callable[[World, str, Sequence[float]], None]] = {
+    InterventionKind.REMOVE: take_away,
+    InterventionKind.KNOCK: knock,
+    InterventionKind.PUSH: push,
 }
 """By kind of intervention: the function that does it to an object."""
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from confab.planner.acting.discovery import Discovery
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.acting.symbolic_world import disturbed, with_individual
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
@@ -134,9 +134,9 @@ class LiveWorld:
 
     def impossible(self, intervention: Intervention) -> str | None:
         """Return why an intervention is impossible in this world at any time, or None if it is possible."""
-        if intervention.change is Change.ADD and self._model_of(intervention.kind) is None:
+        if intervention.change is InterventionKind.ADD and self._model_of(intervention.kind) is None:
             return f"no {intervention.kind} of this scene has a shape for {intervention.individual}"
-        handled = (Change.REMOVE, Change.KNOCK, Change.PUSH)
+        handled = (InterventionKind.REMOVE, InterventionKind.KNOCK, InterventionKind.PUSH)
         if intervention.change in handled and intervention.individual not in self.world.bodies:
             return f"{intervention.individual} is no body of this world (bodies: {', '.join(self.world.bodies)})"
         if not intervention.of_world:
@@ -197,18 +197,18 @@ class LiveWorld:
     def _interfere(self, intervention: Intervention) -> None:
         name, change = intervention.individual, intervention.change
         if self.lookout is not None:
-            if change is Change.ADD:
+            if change is InterventionKind.ADD:
                 self.lookout.problem = with_individual(self.lookout.problem, name, intervention.kind)
             problem = self.lookout.problem
-            if change is Change.BOX:
+            if change is InterventionKind.BOX:
                 problem = with_individual(problem, name, intervention.kind)
             now = self.world.observe()
             refuse_impossible(
                 problem, now, disturbed(problem, now, intervention), f"'{intervention.text}' can't happen"
             )
-        if change is Change.ADD:
+        if change is InterventionKind.ADD:
             self._add(intervention)
-        elif change is Change.BOX:
+        elif change is InterventionKind.BOX:
             put_box(self.world, name, intervention.facts[0].value, intervention.numbers)
         elif name:
             HANDLED[change](self.world, name, intervention.numbers)

@@ -12,7 +12,7 @@ from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact, State, Symbol
 
 
-class Change(Enum):
+class InterventionKind(Enum):
     """What an intervention changes."""
 
     WORLD = "world"  # an object gets another value: moved, emptied, filled
@@ -34,7 +34,7 @@ class Intervention:
 
     Attributes
     ----------
-    change : Change
+    change : InterventionKind
     facts : tuple of Fact
         The facts that hold from then on, or the new goals.
     symbol : Symbol, optional
@@ -49,7 +49,7 @@ class Intervention:
         The intervention as it was written.
     """
 
-    change: Change
+    change: InterventionKind
     facts: tuple[Fact, ...] = ()
     symbol: Symbol | None = None
     individual: str = ""
@@ -62,7 +62,7 @@ class Intervention:
     @property
     def of_world(self) -> bool:
         """Whether it changes the world, and not the goal."""
-        return self.change not in (Change.GOAL, Change.DROP_GOAL)
+        return self.change not in (InterventionKind.GOAL, InterventionKind.DROP_GOAL)
 
 
 class End(Enum):

@@ -22,12 +22,12 @@ from time import perf_counter
 
 from confab.planner.acting.belief import Belief
 from confab.planner.acting.episode import (
-    Change,
     End,
     Episode,
     ExecutedPrimitive,
     Failure,
     Intervention,
+    InterventionKind,
     Replan,
     Surprise,
 )
@@ -339,13 +339,13 @@ class _Run:
         """Record an intervention, and change the goal if the intervention does."""
         self.record.interventions.append((intervention, seconds))
         goal = self.belief.goal
-        if intervention.change is Change.GOAL:
+        if intervention.change is InterventionKind.GOAL:
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
             self.forget(fact.symbol for fact in intervention.facts)
-        elif intervention.change is Change.DROP_GOAL and intervention.symbol is not None:
+        elif intervention.change is InterventionKind.DROP_GOAL and intervention.symbol is not None:
             goal.pop(intervention.symbol, None)
             self.forget([intervention.symbol])
-        elif intervention.change is Change.ADD:
+        elif intervention.change is InterventionKind.ADD:
             self.belief.add(intervention.individual, (intervention.kind,))
         if goal != self.belief.problem.goal:
             self.belief.want(goal)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from confab.planner.acting.discovery import Discovery
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.planner.validation import successor
@@ -83,12 +83,12 @@ class SymbolicWorld:
         ImpossibleStateError
             The resulting state is impossible.
         """
-        if intervention.change in (Change.ADD, Change.BOX):
+        if intervention.change in (InterventionKind.ADD, InterventionKind.BOX):
             self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
-        if intervention.change is Change.BOX:
+        if intervention.change is InterventionKind.BOX:
             text = f"{intervention.individual}, of which no fact speaks, is there"
             self._news.append(Discovery(intervention.individual, (intervention.kind,), text=text))
-        if intervention.change is Change.PUSH:
+        if intervention.change is InterventionKind.PUSH:
             self._add_spot(intervention.individual)
             return
         after = following(self.problem, disturbed(self.problem, self.state, intervention))
@@ -140,11 +140,11 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
     where it was. An object that lies has no place.
     """
     after = dict(state)
-    if intervention.change is Change.KNOCK:
+    if intervention.change is InterventionKind.KNOCK:
         for symbol in place_symbols(problem, intervention.individual):
             after.pop(symbol, None)
         _let_go(problem, state, after, intervention.individual)
-    if intervention.change is Change.REMOVE:
+    if intervention.change is InterventionKind.REMOVE:
         for symbol in state:
             if symbol.arguments[0] == intervention.individual:
                 del after[symbol]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from confab.planner.generated import identifier, tuple_written, written
-from confab.planner.transitions import Table, Writer
+from confab.planner.transitions import PythonWriter, Table
 from confab.reasoner.language import is_variable, mentions, walk
 from confab.reasoner.memory.experience import Rule
 from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
@@ -36,7 +36,7 @@ def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
     return (*(c for c in rule.asks if not _static(c)), *(substituted(c, put) for c in compared))
 
 
-def finder(rule: Rule, writer: Writer, asks: Sequence[Condition]) -> Bind | None:
+def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind | None:
     """Return the function that binds a rule, with unmet conditions, to a table; None if the rule has too many roles.
 
     The problem has the rule's terms (`known`).
@@ -79,7 +79,7 @@ def _variables(terms: Iterable[str]) -> set[str]:
 class _Join:
     """Writes the function of one rule."""
 
-    def __init__(self, rule: Rule, writer: Writer, asks: Sequence[Condition]) -> None:
+    def __init__(self, rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> None:
         self.rule, self.writer, self.soft = rule, writer, asks
         self.kinds, self.problem = dict(rule.kinds), writer.problem
         self.hard = [c for c in rule.asks if c not in asks]

@@ -43,7 +43,7 @@ Literals = tuple[int, ...] | None
 """A conjunction of bits; the empty one is true, None is false."""
 
 
-class Known(Protocol):
+class ReachableFacts(Protocol):
     """The reachable facts, as far as conditions read them (`confab.planner.grounded.reachability.Reached`)."""
 
     problem: Problem
@@ -77,7 +77,7 @@ class Formulas:
     Until `facts` is filled, changeable situation types have no bits, so that only static conditions can be evaluated.
     """
 
-    def __init__(self, reached: Known) -> None:
+    def __init__(self, reached: ReachableFacts) -> None:
         self.reached = reached
         self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
         self.size = 0

@@ -31,7 +31,7 @@ from confab.planner.grounded.joins import Ints, Table, ranges
 from confab.planner.grounded.reachability import Flags, Reached
 from confab.planner.grounded.schemas import Schema
 from confab.planner.grounded.shortage import shortage
-from confab.planner.grounded.task import Change, Grouped, Task
+from confab.planner.grounded.task import BitChange, Grouped, Task
 from confab.planner.plan import Reason
 from confab.reasoner.amounts import COMPARING, written
 from confab.reasoner.derivation import circular
@@ -407,9 +407,9 @@ class _Assembly:
         if amounts is not None:
             initial = amounts.begun(initial)
 
-        def change(operator: int) -> tuple[int, tuple[Change, ...]]:
+        def change(operator: int) -> tuple[int, tuple[BitChange, ...]]:
             precondition = sum(1 << bit for bit in need[operator])
-            found: list[Change] = []
+            found: list[BitChange] = []
             for relaxed, _, symbol, bit in ordered[starts[operator] : starts[operator + 1]].tolist():
                 when = 0 if relaxed == operator else sum(1 << b for b in need[relaxed]) & ~precondition
                 bits, complements = masks[symbol]

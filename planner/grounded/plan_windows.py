@@ -29,7 +29,7 @@ from confab.planner.grounded.amounts import Amounts
 from confab.planner.grounded.hff import heuristic
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.shortest import shortest, ways
-from confab.planner.grounded.task import Change, Grouped, Task, bits_of
+from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
 """Maximum number of states and steps for the search of a cheapest plan, instead of windows."""
@@ -358,7 +358,7 @@ class _Windows:
         def small(state: int) -> int:
             return sum(1 << new[bit] for bit in bits_of(state & bits))
 
-        def change(operator: int) -> tuple[int, tuple[Change, ...]]:
+        def change(operator: int) -> tuple[int, tuple[BitChange, ...]]:
             precondition, changes = task.known(operators[operator])
             kept = (one for one in changes if not one[0] & missing)
             return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in kept)

@@ -27,7 +27,7 @@ from confab.planner.grounded.successors import tree
 from confab.planner.plan import Step
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
-Change = tuple[int, int, int]
+BitChange = tuple[int, int, int]
 """If all bits of the first mask are set, the bits of the second are cleared and then those of the third are set."""
 
 
@@ -100,12 +100,12 @@ class Task:
     needs: Grouped
     adds: Grouped
     derived: Derived
-    change: Callable[[int], tuple[int, tuple[Change, ...]]]
+    change: Callable[[int], tuple[int, tuple[BitChange, ...]]]
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
     amounts: Amounts | None = None
     prices: Mapping[int, Linear] = field(default_factory=dict)
     barred: set[tuple[int, int]] = field(default_factory=set, repr=False)
-    _changes: dict[int, tuple[int, tuple[Change, ...]]] = field(default_factory=dict, repr=False)
+    _changes: dict[int, tuple[int, tuple[BitChange, ...]]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         """Return the number of operators."""
@@ -176,7 +176,7 @@ class Task:
         masks += [1 << bit for bit in range(len(self.facts), self.size)]
         return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
 
-    def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
+    def known(self, operator: int) -> tuple[int, tuple[BitChange, ...]]:
         """Return an operator's precondition and changes, computed once."""
         known = self._changes.get(operator)
         if known is None:

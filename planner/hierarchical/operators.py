@@ -17,10 +17,10 @@ from math import prod
 from typing import TypeAlias
 
 from confab.planner.amount_transitions import comes_nearer
-from confab.planner.derived_facts import Rules
+from confab.planner.derived_facts import CompiledRules
 from confab.planner.generated import identifier, tuple_written, written
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
-from confab.planner.transitions import Forward, Key, Table, Writer, ready_condition
+from confab.planner.transitions import Forward, Key, PythonWriter, Table, ready_condition
 from confab.reasoner.amounts import Amount, inside, terms_of
 from confab.reasoner.language import measures, mentions, terms, walk
 from confab.reasoner.symbols import (
@@ -95,10 +95,10 @@ class Program:
         rules = [rule.behavior for its in self.domain.rules.values() for rule in its]
         self.measures = measures([*self.domain.behaviors.values(), *rules])
         self.symmetry = SymmetryClasses(problem, self.named)
-        self.writer = Writer(problem)
+        self.writer = PythonWriter(problem)
         self.variables = self.writer.variables
         self.writer.constants |= {"pick": self._picked}
-        self._rules = Rules(self.writer) if self.domain.rules else None
+        self._rules = CompiledRules(self.writer) if self.domain.rules else None
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
     def bind(self, table: Table, few: int = FEW) -> Bound:
@@ -273,7 +273,7 @@ class Program:
                 case ValueCondition(situation, (term,), value, False) if term.startswith("?") and term not in hard:
                     constant = self.writer.listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):
-                        holders = f"{identifier('holders'', situation)}.get({written(value)}, ())"
+                        holders = f"{identifier('holders', situation)}.get({written(value)}, ())"
                         found.append((4.0, term, f"list({holders})"))
         for term in free:
             members = self.writer.constant(("members", kinds[term]), self.problem.classes.get(kinds[term], ()))

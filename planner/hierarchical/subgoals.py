@@ -374,8 +374,8 @@ class Subgoals:
         if len(members) <= FEW:
             return list(members)
         found = symmetry.unlike(members, (), self.table.now)
-        for number in sorted({symmetry.class_of.get(one, -1) for one in beside if one in found}):
-            found += islice((one for one in symmetry.members[number] if one not in beside and one not in found), 1)
+        for group in sorted({symmetry.class_of.get(one, -1) for one in beside if one in found}):
+            found += islice((one for one in symmetry.members[group] if one not in beside and one not in found), 1)
         return found
 
     def _boolean(self, situation: str) -> bool:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from confab.planner.derived_facts import Rules
-from confab.planner.transitions import Forward, Table, Writer, key_of
+from confab.planner.derived_facts import CompiledRules
+from confab.planner.transitions import Forward, PythonWriter, Table, key_of
 from confab.reasoner.amounts import Number
 from confab.reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
 
@@ -40,11 +40,11 @@ class Model:
         stated = self.symbols[: len(self.symbols) - len(self.defined)]
         self.cells = [(symbol.situation, key_of(symbol.arguments)) for symbol in stated]
         self.index = {cell: i for i, cell in enumerate(self.cells)}
-        self.writer = Writer(problem)
+        self.writer = PythonWriter(problem)
         self.here = tuple(problem.initial.get(symbol, FALSE) for symbol in stated)
         self.table = Table(problem.domain.situations, dict(zip(stated, self.here, strict=True)))
         if problem.domain.rules:
-            Rules(self.writer).define(self.table)
+            CompiledRules(self.writer).define(self.table)
         lines = [line for b in problem.domain.behaviors.values() for line in self.writer.forward(b)]
         lines += [line for b in problem.domain.behaviors.values() for line in self.writer.priced(b)]
         bind = self.writer.function(["forward, prices = {}, {}", *lines], "(forward, prices)")

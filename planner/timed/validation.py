@@ -15,7 +15,7 @@ from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.timed.plan import Slot, TimedPlan
-from confab.planner.validation import Cell, Change, Facts, Fault, Rules, validate
+from confab.planner.validation import Cell, Facts, Fault, NewValue, Rules, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
 from confab.reasoner.timing import only_during
@@ -49,7 +49,7 @@ class _Running:
     slot: Slot
     pieces: Pieces
     terms: Arguments
-    making: list[Change]
+    making: list[NewValue]
     number: int
 
 

@@ -13,7 +13,7 @@ import confab
 from confab import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.acting.executive import Event
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
@@ -103,7 +103,13 @@ def test_every_form_of_intervention_is_read() -> None:
         "after=28 add Cup cup9 LOCATION location5 BEVERAGE no_beverage",
     ]
     read = parse_interventions(problem, texts)
-    assert [i.change for i in read] == [Change.WORLD, Change.GOAL, Change.DROP_GOAL, Change.REMOVE, Change.ADD]
+    assert [i.change for i in read] == [
+        InterventionKind.WORLD,
+        InterventionKind.GOAL,
+        InterventionKind.DROP_GOAL,
+        InterventionKind.REMOVE,
+        InterventionKind.ADD,
+    ]
     assert [i.after for i in read] == [28, 28, (0, 1, 2), None, 28]
     assert read[3].at == 12.5
     assert [str(fact) for fact in read[4].facts] == ["cup9 LOCATION location5", "cup9 BEVERAGE no_beverage"]

@@ -392,7 +392,7 @@ def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
                 assert (now["live"], now["now"]) == (True, getattr(moment, "seconds", None))
                 assert pool.request("GET", f"{server.url}page.json?after={now['version']}").status == 204
 
-        assert scene.execute(tell=look).reached
+        assert scene.execute(observer=look).reached
         assert pool.request("GET", server.url + "page.json").json()["status"] == "reached"
     assert seen[-1] == "location7"
 

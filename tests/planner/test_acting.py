@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from confab.planner.acting.episode import Change, End, Episode, Intervention
+from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
 from confab.planner.acting.executive import Event, RetryPolicy, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld
@@ -60,11 +60,11 @@ def at(individual: str, value: str, situation: str = "LOCATION") -> Fact:
 
 
 def moved(individual: str, place: str, **when: object) -> Intervention:
-    return Intervention(Change.WORLD, (at(individual, place),), **when)  # type: ignore[arg-type]
+    return Intervention(InterventionKind.WORLD, (at(individual, place),), **when)  # type: ignore[arg-type]
 
 
 def wanted(individual: str, value: str, situation: str = "LOCATION", **when: object) -> Intervention:
-    return Intervention(Change.GOAL, (at(individual, value, situation),), **when)  # type: ignore[arg-type]
+    return Intervention(InterventionKind.GOAL, (at(individual, value, situation),), **when)  # type: ignore[arg-type]
 
 
 def acted(*interventions: Intervention, **options: object) -> Episode:
@@ -132,7 +132,7 @@ def begun(episode: Episode) -> list[str]:
 
 
 def test_an_object_that_vanished_is_not_poured_into() -> None:
-    episode = acted(Intervention(Change.REMOVE, individual="cup2", after=28))
+    episode = acted(Intervention(InterventionKind.REMOVE, individual="cup2", after=28))
     assert episode.status is End.IMPOSSIBLE
     assert any("cup2" in reason.terms for reason in episode.reasons)
     last = max(i for i, event in enumerate(episode.events) if "cup2" in event.step.arguments)
@@ -177,7 +177,7 @@ def test_nobody_puts_down_where_somebody_else_has_put_something() -> None:
 
 @pytest.mark.parametrize("value", ["beverage1", "beverage2"])
 def test_a_cup_filled_with_the_wrong_drink_is_proved_hopeless_and_the_rest_is_served(value: str) -> None:
-    fill = Intervention(Change.WORLD, (at("cup2", value, "BEVERAGE"),), after=28)
+    fill = Intervention(InterventionKind.WORLD, (at("cup2", value, "BEVERAGE"),), after=28)
     episode = acted(fill)
     assert episode.status is (End.REACHED if value == "beverage2" else End.IMPOSSIBLE)
     assert bool(episode.reasons) == (value == "beverage1")
@@ -186,7 +186,10 @@ def test_a_cup_filled_with_the_wrong_drink_is_proved_hopeless_and_the_rest_is_se
 
 
 def test_a_goal_that_is_dropped_is_not_served() -> None:
-    drop = [Intervention(Change.DROP_GOAL, symbol=Symbol("BEVERAGE", (cup,)), after=28) for cup in ("cup1", "cup2")]
+    drop = [
+        Intervention(InterventionKind.DROP_GOAL, symbol=Symbol("BEVERAGE", (cup,)), after=28)
+        for cup in ("cup1", "cup2")
+    ]
     episode = acted(*drop)
     assert episode.status is End.REACHED
     assert len(episode.done.primitives) == 12
@@ -194,7 +197,7 @@ def test_a_goal_that_is_dropped_is_not_served() -> None:
 
 def test_an_object_that_is_added_stands_in_the_way_and_is_taken_care_of() -> None:
     newcomer = (at("cup9", "location5"), at("cup9", "no_beverage", "BEVERAGE"))
-    episode = acted(Intervention(Change.ADD, newcomer, individual="cup9", kind="Cup", after=22))
+    episode = acted(Intervention(InterventionKind.ADD, newcomer, individual="cup9", kind="Cup", after=22))
     assert episode.status is End.REACHED
     assert episode.observed[Symbol("LOCATION", ("cup9",))] != "location5"
 
@@ -202,7 +205,7 @@ def test_an_object_that_is_added_stands_in_the_way_and_is_taken_care_of() -> Non
 def test_goals_about_what_was_added_are_served() -> None:
     newcomer = (at("cup9", "location6"), at("cup9", "no_beverage", "BEVERAGE"))
     episode = acted(
-        Intervention(Change.ADD, newcomer, individual="cup9", kind="Cup", after=22),
+        Intervention(InterventionKind.ADD, newcomer, individual="cup9", kind="Cup", after=22),
         wanted("cup9", "beverage1", "BEVERAGE", after=22),
     )
     assert episode.status is End.REACHED
@@ -332,10 +335,10 @@ def interventions(draw: st.DrawFn) -> Intervention:
     drink = draw(st.sampled_from(["no_beverage", "beverage1", "beverage2"]))
     choices: list[Intervention] = [
         moved(one, draw(st.sampled_from(free)), **when),
-        Intervention(Change.WORLD, (at(cup, drink, "BEVERAGE"),), **when),
-        Intervention(Change.REMOVE, individual=one, **when),
+        Intervention(InterventionKind.WORLD, (at(cup, drink, "BEVERAGE"),), **when),
+        Intervention(InterventionKind.REMOVE, individual=one, **when),
         wanted(one, draw(st.sampled_from(free)), **when),
-        Intervention(Change.DROP_GOAL, symbol=draw(st.sampled_from(sorted(serving().goal))), **when),
+        Intervention(InterventionKind.DROP_GOAL, symbol=draw(st.sampled_from(sorted(serving().goal))), **when),
     ]
     return draw(st.sampled_from(choices))
 
@@ -432,7 +435,9 @@ def test_only_what_failures_stand_against_is_given_up() -> None:
 
 
 def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
-    push = Intervention(Change.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28)  # cup2 is where it shall be
+    push = Intervention(
+        InterventionKind.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28
+    )  # cup2 is where it shall be
     episode = acted(push)
     assert episode.status is End.REACHED
     assert [found.individual for found, _ in episode.discovered] == ["spot1"]
@@ -444,14 +449,16 @@ def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
 
 def test_a_box_that_nobody_spoke_of_is_put_aside() -> None:
     fact = at("box1", "location5")
-    episode = acted(Intervention(Change.BOX, (fact,), individual="box1", kind="Movable", numbers=(0.1,) * 3, after=22))
+    episode = acted(
+        Intervention(InterventionKind.BOX, (fact,), individual="box1", kind="Movable", numbers=(0.1,) * 3, after=22)
+    )
     assert episode.status is End.REACHED
     assert episode.observed[fact.symbol] not in ("location5", "in_hand")
 
 
 @pytest.mark.parametrize("knocked", ["cup2", "bottle1"])
 def test_what_lies_is_given_up_alone(knocked: str) -> None:
-    episode = acted(Intervention(Change.KNOCK, individual=knocked, after=22))
+    episode = acted(Intervention(InterventionKind.KNOCK, individual=knocked, after=22))
     assert episode.status is End.IMPOSSIBLE
     assert any(knocked in reason.text for reason in episode.reasons)
     assert holds(episode)
@@ -493,7 +500,7 @@ def test_a_world_that_breaks_ends_the_episode_with_a_clear_reason(how: str, word
 
 
 def test_everything_is_taken_away() -> None:
-    episode = acted(*(Intervention(Change.REMOVE, individual=one, after=22) for one in OBJECTS))
+    episode = acted(*(Intervention(InterventionKind.REMOVE, individual=one, after=22) for one in OBJECTS))
     assert episode.status is End.IMPOSSIBLE
     assert at_rest(episode)
     assert episode.goal == {}

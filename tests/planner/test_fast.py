@@ -21,7 +21,7 @@ from confab.planner.paper.transitions import Model, ground
 from confab.planner.plan import Limits, Status
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem, Symbol
-from tests.planner.test_wants import museum
+from tests.planner.test_subgoals import museum
 from worlds.families import FAMILIES, family, random_table, table, tabletop
 from worlds.rooms import rooms
 from worlds.truth import StateSpace, TooManyError

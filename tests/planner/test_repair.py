@@ -299,17 +299,17 @@ def test_whatever_happens_whenever_little_is_done_otherwise(
             anew.append(there)
             return plan(there, limits=limits, using=uses)
 
-        repaired = repair_or_replan(now, rest, before, planner, uses)
-        if repaired.steps is None:
-            assert repaired.outcome is not None
-            assert repaired.outcome.status is not Status.GAVE_UP
+        result = repair_or_replan(now, rest, before, planner, uses)
+        if result.steps is None:
+            assert result.outcome is not None
+            assert result.outcome.status is not Status.GAVE_UP
             continue
-        end = carried_out(now, now.initial, repaired.steps)
+        end = carried_out(now, now.initial, result.steps)
         assert all(end[symbol] == value for symbol, value in now.goal.items())
-        assert repaired.cost == cost_of(now, Plan(repaired.steps))
-        repaired += repaired.kind == "repair"
-        spent += repaired.cost
-        different += sum(difference(rest, repaired.steps))
+        assert result.cost == cost_of(now, Plan(result.steps))
+        repaired += result.kind == "repair"
+        spent += result.cost
+        different += sum(difference(rest, result.steps))
     assert repaired >= kept
     assert spent <= cost
     assert different <= changed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import confab
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Fact, Symbol
 from confab.sim.faults import knocked
@@ -24,16 +24,18 @@ def live() -> Iterator[LiveWorld]:
 
 
 def put(individual: str, place: str, **when: float) -> Intervention:
-    return Intervention(Change.WORLD, (Fact(Symbol("LOCATION", (individual,)), place),), **when)  # type: ignore[arg-type]
+    return Intervention(InterventionKind.WORLD, (Fact(Symbol("LOCATION", (individual,)), place),), **when)  # type: ignore[arg-type]
 
 
 def test_what_nobody_can_do_is_known_beforehand(live: LiveWorld) -> None:
-    held = Intervention(Change.WORLD, (Fact(Symbol("HOLDS", ("left_hand",)), "cup1"),))
+    held = Intervention(InterventionKind.WORLD, (Fact(Symbol("HOLDS", ("left_hand",)), "cup1"),))
     assert live.impossible(put("cup1", "location6")) is None
     assert "which is no place" in str(live.impossible(put("cup1", "in_hand")))
     assert "interventions change BEVERAGE and LOCATION" in str(live.impossible(held))
-    assert "no body of this world" in str(live.impossible(Intervention(Change.REMOVE, individual="left_hand")))
-    assert "has a shape" in str(live.impossible(Intervention(Change.ADD, individual="x", kind="Hand")))
+    assert "no body of this world" in str(
+        live.impossible(Intervention(InterventionKind.REMOVE, individual="left_hand"))
+    )
+    assert "has a shape" in str(live.impossible(Intervention(InterventionKind.ADD, individual="x", kind="Hand")))
 
 
 def test_a_hand_is_not_to_blame_for_what_a_person_moves_meanwhile(live: LiveWorld) -> None:
@@ -44,7 +46,7 @@ def test_a_hand_is_not_to_blame_for_what_a_person_moves_meanwhile(live: LiveWorl
 
 
 def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) -> None:
-    live.announce((Intervention(Change.REMOVE, individual="bottle1", at=0.4),))
+    live.announce((Intervention(InterventionKind.REMOVE, individual="bottle1", at=0.4),))
     verdict = live.execute(REACH)
     assert (verdict.ok, verdict.code) == (False, "interrupted")
     seen = live.observe()
@@ -53,7 +55,7 @@ def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) 
 
 
 def test_what_is_gone_is_moved_by_nobody(live: LiveWorld) -> None:
-    gone = Intervention(Change.REMOVE, individual="cup1")
+    gone = Intervention(InterventionKind.REMOVE, individual="cup1")
     for intervention in (gone, gone, put("cup1", "location6")):
         live.disturb(intervention)
     assert "cup1" not in live.world.bodies
@@ -89,7 +91,7 @@ def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
     scene = confab.load("kitchen-corner")
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:
         live, opening = LiveWorld(world, scene.problem.classes), Step((0,), 0, 3, "F3_OPEN", ("right_hand", "drawer"))
-        live.announce((Intervention(Change.WORLD, (Fact(Symbol("OPENED", ("drawer",)), "false"),), at=1.7),))
+        live.announce((Intervention(InterventionKind.WORLD, (Fact(Symbol("OPENED", ("drawer",)), "false"),), at=1.7),))
         assert live.execute(opening).code == "interrupted"
         assert live.observe()[Symbol("OPENED", ("drawer",))] == "false"
         hand = world.hands["right_hand"]
@@ -100,25 +102,25 @@ def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
 LOCATION = {name: Symbol("LOCATION", (name,)) for name in ("cup1", "cup2", "bottle1", "box1")}
 
 
-def handled(change: Change, individual: str, *numbers: float, place: str = "") -> Intervention:
+def handled(change: InterventionKind, individual: str, *numbers: float, place: str = "") -> Intervention:
     facts = (Fact(LOCATION[individual], place),) if place else ()
     return Intervention(change, facts, individual=individual, kind="Movable", numbers=numbers)
 
 
 def test_what_stands_beside_its_places_is_at_a_spot_that_the_same_hand_reaches(live: LiveWorld) -> None:
-    live.disturb(handled(Change.PUSH, "cup2", 0.02, 0.08))
+    live.disturb(handled(InterventionKind.PUSH, "cup2", 0.02, 0.08))
     assert live.observe()[LOCATION["cup2"]] == "spot1"
     (spot,) = live.discoveries()
     assert "Location" in spot.kinds
     assert ("canReach", ("left_hand", "spot1")) in spot.relations
     assert live.discoveries() == ()
     assert live.observe()[LOCATION["cup2"]] == "spot1"  # it isn't discovered twice
-    live.disturb(handled(Change.PUSH, "cup2", -0.02, -0.08))
+    live.disturb(handled(InterventionKind.PUSH, "cup2", -0.02, -0.08))
     assert live.observe()[LOCATION["cup2"]] == "location1"
 
 
 def test_a_thing_of_which_no_fact_speaks_is_fixed_if_no_hand_opens_wide_enough(live: LiveWorld) -> None:
-    live.disturb(handled(Change.BOX, "box1", 0.12, 0.12, 0.2, place="location7"))
+    live.disturb(handled(InterventionKind.BOX, "box1", 0.12, 0.12, 0.2, place="location7"))
     assert live.observe()[LOCATION["box1"]] == "location7"
     (box,) = live.discoveries()
     assert box.kinds == ("Movable",)
@@ -126,7 +128,7 @@ def test_a_thing_of_which_no_fact_speaks_is_fixed_if_no_hand_opens_wide_enough(l
 
 
 def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
-    live.disturb(handled(Change.KNOCK, "cup1"))
+    live.disturb(handled(InterventionKind.KNOCK, "cup1"))
     assert LOCATION["cup1"] not in live.observe()
     assert live.why_unplaced("cup1").startswith("lies ")
     assert live.why_unplaced("cup2").startswith("stands ")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import confab
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.plan import Step
 from confab.reaching import with_reach
 from confab.reasoner.embodiment.skill_checks import RULES
@@ -155,7 +155,7 @@ def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:
         before = world.truth("jar")[1]
         opened = Symbol("OPENED", ("drawer",))
-        LiveWorld(world, {}).disturb(Intervention(Change.WORLD, (Fact(opened, "true"),)))
+        LiveWorld(world, {}).disturb(Intervention(InterventionKind.WORLD, (Fact(opened, "true"),)))
         assert world.observe()[opened] == "true"
         assert before[0] - world.truth("jar")[1][0] == pytest.approx(
             world.links["drawer"].values()["drawer"], abs=0.003

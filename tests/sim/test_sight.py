@@ -7,7 +7,7 @@ import pytest
 
 import confab
 from confab.physics import Report
-from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.plan import Plan
 from confab.reasoner.embodiment.values import Embodiment, Mechanism, Part, PerceiverUse, Place
 from confab.reasoner.symbols import Fact, Symbol
@@ -31,7 +31,7 @@ def kitchen() -> Scene:
 def set_joint(world: World, link: str, opened: bool) -> None:
     """Open or shut a link at once, with what it carries."""
     live = LiveWorld(world, {})
-    live.disturb(Intervention(Change.WORLD, (Fact(Symbol("OPENED", (link,)), str(opened).lower()),)))
+    live.disturb(Intervention(InterventionKind.WORLD, (Fact(Symbol("OPENED", (link,)), str(opened).lower()),)))
 
 
 def covered(world: World, name: str) -> str | None:
