@@ -45,11 +45,11 @@ MOST_CASES = 24
 
 
 class TooManyCasesError(ValueError):
-    """More effects change one expression at once than are told apart."""
+    """The number of effects that change one expression at once exceeds the maximum."""
 
 
 def both(formulas: Iterable[Formula]) -> Conjunction:
-    """Return a conjunction without what is true anyway; None if it contradicts itself."""
+    """Return a conjunction without conditions that are always true; None if it contradicts itself."""
     found: dict[Condition, None] = {}
     for formula in formulas:
         if formula is False:

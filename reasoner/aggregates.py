@@ -1,4 +1,4 @@
-"""Derived amounts: a sum, a count, a maximum or a minimum over individuals, in terms of what planning has anyway.
+"""Derived amounts: a sum, a count, a maximum or a minimum over individuals, in terms of other conditions and effects.
 
 A sum or a count becomes an amount that is part of each state. Its first value is worked out from the initial state (`totals`);
 each behaviour gets the effects that keep it up to date (`kept`). For ``LOAD(cart)``, the sum of ``weight(item)`` over all items
@@ -114,7 +114,7 @@ def following(problem: Problem, state: Mapping[Symbol, str]) -> dict[Symbol, str
 
 
 def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
-    """Return aggregates, each behind those that it reads.
+    """Return aggregates in order of dependency.
 
     Raises
     ------
@@ -363,7 +363,7 @@ def kept(
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Tuples that may begin or cease to add to a total: those that agree with an effect on a symbol that is named.
+    """Tuples that may begin or cease to add to a total: those that agree with an effect on a symbol of an effect.
 
     `effect` has its variables renamed apart; `named` are the arguments of the symbol as the aggregate has them, `value` the
     value (None of an amount); `before` tells whether a tuple agrees with the value before the effect or with the one after it.
@@ -465,7 +465,7 @@ class _Keeping:
         return both(found)
 
     def effects(self, number: int) -> Iterator[AmountEffect]:
-        """Yield the effects on the total for one candidate's tuples, without those of the candidates before."""
+        """Yield the effects on the total for the tuples of one candidate, without those of earlier candidates."""
         candidate = self.candidates[number]
         effect = candidate.effect
         tuple_: dict[str, str] = {}
@@ -487,7 +487,7 @@ class _Keeping:
             yield from self._differences(whole, each, [*guard, *more, *others])
 
     def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
-        """Let a term stand for a variable of the aggregate; return what that asks of it."""
+        """Substitute a term for a variable of the aggregate; return the conditions that this implies."""
         if name in tuple_:
             return self.after.equal(tuple_[name], term)
         tuple_[name] = term
@@ -496,7 +496,7 @@ class _Keeping:
     def _completed(
         self, tuple_: Mapping[str, str], each: Parameter | None
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
-        """Yield a tuple with terms for all variables: what a condition determines, each of a class, or every individual."""
+        """Yield a tuple with terms for all variables: determined by a condition, members of a class, or all individuals."""
         found, more = dict(tuple_), list[Formula]()
         determined = True
         while determined:
@@ -625,7 +625,7 @@ class _World:
     def solutions(
         self, conditions: Sequence[Condition], terms: dict[str, str], kinds: Mapping[str, str], names: Sequence[str]
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals for some terms with which conditions hold; what a value determines isn't tried."""
+        """Yield the individuals for some terms with which conditions hold; variables that a value determines aren't enumerated."""
         if any(not self.holds(c, terms, kinds) for c in conditions if not mentions(c) - terms.keys()):
             return
         waiting = [c for c in conditions if mentions(c) - terms.keys()]

@@ -36,7 +36,7 @@ def write_whole(
     path : Path
     content : str, bytes or iterable of str
     check : callable, optional
-        Reads what was written; raises what is wrong with it, and nothing is replaced then.
+        Reads the written file; if it raises an error, no file is replaced.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     if path == STDOUT:
@@ -144,7 +144,7 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 def alone(path: Path) -> Iterator[None]:
     """Lock a file, by locking its folder so that no lock file is left behind; other callers of this function wait.
 
-    Links are followed, so that all paths to a file lead to one lock. A caller that has to wait is told so.
+    Links are followed, so that all paths to a file lead to one lock. A caller that has to wait is notified.
 
     Raises
     ------

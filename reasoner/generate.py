@@ -2,7 +2,7 @@
 
 A family is a Turtle file in ``ontology/families``: a line ``#* SECTION`` heads a block that is repeated for each row of
 that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named:
-a template speaks of objects of a `first` and a `second` kind.
+a template uses objects of a `first` and a `second` kind.
 
 ==============================  ========================================================================
 section                         words
@@ -120,7 +120,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name:
 
 
 def _blocks(path: Path) -> list[tuple[str, str]]:
-    """Return the sections of a template with their text, those of its ``like`` template first."""
+    """Return the sections of a template with their text, after those of its ``like`` template."""
     found: list[tuple[str, str]] = []
     section, lines = "once", list[str]()
     for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:

@@ -50,9 +50,9 @@ class Kind:
     Parameters
     ----------
     name : str
-        As a message says it, with its article.
+        The name of the kind in messages, with its article.
     foreign : bool
-        Whether Confab didn't write it; nothing replaces it.
+        Whether Confab doesn't write such files; they are never overwritten.
     columns : tuple of str, optional
         The columns of rows; None where there are none or the format doesn't tell.
     """

@@ -60,6 +60,6 @@ def nested_elements(content: bytes) -> int:
 
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler, parser.EndElementHandler = begin, end
-    with suppress(expat.ExpatError):  # what reads the document says so
+    with suppress(expat.ExpatError):  # the reader of the document reports it
         parser.Parse(content, True)
     return most

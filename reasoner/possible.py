@@ -1,6 +1,6 @@
 """Impossible states: one check, with one set of messages, for every source of states.
 
-Files, facts of a caller, observations, interventions and the board state what holds. Each time, a value has to belong to its
+Files, callers, observations, interventions and the board state facts. Each time, a value has to belong to its
 situation type, an amount has to lie within its bounds, and an exclusive value may have one holder. A symbol without a value is
 unknown, which is no fault.
 """
@@ -85,7 +85,7 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
     problem : Problem
     before, after : State
     cause : str
-        What would lead from one to the other, to be named in the message.
+        Description of the transition, for the message.
     """
     known = {fault.what for fault in impossible(problem, before)}
     for fault in impossible(problem, after):

@@ -33,7 +33,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
                 continue
             made = _values(problem, behavior, effect)
             if FALSE in made or made & values.get(situation, set()):
-                continue  # what is so already isn't changed
+                continue  # facts that hold already aren't changed
             if below is not None and not made & _given(problem, below, situation):
                 yield behavior, _unrefined(behavior, f"it makes {situation} {_said(effect)}", below)
             first = next((level for level in domain.levels if level >= kind.level), behavior.level)

@@ -16,7 +16,7 @@ from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact,
 class Refutation:
     """A behaviour with its arguments, the facts under which it is impossible, and the reason.
 
-    An empty argument stands for any individual.
+    An empty argument matches any individual.
     """
 
     behavior: str

@@ -85,7 +85,7 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         asked[-1] = replace(asked[-1], negated=False)
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
-    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
+    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # denotes the individual
     clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
     if not clauses:
         return f"there is {whole}"
@@ -111,12 +111,12 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
 
 
 def _is_subject(mark: str, clause: str) -> bool:
-    """Whether the individual that a mark stands for is the subject of a clause and occurs nowhere else in it."""
+    """Return whether the individual denoted by a mark is the subject of a clause and occurs nowhere else in it."""
     return clause.startswith(f"{mark} ") and clause.count(mark) == 1
 
 
 def _relative(mark: str, clause: str) -> str | None:
-    """Return a clause as a relative clause about the individual that a mark stands for; None if it can't be one."""
+    """Return a clause as a relative clause about the individual denoted by a mark; None if it can't be one."""
     if _is_subject(mark, clause):
         return f"that {clause.removeprefix(f'{mark} ')}"
     if clause.endswith(f" {mark}") and clause.count(mark) == 1 and " and " not in clause:

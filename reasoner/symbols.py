@@ -169,7 +169,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two amounts stand in the relation `operator` (a key of `amounts.COMPARING`); false if one of them is missing."""
+    """A comparison of two amounts by `operator` (a key of `amounts.COMPARING`); false if one of them is missing."""
 
     left: Expression
     operator: str
@@ -219,7 +219,7 @@ Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
 class Span(Enum):
-    """The part of a step at which a condition is asked, or an effect made."""
+    """The part of a step at which a condition must hold, or an effect takes place."""
 
     START = "atStart"
     THROUGHOUT = "throughout"  # of an effect: it is in the making until the end
@@ -237,7 +237,7 @@ class Timing:
     actors : tuple of str
         Terms of the behaviour that can be in one step at a time.
     conditions, effects : tuple of pairs
-        All conditions and effects as they are written, each with its span.
+        All conditions and effects, each with its span.
     """
 
     duration: Expression | None = None
@@ -256,7 +256,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Times:
-    """What a task says of time, in seconds from the begin of the plan.
+    """The times of a task, in seconds from the begin of the plan.
 
     Attributes
     ----------
@@ -294,7 +294,7 @@ class Behavior:
     Effects are applied in order, false facts first, so that a fact which one binding makes both false and true is true, as in
     PDDL. The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
     the individuals that it names only as members of a class. A `price` replaces `cost`, and a precondition requires that the price
-    is defined (`priced`). `timing` says when its conditions are asked and its effects made (`confab.reasoner.timing`).
+    is defined (`priced`). `timing` states when its conditions must hold and its effects take place (`confab.reasoner.timing`).
     """
 
     name: str
@@ -403,11 +403,11 @@ class Aggregate:
     function : str
         One of `AGGREGATES`.
     amount : Expression
-        What is added up or compared; 1 for a count.
+        The number to be summed or compared; 1 for a count.
     parameters : tuple of Parameter
         The names of its arguments in the conditions, and their classes.
     variables : tuple of Parameter
-        What is aggregated over.
+        The variables of the individuals to be aggregated.
     conditions : tuple of Condition
     """
 
@@ -430,7 +430,7 @@ class Aggregate:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The aggregate as a behaviour that changes its amount, for functions that look for what an amount depends on."""
+        """The aggregate as a behaviour that changes its amount, for functions that determine the dependencies of an amount."""
         head = AmountEffect(self.situation, tuple(p.name for p in self.parameters), "increase", self.amount)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, cost=0.0, amounts=(head,))
 
@@ -637,7 +637,7 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
     """Return the preconditions that follow from the bounds of the amounts that a behaviour changes, if conditions can express them.
 
-    They are negations of a violated bound, so that they hold for missing amounts, on which effects do nothing.
+    They are negations of a violated bound, so they hold for missing amounts, which effects don't change.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

@@ -1,7 +1,7 @@
 """How behaviours lie in time: durations, actors, and the spans of conditions and effects (docs/levels.md, "In time").
 
-A behaviour's own preconditions and effects are its *projection*: what has to hold before it, and what holds after it, if nothing
-else happens meanwhile. Every planner reads these. `Timing` says in addition when each of them is asked or made.
+A behaviour's own preconditions and effects are its *projection*: its conditions before and effects after it, if no other step
+overlaps it. Every planner reads these. `Timing` states in addition when each condition must hold and each effect takes place.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def timing_of(behavior: Behavior) -> Timing:
 def projected(
     conditions: Sequence[tuple[Span, Condition]], effects: Sequence[tuple[Span, Effect]]
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
-    """Return the preconditions and effects of a behaviour that is done without anything else meanwhile.
+    """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    A condition that an effect at the start brings about isn't asked before; an effect at the start that a later one replaces
+    A condition that an effect at the start achieves isn't required before; an effect at the start that a later one replaces
     isn't seen afterwards.
     """
     given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
@@ -58,7 +58,7 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours with a value that holds only while they last, and that another one, or the goal, can ask for.
+    """Return the behaviours with a value that holds only during them, and that another one, or the goal, can require.
 
     Their plans need concurrency: no sequence of whole steps shows such a value.
     """

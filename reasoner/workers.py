@@ -1,6 +1,6 @@
 """Processes that end with the process that started them, even if that is killed, and have their own limit of CPU time.
 
-Each gets one end of a pipe whose other end the parent process holds. The kernel kills the child, with its own children, as soon as
+Each gets one end of a pipe whose other end belongs to the parent process. The kernel kills the child, with its children, as soon as
 that other end is closed (Linux). After kill -9 or a crash no code has to run for that, and it doesn't matter which thread started
 the process.
 """
@@ -34,7 +34,7 @@ class WorkerError(RuntimeError):
     Parameters
     ----------
     said : str
-        What it said on stderr.
+        Its output on stderr.
     status : int
         Its exit code, negative for a signal.
     """
@@ -60,7 +60,7 @@ def tie(end: int) -> None:
     Parameters
     ----------
     end : int
-        The reading end, from which nothing is read.
+        The reading end, which is never read.
     """
     if sys.platform == "linux":
         fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp())
@@ -132,7 +132,7 @@ def call(
     Parameters
     ----------
     function : callable
-        Of a module; what it prints is lost.
+        A function of a module; its output is lost.
     *arguments
         Are pickled, as what is returned or raised.
     seconds : float
@@ -179,7 +179,7 @@ def answer(megabytes: int) -> None:
     import pickle
 
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the function prints
+    os.dup2(2, 1)  # output of the function
     if megabytes:
         resource.setrlimit(resource.RLIMIT_AS, (megabytes * 1_000_000,) * 2)
     function, arguments = pickle.load(sys.stdin.buffer)

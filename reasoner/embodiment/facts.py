@@ -134,7 +134,7 @@ class BodyFacts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the numbers of a skill or perceiver, overridden by those of its user, overridden by adjustments."""
+        """Return the numbers of a skill or perceiver: its user's numbers override its own, and adjustments override both."""
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):
             settings |= self.all_numbers(node)

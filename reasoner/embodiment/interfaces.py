@@ -60,7 +60,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a status means: success, or a failure code; and the situation types that must change before repeating makes sense."""
+    """The meaning of a status: success, or a failure code and the situation types that must change before a retry."""
 
     success: bool
     code: str

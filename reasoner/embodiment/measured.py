@@ -34,7 +34,7 @@ def one_valued(store: ox.Store) -> frozenset[str]:
 
 
 def valued(store: ox.Store) -> frozenset[str]:
-    """Return the situation types that have values at all, not only true and false."""
+    """Return the situation types with values other than true and false."""
     return frozenset(row[0] for row in rows(store, VALUED))
 
 

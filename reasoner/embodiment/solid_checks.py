@@ -41,7 +41,7 @@ def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _base_inside(mechanism: Mechanism, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield the deepest overlap of a mechanism's base with what stands around it."""
+    """Yield the deepest overlap of a mechanism's base with its neighbours."""
     base = [block for block in blocks_of(mechanism, {}) if block.owner == mechanism.name]
     for _, _, one, other in _deepest(_meeting(base, around, 0.0)):
         yield _flaw(one, other, overlap(one, other), "", f"move {mechanism.name} or {other.owner} apart")
@@ -143,7 +143,7 @@ def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Fla
     for one, other in combinations(standing, 2):
         on = {embodiment.places[where[one]].carrier: other, embodiment.places[where[other]].carrier: one}
         inside = any(lower in vessels and upper in (one, other) for lower, upper in on.items())
-        if not inside and where[one] != where[other]:  # what stands in a vessel is between its walls
+        if not inside and where[one] != where[other]:  # an object in a vessel is between its walls
             met += _meeting(standing[one], standing[other], 0.0)
     for deep, _, first, second in _deepest(met):
         places = [f"{name} is at {where[name]}" for name in (first.owner, second.owner) if name in where]

@@ -236,7 +236,7 @@ class Phase:
 
     `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles or features that the hand may touch. The motion
     ends early when one of the guards in `until` holds; after it all `checks` must hold. A phase is executed only if all conditions
-    in `when` hold. A `foreseen` phase is not executed, but has to be possible before the hand moves at all.
+    in `when` hold. A `foreseen` phase is only checked to be feasible before the hand moves.
     """
 
     name: str
@@ -277,7 +277,7 @@ class SkillUse:
 
 @dataclass(frozen=True)
 class PerceiverUse:
-    """The perceiver that reads a situation type off the world, its thresholds, and the individuals that stand for special values.
+    """The perceiver that measures a situation type, its thresholds, and the individuals of special values.
 
     `choices` are the situation type's values in declared order; `links` are the links that have this situation type. A measured
     type holds within the bounds `holds`; `asked` has the arguments of its symbols if these are true or false.

@@ -21,7 +21,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     Raises
     ------
     KnowledgeError
-        The query isn't SPARQL, or its answer is no triples, or none at all.
+        The query isn't SPARQL, or its result isn't triples, or is empty.
     LimitError
         As `confab.reasoner.graph.query_process.ask`.
     """

@@ -1,6 +1,6 @@
 """Documents as a parser receives them: RDF/XML without the parts of a DTD that read other files or grow.
 
-expat, which is made for XML, reads the document type. It is then written anew with plain entities only, which Protégé 4 uses to
+expat, which is made for XML, reads the document type. It is then replaced by one with plain entities only, which Protégé 4 uses to
 abbreviate namespaces. The RDF parser sees no other prolog, whatever comments, instructions and declarations the file has.
 """
 
@@ -140,7 +140,7 @@ def as_trig(content: bytes, media_type: str, base: str) -> bytes:
 
 
 def plain_xml(content: bytes) -> bytes:
-    """Return an XML document with its prolog written anew; one without a document type as it is.
+    """Return an XML document with a new prolog; one without a document type unchanged.
 
     >>> plain_xml(b'<!--<a>--><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
     b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'

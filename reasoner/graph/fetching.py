@@ -66,7 +66,7 @@ def fetch(url: str, folder: Path) -> Fetched:
     Raises
     ------
     KnowledgeError
-        It can't be reached or read, is too large, plays tricks, or is another ontology; nothing is written then.
+        It can't be reached or read, is too large, is suspicious, or is another ontology; no file is written then.
     """
     try:
         parts = urlsplit(url)
@@ -130,7 +130,7 @@ def _download(url: str) -> tuple[bytes, str]:
 
 
 def _guessed(url: str, content: bytes) -> str:
-    """Return the kind of a document whose media type doesn't say it."""
+    """Return the kind of a document whose media type is ambiguous."""
     suffix = Path(urlsplit(url).path).suffix.lower()
     if suffix in FORM:
         return suffix

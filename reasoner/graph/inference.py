@@ -1,11 +1,11 @@
-"""OWL 2 RL: what follows from the ontology is written to the graph `inferred` before planning.
+"""OWL 2 RL inference: conclusions from the ontology are written to the graph `inferred` before planning.
 
-Only what can't change is concluded. Facts of situation types are left out, since behaviours change them; they count merely as
+Only static facts are concluded. Facts of situation types are left out, since behaviours change them; they count merely as
 proof that their subject and object have the domain and range of the property. A class that is defined by situations is
 compiled into conditions instead, see `confab.reasoner.reading.definitions`.
 
-The reasoner runs only if the ontology says something from which more follows than the reader sees by itself (it follows
-subclasses): `needed` asks for that. What RL can't conclude is said in docs/inference.md.
+The reasoner runs only if the ontology has axioms with consequences beyond subclasses, which the reader follows by itself:
+`needed` tests this. docs/inference.md lists the limits of RL.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
     graph : KnowledgeGraph
         Its graph `inferred` is emptied first.
     always : bool
-        Run the reasoner even if nothing is `needed`.
+        Run the reasoner even if it isn't `needed`.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _iris(graph: KnowledgeGraph, query: str) -> set[str]:
 
 
 def _static(graph: KnowledgeGraph, changing: set[str]) -> Iterator[ox.Triple]:
-    """Yield the triples that the reasoner sees: no texts, nothing inside behaviours, no facts that may change."""
+    """Yield the triples for the reasoner: without texts, behaviours, and facts that may change."""
     for name in GIVEN:
         for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name)):
             predicate = quad.predicate.value
@@ -112,7 +112,7 @@ def _of_behaviors(iri: str) -> bool:
 
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
-    """Yield the closure of some triples, those of IRIs only."""
+    """Yield the closure of some triples, as far as it consists of IRIs."""
     import tempfile
 
     import reasonable

@@ -52,14 +52,14 @@ class Remote(Protocol):
     """A remote store that answers SPARQL 1.1, such as `confab.reasoner.graph.stores.Endpoint`."""
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
-        """Return the answer to a query; with `confirm`, the query is recorded and asked again later."""
+        """Return the result of a query; with `confirm`, the query is recorded and repeated later."""
 
     def confirm(self) -> None:
         """Raise `KnowledgeError` if a recorded query has another answer now."""
 
 
 class KnowledgeError(ValueError):
-    """The given knowledge can't be used; the message says what, where, and what to do.
+    """The given knowledge can't be used; the message states the fault, its position, and the remedy.
 
     `node` is the IRI of the faulty node, if the message names it otherwise.
     """
@@ -91,13 +91,13 @@ class KnowledgeGraph:
     declared : mapping of prefix to namespace
         What the files declare, the scene's own first; the empty prefix is that of the scene's own file.
     faults : list of str
-        Why the scene can only be asked and not be planned in, if it was loaded in spite of them.
+        The reason why the scene can be queried but not planned in, if it was loaded in spite of faults.
     written : mapping of individual to place
         Where in the SPARQL update of a behaviour an individual stands that was made from it.
     remote : Remote, optional
         The store that answers instead of `store`; it is only read.
     round_trips : int
-        How many queries were asked so far.
+        Number of queries so far.
     """
 
     scene: str
@@ -225,7 +225,7 @@ def load(
     tolerant : bool
         Load any file of RDF, and note in `faults` what keeps it from being a scene: imports that aren't found, no ontology.
     faults : list of Fault, optional
-        Gets what is wrong with behaviours that are written as updates; without it, that is an error.
+        Receives the faults of behaviours that are written as updates; without it, they are errors.
 
     Raises
     ------
@@ -276,7 +276,7 @@ def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
 
 
 def _scene_first(files: Sequence[Path]) -> list[Path]:
-    """Return files with the scene first: the first file that none of the others imports."""
+    """Return files with the scene first: the first file that no other one imports."""
     if not files:
         raise KnowledgeError("no file is given; wanted the name of a shipped scene, or files of RDF")
     if len(files) == 1:
@@ -379,7 +379,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
         timed = _Timed(content, f"reading {file}")
-        if form.supports_datasets:  # whatever graphs it has, it is one file
+        if form.supports_datasets:  # all its graphs are in one file
             quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
             graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
         else:

@@ -79,7 +79,7 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
     Raises
     ------
     KnowledgeError
-        It isn't SPARQL 1.1, asks another endpoint without leave, or is nested too deeply.
+        It isn't SPARQL 1.1, queries another endpoint without permission, or is nested too deeply.
     LimitError
         It takes more time or memory, or gives more rows, than the limits allow.
     """
@@ -106,7 +106,7 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 
 
 class QueryWorker:
-    """A process that answers queries about a graph as it is when the process starts, one after the other.
+    """A process that answers queries about a graph in the state in which the process started, one after another.
 
     It starts with the first query and ends with the ``with`` block or with this process, even if that is killed. A query that is
     interrupted or exceeds its limits ends alone.
@@ -159,7 +159,7 @@ class QueryWorker:
         dataset = _existing(self.graph, dataset or clauses(self.graph, query) or (UNION, None))
         found = self._answer(core_names(self.graph, allowed(query, self.limits)), dataset)
         if found[0] == "error":
-            found = self._answer(query, dataset)  # as it was written, so that the position is right
+            found = self._answer(query, dataset)  # unchanged, for the right position in errors
         return _checked(self.graph, query, self.limits, found)
 
     def _answer(self, query: str, dataset: Dataset) -> Answer:
@@ -279,7 +279,7 @@ def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answ
 
 
 def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
-    """Return what is wrong with a query in one line, with the text at that place and the name of an unknown prefix."""
+    """Return the error of a query in one line, with the text at its position and the name of an unknown prefix."""
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
     used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]

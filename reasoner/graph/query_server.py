@@ -65,7 +65,7 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
                 limit(resource.RLIMIT_NOFILE, 3)  # no further one
             query, default, named = question
             said = pickle.dumps(answer(store, query, default, named, setup))
-            if len(said) > setup["memory"] // 10:  # it takes several times as much where it is read
+            if len(said) > setup["memory"] // 10:  # the reader needs several times as much memory
                 said = pickle.dumps(("too many", (), ()))
             while said:
                 said = said[os.write(theirs, said[: 1 << 20]) :]

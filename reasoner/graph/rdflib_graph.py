@@ -1,4 +1,4 @@
-"""A knowledge graph as an rdflib graph: what is added to one of them or removed from it changes both at once."""
+"""A knowledge graph as an rdflib graph: additions and removals apply to both at once."""
 
 from __future__ import annotations
 

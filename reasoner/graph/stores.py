@@ -72,14 +72,14 @@ class Endpoint:
     timeout : float
         Seconds to wait for an answer.
     retries : int
-        How often a question is asked again after a lost connection or a busy server, each time after twice the pause.
+        Number of retries after a lost connection or a busy server, each after twice the pause.
     graphs : tuple of str
-        IRIs of the named graphs whose union is asked; the endpoint's default graph if empty.
+        IRIs of the named graphs whose union is queried; the endpoint's default graph if empty.
 
     Attributes
     ----------
-    noted : mapping of query, as it is sent, to digest of its answer
-        What was read so far; `confirm` asks it again.
+    noted : mapping of query, as it is sent, to digest of its result
+        The results so far; `confirm` repeats the queries.
     """
 
     url: str
@@ -104,7 +104,7 @@ class Endpoint:
     def _pool(self) -> urllib3.PoolManager:
         retry = urllib3.Retry(
             total=self.retries,
-            read=min(1, self.retries),  # a question that took too long isn't asked for ever
+            read=min(1, self.retries),  # a query that timed out isn't repeated for ever
             backoff_factor=BACKOFF,
             status_forcelist=BUSY,
             allowed_methods=None,  # a query changes nothing, so a POST may be repeated
@@ -116,7 +116,7 @@ class Endpoint:
         )
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
-        """Return what a SPARQL 1.1 query answers.
+        """Return the result of a SPARQL 1.1 query.
 
         Parameters
         ----------
@@ -125,12 +125,12 @@ class Endpoint:
         bindings : mapping of variable to IRI
             Of variables that the query selects.
         noted : bool
-            Whether `confirm` asks it again.
+            Whether `confirm` repeats it.
 
         Raises
         ------
         KnowledgeError
-            Nothing answers there, or too slowly or too much; it wants authentication; it is no endpoint; the query isn't
+            No response, or too slow or too large; authentication is required; it is no endpoint; the query isn't
             SPARQL.
         """
         form = FORM.search(PROLOGUE.sub(" ", query))
@@ -158,7 +158,7 @@ class Endpoint:
         return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
 
     def confirm(self) -> None:
-        """Ask all recorded queries again, so that no two versions of the data get into one plan.
+        """Repeat all recorded queries, so that no two versions of the data get into one plan.
 
         Raises
         ------

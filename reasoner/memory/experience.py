@@ -40,7 +40,7 @@ def _named(kind: str, said: object) -> str:
 
 @dataclass(frozen=True)
 class Rule:
-    """A behaviour that achieves a goal, over roles; different roles stand for different individuals.
+    """A behaviour that achieves a goal, over roles; different roles denote different individuals.
 
     Attributes
     ----------

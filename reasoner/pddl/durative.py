@@ -1,7 +1,7 @@
-"""Durative actions of PDDL 2.1: the parts at the start, over all and at the end, and what an action asks and does as a whole.
+"""Durative actions of PDDL 2.1: their parts at the start, over all and at the end, and the action as a whole.
 
-As a whole, a condition that an effect at the start brings about isn't asked, and an effect at the start that the end takes
-back isn't seen: it is the action as it is if nothing else happens meanwhile.
+As a whole, a condition that an effect at the start achieves isn't required, and an effect at the start that the end deletes is
+hidden: this is the action if no other one overlaps it.
 """
 
 from __future__ import annotations

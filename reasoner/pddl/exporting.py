@@ -66,12 +66,12 @@ def to_pddl(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
+        In place of the problem's own; by default, symbols at rest in the initial state must be at rest in the end.
 
     Raises
     ------
     KnowledgeError
-        Some behaviour has a value that others ask for and that holds only while it lasts: actions without time don't show it.
+        Some behaviour has a value that others require and that holds only during it: actions without time can't express it.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(

@@ -29,7 +29,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class NumericEffect:
-    """A function changed as `head` (of `CHANGES`) says, where its condition holds."""
+    """A function changed by `head` (of `CHANGES`) if its condition holds."""
 
     head: str
     function: Form

@@ -13,7 +13,7 @@ action                          behaviour on level 1, all of whose variables are
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, its number behind the arguments
 any other function              situation type whose values are amounts, unless it only counts costs
-goal that is no fact            asked by the behaviour ``REACH_GOAL``, whose effect is a goal
+goal that is no fact            precondition of the behaviour ``REACH_GOAL``, whose effect is a goal
 ==============================  ================================================================
 
 Which predicates exclude one another is found by invariant synthesis: an action that adds one of them for an object
@@ -350,7 +350,7 @@ class _Import:
         return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to what was found, if it is a fact or a negated boolean one that agrees with the rest.
+        """Add a conjunct of the goal to the facts found, if it is a fact or a negated boolean one that agrees with the rest.
 
         So is a function that changes compared with a number.
         """
@@ -374,7 +374,7 @@ class _Import:
 
     @cached_property
     def signatures(self) -> dict[str, list[str]]:
-        """The types of each predicate's arguments: as declared, or wider where a variable of a wider type stands there."""
+        """The types of each predicate's arguments: as declared, or wider if a variable of a wider type occurs there."""
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
         parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
         parts += [(axiom.parameters, (axiom.condition, None)) for axiom in self.pddl.axioms]

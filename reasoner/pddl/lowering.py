@@ -1,4 +1,4 @@
-"""Behaviours as actions of PDDL: what they ask and change, as plainly as it can be said.
+"""Behaviours as actions of PDDL: their conditions and effects in the simplest form.
 
 ==============================  ==================================================================
 here                            in PDDL
@@ -7,7 +7,7 @@ effect on a known value         that value is deleted; an unknown one becomes a 
 negated value, inequality       parameter for the value that it is instead, which isn't the same
 "no such object"                predicate for "free", kept up to date, if it can't hold twice;
                                 else one contrary per object
-symbol that may not exist       predicate that says for what it does
+symbol that may not exist       predicate that states for which it does
 defined situation               its definition; ``:derived`` if it is recursive
 two effects on one symbol       the first one under the condition that the second one isn't made
 anything else                   as it is, with ``or``, ``exists``, ``when``, ``forall``

@@ -50,9 +50,10 @@ class Typed:
 
 @dataclass(frozen=True)
 class Action:
-    """An action as it is written; `precondition` and `effect` are forms whose words have been checked.
+    """An action as parsed; `precondition` and `effect` are forms whose words have been checked.
 
-    Those of a durative action are what it asks and does as a whole (`confab.reasoner.pddl.durative`); `durative` has the parts.
+    Those of a durative action are its conditions and effects as a whole (`confab.reasoner.pddl.durative`); `durative` has the
+    parts.
     """
 
     name: str
@@ -232,7 +233,7 @@ class _Reader:
                 actions.append(section)
             elif section.head == ":derived":
                 axioms.append(section)
-            elif section.head != ":requirements":  # what is declared and not used does no harm
+            elif section.head != ":requirements":  # unused declarations are harmless
                 raise self.fail(section, f"unknown section {section.head} in a domain")
         self.derived = {
             axiom.items[1].head for axiom in axioms if len(axiom.items) > 1 and isinstance(axiom.items[1], Form)
@@ -394,7 +395,7 @@ class _Reader:
         variables: Mapping[str, str],
         parts: Mapping[str, Form],
     ) -> None:
-        """Take a durative action; its parts are checked as those of any action, each by itself."""
+        """Read a durative action; its parts are checked like those of any action, each separately."""
         if ":duration" not in parts:
             raise self.fail(form, f"durative action '{name.text}' has no :duration")
         try:
@@ -555,7 +556,7 @@ class _Reader:
         for item, declared in zip(got, wanted, strict=True):
             kind, text = self.term(item, variables), self.word(item, "a term").text
             fits = declared.type in self.pddl.above(kind)
-            if text in variables:  # which may stand for an object of the type
+            if text in variables:  # a variable may denote an object of the type
                 fits = fits or kind in self.pddl.above(declared.type) or self.meet(kind, declared)
             if not fits:
                 dash = declared.type in self.pddl.objects and kind == "object"

@@ -54,7 +54,7 @@ class Table(Protocol):
         """Return a conjunction without what always holds, or None if it never holds."""
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
-        """Return what a number, a function or a calculation is here."""
+        """Return the value of a number, a function or a calculation."""
 
     def value_effects(
         self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
@@ -78,7 +78,7 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
     variables : Variables
         Those of the behaviour that aren't its parameters.
     conditions : sequence of Condition
-        What the action asks as a whole.
+        The preconditions of the action as a whole.
     """
     asked: list[tuple[Span, Condition]] = []
     made: list[tuple[Span, AnyEffect]] = []
@@ -96,9 +96,9 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which each durative action is two, for what looks for invariants: its start, and its end.
+    """Return a domain in which each durative action is two, its start and its end, for the search of invariants.
 
-    A fact is taken away safely if it is asked for where it is taken away: the end may add one in place of a fact that the start
+    A deletion is safe if the deleted fact is required at the same time: the end may add one in place of a fact that the start
     took away, unless the start adds one, too.
     """
     actions: dict[str, Action] = {}

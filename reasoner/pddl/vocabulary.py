@@ -34,7 +34,7 @@ class Vocabulary:
         self.names: dict[tuple[str, str], str] = {}
         self.taken = set(RESERVED.split())
         self.used: dict[str, None] = {}  # situation types that are named as predicates
-        self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # predicates that nothing changes, with their rows
+        self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # static predicates, with their rows
         self.arity: dict[str, int] = {}
         self.functions: dict[str, list[set[str]]] = {}  # with the types of the terms that are their arguments
         self.measured: dict[str, str] = {}  # relations that give a number, with their functions

@@ -7,7 +7,7 @@ preconditions become graph patterns on it:
 condition                  pattern
 =========================  ===================================================================
 `ValueCondition`           ``GRAPH <urn:confab:graph:situation> { ?cup k:location ?l }``
-`RelationCondition`        ``?hand k:canReach ?l``, static, on what is asserted and inferred
+`RelationCondition`        ``?hand k:canReach ?l``, static, on asserted and inferred facts
 `ClassCondition`           ``?cup a/rdfs:subClassOf* k:Cup``
 `Comparison`               ``GRAPH … { ?bottle k:servings ?n1 } FILTER(?n1 >= 2)``
 `Witness`, `AnyOf`         ``FILTER EXISTS { … }``, joined by ``||``
@@ -63,7 +63,7 @@ MOST_TOGETHER = 3
 
 @dataclass(frozen=True, order=True)
 class Affordance:
-    """What an object affords in a situation.
+    """The affordances of an object in a situation.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Affordance:
     situation : tuple of Fact
         The facts that its preconditions name and that hold.
     effect : tuple of Fact
-        What would hold afterwards.
+        The facts that would hold afterwards.
     """
 
     object: str
@@ -106,7 +106,7 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
-    """Yield the derived facts of the graph `SITUATION`, from nothing upwards.
+    """Yield the derived facts of the graph `SITUATION`, from stated facts upwards.
 
     Each has to be added before the next is requested.
     """
@@ -194,7 +194,7 @@ def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
     """Yield the preconditions that follow from the bounds of amounts that several effects of a behaviour may change at once.
 
-    Each effect is added up with those that change the same symbol where their arguments are equal.
+    Each effect is combined with those that change the same symbol if their arguments are equal.
     """
     for effect in behavior.amounts:
         quantity = situations[effect.situation].quantity
@@ -314,7 +314,7 @@ class _Writer:
                 for inner in conditions:
                     yield from self.pattern(inner)
                 known = any(_names(inner, variable) for inner in conditions)
-                # Of what is known already the class is only asked, not joined: hundreds of times as fast.
+                # Of a known individual the class is only tested, not joined: hundreds of times as fast.
                 yield f"FILTER EXISTS {{ {self.typed(variable, kind)} }}" if known else self.typed(variable, kind)
             case AnyOf(alternatives):
                 groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)

@@ -100,7 +100,7 @@ class Definitions:
     situations : mapping of value property to its situation type, and whether it is functional
     names : Names
     numbers : set of properties that lead to numbers
-    kinds : mapping of property to the classes of subject and value, as names; "" where nothing says it
+    kinds : mapping of property to the classes of subject and value, as names; "" where none is stated
     concluded : mapping of class to situation type and owner
         Classes that rules conclude, SWRL's (`confab.reasoner.reading.swrl`) or others, or that are defined by themselves, the
         situation type that holds of each, and the class that has it, "" if several do.
@@ -153,7 +153,7 @@ class Definitions:
     def _closed(self) -> frozenset[str]:
         """The classes without members for OWL 2 RL, since their definitions use `CLOSED` constructs.
 
-        Those are meant that are *Base and …*, where planning knows all that the definition speaks of.
+        Definitions of the form *Base and …* whose terms planning knows.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -223,7 +223,7 @@ class Definitions:
         if iri in self.concluded:
             return (ValueCondition(self.names.short(self.concluded[iri][0]), (term,), TRUE, negated),)
         found = tuple(self.expression(term, self._one_definition(iri)))
-        if iri not in self._situated:  # a scene may state who is in a class that doesn't change
+        if iri not in self._situated:  # a scene may state the members of a static class
             found = (AnyOf(((ClassCondition(term, self.names.short(iri)),), found)),)
         return (_negation(found),) if negated else found
 

@@ -1,4 +1,4 @@
-"""What is wanted: the goals of a task, and those that people type."""
+"""Goals: those of a task, and those that users type."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from confab.reasoner.symbols import (
 TASK = "Task"
 """The class of the individual that derived goals are about."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
-"""What is wanted of an amount, as people write it."""
+"""The goal for an amount, as users write it."""
 
 
 def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
@@ -48,7 +48,7 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
     Raises
     ------
     KnowledgeError
-        A word names nothing of its kind, the object doesn't have the situation type, or two goals exclude each other.
+        A word is unknown, the object doesn't have the situation type, or two goals exclude each other.
     """
     given: dict[Symbol, str] = {}
     for fact in goals:
@@ -64,7 +64,7 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     Raises
     ------
     KnowledgeError
-        A word names nothing of its kind; the message has the nearest known name.
+        A word is unknown; the message has the nearest known name.
     """
     words = fact.split()
     individuals = problem.individuals
@@ -135,7 +135,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
             kind = problem.domain.situations[symbol.situation]
             members = (problem.classes.get(of, ()) for of in kind.arguments)
             if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
-                continue  # what can't be so of these isn't
+                continue  # impossible members are left out
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
@@ -178,7 +178,7 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
 
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the value that a goal wants; of a negated one, what is left if not this on the first level that can see it.
+    """Return the value of a goal; for a negated one, the only other value on the first level that sees it.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return what a goal wants: of a class in the place of an individual, the same of each of the class."""
+    """Return the goals that a goal stands for: one for each member if it names a class in place of an individual."""
     if is_a(parts.nodes.get(iri, {}), "AllOf") and not parts.flag(iri, "negated"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)

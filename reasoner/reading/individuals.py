@@ -40,7 +40,7 @@ class Individuals:
         self.triples: dict[Triple, None] = {}
         self.seen: set[str] = set()
         values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
-        self.links = {*PLACES, *values, *schema.nodes}  # by which facts are said
+        self.links = {*PLACES, *values, *schema.nodes}  # properties of facts
 
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
@@ -69,7 +69,7 @@ class Individuals:
                 rows.append(stated((s, p, o), numbers))
                 continue
             if not names and said in links and subject not in nodes:
-                link((s, p, o))  # says what is wrong with it
+                link((s, p, o))  # reports its fault
             if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
                 rows.append((subject, said, text(o)))
         self.triples.update(dict.fromkeys(rows))

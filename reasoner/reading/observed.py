@@ -2,7 +2,7 @@
 
 Each fact is a situated object instance, an individual with object, situation type and value. It isn't the property assertion that
 the scene makes: a scene that says where a cup was, and a file that says where it was seen, don't contradict each other. A planning
-call that starts from what was observed puts these values in place of the scene's.
+call that starts from observations puts these values in place of the scene's.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     Raises
     ------
     KnowledgeError
-        The file is missing or no Turtle, or speaks of what the scene doesn't have.
+        The file is missing or not Turtle, or mentions terms that the scene doesn't have.
     """
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such file of observed facts; 'confab run' and 'confab execute' write one")

@@ -58,7 +58,7 @@ SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
 """Maximum depth of nested conditions."""
 MOST_CONDITIONS = 10_000
-"""Maximum number of conditions in a behaviour, each counted as often as it is named."""
+"""Maximum number of conditions in a behaviour, each counted once per occurrence."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,10 @@ class Parts:
     terms: set[str]
     pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
     definitions: Definitions
-    individuals_of: frozenset[str] = frozenset()  # classes that stand for all of their individuals
+    individuals_of: frozenset[str] = frozenset()  # classes that represent all of their individuals
     standing: dict[str, str] = field(
         default_factory=dict
-    )  # those of what is being read, and the term for each individual
+    )  # those of the current item, and the term for each individual
     inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
     count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
 

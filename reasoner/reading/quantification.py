@@ -65,7 +65,7 @@ def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str
 
     If ordered, the rows are in the order of IDs, but where individuals share an index, or have none and lie in several ontologies.
 
-    If the reading isn't of the whole scene, its individuals are the only ones that are asked for.
+    If the reading isn't of the whole scene, only its individuals are queried.
 
     Raises
     ------

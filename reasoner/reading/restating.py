@@ -1,6 +1,6 @@
 """A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it.
 
-What is refuted (`confab.reasoner.refutations`) is stated here, too, as the precondition that it is.
+A refutation (`confab.reasoner.refutations`) is stated here, too, as a precondition that excludes it.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ Node = Mapping[str, str]
 def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -> KnowledgeGraph:
     """Return a copy of a graph with some facts replaced.
 
-    What follows by inference is for the caller to conclude anew.
+    The caller has to infer consequences again.
 
     Raises
     ------
     KnowledgeError
-        Together with what holds besides, the facts can't be.
+        The facts are inconsistent with the rest of the state.
     """
     initial = reading.problem.initial
     try:
@@ -105,7 +105,7 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
     yield from _individual(every, "AllOf", "all of this")
     for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
         if not argument:
-            continue  # whatever it is
+            continue  # any value
         part = ox.NamedNode(f"{node.value}.argument{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
         yield from _individual(part, "EqualityCondition", f"it is {argument}")

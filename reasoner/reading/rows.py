@@ -20,14 +20,14 @@ from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
-FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
+FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, by name
 DATA = frozenset(
     CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct")
 )
 DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
-"""What the core says of its nodes in numbers, signs, durations, truth values and text; all else leads to other nodes."""
+"""The properties of the core whose values are numbers, signs, durations, truth values and text; all others lead to nodes."""
 OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
@@ -41,7 +41,7 @@ Member = tuple[str, str, int]
 
 @dataclass(frozen=True)
 class Schema:
-    """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
+    """The rows that are the same for every individual: those of `SCHEMA`, as IRIs.
 
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
     property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
@@ -66,7 +66,7 @@ class Schema:
 
     @cached_property
     def by_kind(self) -> Mapping[str, Sequence[str]]:
-        """The nodes of each class that they are said to be of, in the order of their IRIs."""
+        """The nodes of each class that they are stated to belong to, in the order of their IRIs."""
         found: dict[str, list[str]] = defaultdict(list)
         for iri, node in self.nodes.items():
             for kind in node[TYPE]:
@@ -81,7 +81,7 @@ class Schema:
 
     @cached_property
     def individuals_of(self) -> frozenset[str]:
-        """The classes of objects: where an individual is expected, they stand for all of theirs."""
+        """The classes of objects: in place of an individual, they denote all of their members."""
         known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}
         known |= {iri for iri, node in self.expressions.items() if OWL + "equivalentClass" in node}
         return frozenset(known - self.nodes.keys())
@@ -92,7 +92,7 @@ class Schema:
 
 
 def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
-    """Return what is said of each subject: the subjects in order, and the values of each property."""
+    """Return the statements about each subject: the subjects in order, and the values of each property."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for subject, predicate, value in triples:
         nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
@@ -104,7 +104,7 @@ def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, lis
 
 
 def core_triple(row: Sequence[Term]) -> Triple:
-    """Return a triple as text, once it is sure that a text isn't taken for the name of what is meant."""
+    """Return a triple as text, after checking that no text is confused with a name."""
     subject, predicate, value = row
     named = text(predicate)
     return (
@@ -148,7 +148,7 @@ def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
 
 
 def decimal(text: str, what: str) -> Fraction:
-    """Return a number that stands in an ontology, exact.
+    """Return a number that occurs in an ontology, exact.
 
     Raises
     ------
@@ -162,14 +162,14 @@ def decimal(text: str, what: str) -> Fraction:
 
 
 def index_of(iri: str, index: str) -> int:
-    """Return a node's place in the declared order; what has no index comes last."""
+    """Return a node's place in the declared order; nodes without an index come last."""
     if not index:
         return FIRST_INDEX_OF_NONE
     return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
 
 
 def whole_number(text: str, what: str, least: int, most: int) -> int:
-    """Return a number that stands in an ontology.
+    """Return a number that occurs in an ontology.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """A part of a scene that grows with the dependencies of a check, read without the routes of task recognition.
 
-A checker says which individuals it looks for: those of a class that satisfy conditions at first. The graph is asked for all of
-them, by one query. What was found is read with the values that it leads to, until nothing that is looked for is missing.
+A checker states the individuals that it looks up: members of a class that initially satisfy conditions. One query asks the graph
+for all of them. The individuals found are read with their values, and so on, until none that is looked up is missing.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Surroundings:
     Attributes
     ----------
     individuals : Individuals
-        What was read.
+        The individuals read.
     """
 
     def __init__(self, graph: KnowledgeGraph, slice_: Reading) -> None:

@@ -8,12 +8,12 @@ head ``Heavy(?x)``                           `Rule` of the situation type that `
 ``Cup(?x)``, the first such of ``?x``        the class of the term; else a `ClassCondition`, or what defines it
 ``liesIn(?x, ?y)``                           `ValueCondition` or `RelationCondition`
 ``sameAs``, ``differentFrom``                `EqualityCondition`
-``weight(?x, ?w)``                           ``?w`` stands for the amount
+``weight(?x, ?w)``                           ``?w`` denotes the amount
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
 A variable that the head doesn't name is determined by a functional value property, or else sought by a `Witness`. Rules are
-DL-safe: variables stand for the scene's individuals.
+DL-safe: variables denote the scene's individuals.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _FIRST, _REST = RDF + "first", RDF + "rest"
 
 Node = Mapping[str, Sequence[str]]
 Atom = tuple[str, tuple[str, ...]]
-"""A predicate, and the IRIs of variables and individuals or the text of numbers that it is said of."""
+"""A predicate, and its arguments: IRIs of variables and individuals, or the text of numbers."""
 
 
 def heads(nodes: Mapping[str, Node]) -> set[str]:
@@ -88,7 +88,7 @@ def _cells(nodes: Mapping[str, Node], start: Sequence[str]) -> Iterator[str]:
 
 
 def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -> dict[str, list[Rule]]:
-    """Return the rules that SWRL says, by the IRI of their situation types.
+    """Return the SWRL rules, by the IRI of their situation types.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -
     Raises
     ------
     KnowledgeError
-        A rule says what planning doesn't evaluate; the message has the rule, and what to say instead.
+        A rule has atoms that planning doesn't evaluate; the message has the rule, and an alternative.
     """
     found: dict[str, list[Rule]] = {}
     for iri in _rules(definitions.nodes):
@@ -123,7 +123,7 @@ class _Imp:
         body = self._atoms("body")
         self._numbers(body)
         for atom in sorted(body, key=lambda atom: (len(atom[1]) != 1, self.definitions.changes(atom[0]))):
-            self._said(*atom)  # classes first: they say best what a variable stands for
+            self._said(*atom)  # classes first: they determine the kind of a variable
         for predicate, said in self._atoms("head"):
             yield self._concluded(predicate, said)
 

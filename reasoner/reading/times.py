@@ -1,4 +1,4 @@
-"""What a scene says of time besides its behaviours: deadlines of goals, windows of individuals, and what happens by itself."""
+"""The times of a scene besides its behaviours: deadlines of goals, windows of individuals, and events at fixed times."""
 
 from __future__ import annotations
 

@@ -59,9 +59,9 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
     ask : callable
         Returns the rows of a query on the graph.
     spelled : mapping of behaviour to prefixes
-        Those of the file that states its update.
+        The prefixes of the file that states its update.
     prefixes : mapping of prefix to namespace
-        Those of all files, for what was asked of a store that knows no files.
+        The prefixes of all files, for results of a store without files.
     """
     texts: dict[str, str] = {}
     extends: dict[str, list[str]] = {}
@@ -133,7 +133,7 @@ def _compile(
 
 
 def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield a behaviour after all that it extends; one that extends itself comes twice."""
+    """Yield a behaviour after all that it extends; one that extends itself occurs twice."""
     if behavior in above:
         yield behavior
         return

@@ -1,7 +1,7 @@
-"""A Turtle file whose behaviours are written anew, as updates or as individuals; all else in it stays as it stands.
+"""Conversion of the behaviours in a Turtle file to updates or to individuals; the rest of the file is unchanged.
 
-The file is taken apart into statements. Those of a behaviour and its parts are exchanged; a behaviour that the other form can't
-say in the same way stays, with a note why.
+The file is split into statements. Those of a behaviour and its parts are replaced; a behaviour that the other form can't
+express stays, with a note why.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def convert(path: Path, form: Form) -> Converted:
     Raises
     ------
     KnowledgeError
-        It is no Turtle file, it or what it imports can't be read, or an update in it has a fault.
+        It isn't Turtle, it or an import can't be read, or an update in it has a fault.
     """
     path = Path(os.path.realpath(path))
     if path.suffix != ".ttl":
@@ -125,7 +125,7 @@ def update_of(graph: KnowledgeGraph, schema: Schema, iri: str) -> str:
     Raises
     ------
     ValueError
-        It says something that an update can't say.
+        It has parts that an update can't express.
     """
     (behavior,) = as_written(schema, [iri]).values()
     file = _File([], dict(sorted(graph.spoken.items(), key=lambda pair: pair[0] != "confab")))
@@ -328,9 +328,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
         nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
     schema = read_schema(graph)
     nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
-    priced = {
-        *schema.nodes[iri].get(CORE + "price", ())
-    }  # an update doesn't say a price, so that its calculation stays
+    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # an update has no price, so its calculation stays
     while (
         more := {v for node in priced for values in schema.nodes[node].values() for v in values}
         & schema.nodes.keys() - priced

@@ -56,9 +56,9 @@ class Update:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """The properties that an update can speak of, as IRIs.
+    """The properties that an update can use, as IRIs.
 
-    `properties` leads from a value property to its situation type; `functional` are those of one value at a time; `bare` are
+    `properties` maps a value property to its situation type; `functional` are those of one value at a time; `bare` are
     the situation types without a property, which stand for one themselves; `amounts` are the situation types, and `measures`
     the relations, that give numbers.
     """

@@ -120,7 +120,7 @@ AGGREGATE = re.compile("Aggregate_(Sum|Count|Max|Min)")
 
 @silent_about_numbers()
 def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
-    """Return the prefixes that a CONSTRUCT query declares, and what it says.
+    """Return the prefixes that a CONSTRUCT query declares, and its content.
 
     >>> total = "SELECT ?a (COUNT(?b) AS ?n) WHERE { ?b <urn:q> ?a } GROUP BY ?a"
     >>> _, one = constructed(f"CONSTRUCT {{ ?a <urn:p> ?n }} WHERE {{ {total} }}")
@@ -381,5 +381,5 @@ def words(tree: Any) -> Iterator[Word]:
 
 
 def place(tree: Any) -> int:
-    """Return the position of a part of the tree, as far as its words determine it."""
+    """Return the position of a part of the tree, if its words determine it."""
     return min((word.at for word in words(tree)), default=0)

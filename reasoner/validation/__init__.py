@@ -1,1 +1,1 @@
-"""What is wrong in an ontology: where, why, and what to do."""
+"""Validation of an ontology: faults with position, cause and remedy."""

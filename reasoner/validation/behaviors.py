@@ -1,4 +1,4 @@
-"""Rules on behaviours: variables that nothing determines, values that nothing reaches, effects that nothing refines."""
+"""Rules on behaviours: undetermined variables, unreachable values, effects without a refinement."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ EVERY_OTHER = re.compile(r"\?each\d")
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
-    """Find variables of effects and negated conditions that nothing determines."""
+    """Find undetermined variables of effects and negated conditions."""
     if case.reading is None:
         return
     domain = case.reading.problem.domain
@@ -125,8 +125,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     wanted = {
         (symbol.situation, value): symbol
         for symbol, value in problem.goal.items()
-        if problem.domain.situations[symbol.situation].quantity
-        is None  # what it can come to is for planning to find out
+        if problem.domain.situations[symbol.situation].quantity is None  # planning calculates its values
         and problem.initial.get(symbol, FALSE) != value
         and (symbol.situation, value) not in there
     }
@@ -156,7 +155,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         )
     for (situation, value), symbol in wanted.items():
         if any((situation, value) in given[name] for name in (*waiting, *contradictory)):
-            continue  # it follows from what is said of these
+            continue  # it follows from facts about these
         yield (
             names.iri(symbol.arguments[0]),
             f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
@@ -171,7 +170,7 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
     for situation in problem.domain.situations.values():
-        # others may change what no behaviour changes; situation types without objects are skipped
+        # Other sources may change symbols that no behaviour changes; situation types without objects are skipped.
         present = all(problem.classes.get(kind) for kind in situation.arguments)
         if situation.name not in changed or not present:
             there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
@@ -180,7 +179,7 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
 
 
 def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
-    """Return the values that a behaviour can produce, meanwhile or in the end, each with its situation type."""
+    """Return the values that a behaviour can produce, temporarily or finally, each with its situation type."""
     effects = [*behavior.effects, *(e for e in timing_of(behavior).made(Span.START) if isinstance(e, ValueEffect))]
     return {(e.situation, value) for e in effects for value in _individuals(e.value, behavior, problem)}
 
@@ -195,12 +194,12 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield groups of behaviours that need each other and nothing else: the causes of the other findings."""
+    """Yield groups of behaviours that depend on each other only: the causes of the other findings."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
         if name in seen or not reached <= needs.keys():
-            continue  # it needs a behaviour whose conditions exclude each other, of which another rule tells
+            continue  # it needs a behaviour whose conditions exclude each other, reported by another rule
         if all(name in _reached(other, needs) for other in reached - {name}):
             seen |= reached
             yield reached

@@ -109,7 +109,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
         why = "what is defined is true or false for each pair; a functional value property gives one value"
         return situation, what, why, f"drop owl:FunctionalProperty of {name}, or drop the axiom"
     if situation in changed:
-        return None  # `effect-on-definition` says it where the effect is
+        return None  # `effect-on-definition` reports it at the effect
     what += f"no property leads into {name}"
     why = "planning works out what follows from what behaviours change or what is static"
     mend = f"make a property that behaviours change, or a static one, rdfs:subPropertyOf {name}; or drop the axiom"

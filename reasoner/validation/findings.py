@@ -1,4 +1,4 @@
-"""Findings of validation: frozen values that name file, node, what is wrong, why, and the remedy."""
+"""Findings of validation: frozen values with file, node, fault, cause, and remedy."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ class Finding:
     Attributes
     ----------
     file : str
-        The file that says it.
+        The file that contains it.
     line : int
-        Where the file speaks of the node for the first time, counted from 1; 0 if unknown.
+        The line of the first occurrence of the node in the file, counted from 1; 0 if unknown.
     node, label : str
         IRI of the term at fault and its label, or its short name if it has none; empty if the whole file is meant.
     rule : str
         Name of the rule that was broken.
     what, why, remedy : str
-        What is wrong, why that matters, and what to do about it.
+        The fault, its effect, and its remedy.
     severity : str
-        ``error``; ``warning`` for what can be planned with all the same; ``remark`` for a choice to be aware of.
+        ``error``; ``warning`` for a fault that doesn't prevent planning; ``remark`` for a choice to be aware of.
     """
 
     file: str
@@ -152,7 +152,7 @@ class Places:
 
 
 def fill(template: str, words: Mapping[str, str]) -> str:
-    """Put words in for ``{name}`` in a template; a name without a word stays as it is.
+    """Insert words for ``{name}`` in a template; a name without a word stays as it is.
 
     >>> fill("{node} has no {what}", {"node": "cup1"})
     'cup1 has no {what}'

@@ -78,7 +78,7 @@ class Classification:
     Attributes
     ----------
     consistent : bool
-        Whether there can be a world as the ontology describes it; if not, nothing else is known.
+        Whether the ontology is consistent; if not, the other attributes are empty.
     empty : tuple of str
         IRIs of the named classes that can have no individual, prototypes among them.
     types : mapping of individual to classes
@@ -105,7 +105,7 @@ def world_of(triples: bytes) -> Any:
 
 
 def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False) -> Classification:
-    """Return what HermiT concludes from a graph; texts and numbers are left out, but for those of cardinalities.
+    """Return the conclusions of HermiT from a graph; texts and numbers are left out, except those of cardinalities.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False
     prototypes : str
         Turtle to add.
     types : bool
-        Ask for the individuals' classes as well.
+        Request the individuals' classes as well.
 
     Raises
     ------

@@ -52,7 +52,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
 
     causes: dict[tuple[str, str], dict[str, str]] = defaultdict(
         dict
-    )  # by what doesn't go together: behaviours, what they do
+    )  # by incompatible units: behaviours, their operations
     totals = {name: one.behavior for name, one in reading.problem.domain.aggregates.items()}
     for name, behavior in (*totals.items(), *reading.problem.domain.behaviors.items()):
         for left, right, does in _together(behavior):
@@ -253,7 +253,7 @@ class _Ranges:
                 continue
             left, right = self.of(condition.left, narrowed), self.of(condition.right, narrowed)
             if left is None or right is None:
-                continue  # what has no number is told by another rule
+                continue  # another rule reports missing numbers
             if not _possible(condition.operator, left, right):
                 return f"it requires that {_plain(condition)}", self.about(condition)
             if isinstance(condition.left, Amount):

@@ -1,4 +1,4 @@
-"""The table of our own validation rules, for what a SPARQL query can't express well.
+"""The table of validation rules that are implemented in Python, for checks that SPARQL can't express well.
 
 Each rule is a function from a `Case` to findings, written as (node, what, why, remedy).
 """

@@ -62,7 +62,7 @@ def relative_iris(case: Case) -> Iterator[Fault]:
 
 
 def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
-    """Yield each use of an undeclared term: the subject, the term, and what it has to be, in words and as classes."""
+    """Yield each use of an undeclared term: the subject, the term, and its expected kind, in words and as classes."""
     for triple in case.triples:
         for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
             types = case.types.get(iri, set())
@@ -71,7 +71,7 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return the nodes that name an undeclared term, and those that name these nodes: their other faults may follow from it."""
+    """Return the nodes that name an undeclared term, and those that name these nodes: their other faults may be consequences."""
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value
@@ -83,7 +83,7 @@ def misread(case: Case) -> set[str]:
 
 
 def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str, str, set[str]]]:
-    """Yield the IRIs of a triple with what they have to be."""
+    """Yield the IRIs of a triple with their expected kinds."""
     predicate, value = triple.predicate.value, triple.object
     yield predicate, "a property", PROPERTIES
     if not isinstance(value, ox.NamedNode):

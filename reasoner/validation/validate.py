@@ -1,16 +1,16 @@
-"""Validation of ontologies while they are written: what is wrong, where, why, and what to do.
+"""Validation of ontologies while they are written: faults with position, cause and remedy.
 
 ==================  ========================================================================
-what checks         where it is said
+what checks         documented in
 ==================  ========================================================================
 form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
-our own rules       `confab.reasoner.validation.rules.RULES`, for what a query can't say well
+our own rules       `confab.reasoner.validation.rules.RULES`, for checks that a query can't express well
 measures of bodies  `confab.reasoner.embodiment.measures.RULES`, where there is a robot
 joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, likewise
 skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, likewise
 solids              `confab.reasoner.embodiment.solid_checks`, likewise: one through another, overlapping at first
-logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
+logic (`deep`)      HermiT: consistency, empty classes, unsatisfiable preconditions
 ==================  ========================================================================
 """
 
@@ -96,21 +96,22 @@ def validate(
     files : sequence of str or Path
         Files, or names of shipped scenes. Each is checked together with its imports.
     deep : bool
-        Ask HermiT as well, which needs Java.
+        Run HermiT as well, which needs Java.
     done : callable, optional
-        Is told what is being done, `STAGES` times for each file.
+        Is notified of the current stage, `STAGES` times for each file.
 
     Returns
     -------
     list of Finding
-        In order of file and line, undeclared terms first; empty if nothing is wrong. Those that aren't `serious` are warnings.
+        In order of file and line, undeclared terms first; empty if the ontology has no faults. Those that aren't `serious` are
+        warnings.
 
     Raises
     ------
     KnowledgeError
         There is no such file.
     confab.reasoner.validation.hermit.NoJavaError
-        `deep` is wanted and there is no Java; the message says how to get one.
+        `deep` is requested and there is no Java; the message states how to install it.
     """
     return unique(finding for file in files for finding in _validate_one(file, deep, done or (lambda _: None)))
 
