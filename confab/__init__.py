@@ -3,15 +3,15 @@
 ================  =========================================================================================
 `scenes()`        the shipped scenes' names
 `load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a SPARQL endpoint
-`scene.query(…)`  ask it in SPARQL: a `Table`
+`scene.query(…)`  query it in SPARQL: a `Table`
 `scene.plan(…)`   plan in it: a `Result`
 `scene.verify(…)` carry a plan out in physics: a `Report`
 `scene.execute(…)`  act in a closed loop, and be interrupted: an `Execution`
-`Memory`          what was learned from all this; `practise(…)` learns, and shows what it is worth
-`new_domain(name)`  begin a domain of your own; `validate(file)` says what is wrong with it
+`Memory`          experience from planning and execution; `practise(…)` learns, and measures the benefit
+`new_domain(name)`  begin a domain of your own; `validate(file)` lists its faults
 `generate(…)`     a scene for trials, as large as wanted
 `within(seconds)` everything that is done in a block ends by then
-`KnowledgeError`  what was given can't be used; the message says what, where, and what to do
+`KnowledgeError`  the given input can't be used; the message states the fault, its position, and the remedy
 ================  =========================================================================================
 
 >>> import confab
@@ -77,11 +77,11 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first asked for, so that the command line starts fast."""
+    """Import a public name on first access, so that the command line starts fast."""
     if name not in _HOMES:
         from importlib.util import find_spec
 
-        if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` asks here first
+        if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` calls this first
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
         from confab.hints import MODULE
         from confab.reasoner.names import wrong_name

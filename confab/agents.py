@@ -2,7 +2,7 @@
 
 Each call is answered in a process of its own, which ends with the call: when its time is over, when the client cancels it, when the
 server ends. An answer is text of at most `SHOWN` bytes; the whole of a longer one is a resource that its last line names. Files are
-read in one folder; nothing is written but a scene's reach facts beside it.
+read in one folder; only a scene's reach facts are written, beside it.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def server(folder: Path) -> MCPServer[Any]:
 
     @made.tool()
     async def plan(scene: SceneName, goals: Goals = [], mode: Mode = "guarded", seconds: Seconds = 20.0) -> str:  # noqa: B006
-        """Plan: the steps of all levels, or why there is no plan, with what proves it."""
+        """Plan: the steps of all levels, or the reason why there is no plan, with its proof."""
         return await answered(answers.plan, scene, goals, [], mode, seconds, seconds=seconds)
 
     @made.tool()
@@ -137,12 +137,12 @@ def server(folder: Path) -> MCPServer[Any]:
     async def query(
         scene: SceneName, sparql: Annotated[str, Field(description="A SPARQL 1.1 query")], seconds: Seconds = 20.0
     ) -> str:
-        """Ask a scene in SPARQL (SELECT, ASK or CONSTRUCT); its prefixes are declared already."""
+        """Query a scene in SPARQL (SELECT, ASK or CONSTRUCT); its prefixes are declared already."""
         return await answered(answers.query, scene, sparql, seconds, seconds=seconds)
 
     @made.tool()
     async def validate(scene: SceneName, seconds: Seconds = 60.0) -> str:
-        """Say what is wrong with an ontology file, where, why, and what to do."""
+        """List the faults of an ontology file, with positions, causes and remedies."""
         return await answered(answers.validate, scene, seconds=seconds)
 
     @made.tool()
@@ -152,7 +152,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Say why a step is in the plan: its effects, and what needs them."""
+        """Explain why a step is in the plan: its effects, and the steps that need them."""
         return await answered(answers.why, scene, goals, step, seconds, seconds=seconds)
 
     @made.tool()
@@ -164,7 +164,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Say why an alternative isn't in the plan: the conditions that it lacks, or its additional cost."""
+        """Explain why an alternative isn't in the plan: its failing conditions, or its additional cost."""
         return await answered(answers.why_not, scene, goals, instead, seconds, seconds=seconds)
 
     @made.tool()

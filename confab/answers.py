@@ -59,7 +59,7 @@ def scene_of(folder: Path, name: str) -> Scene:
         refuse_outside(catalog, catalog)
         for file in ontology.catalog(catalog).values():
             refuse_outside(catalog, file)
-    for file in sorted(path.parent.iterdir()):  # what may be imported by its name
+    for file in sorted(path.parent.iterdir()):  # files that may be imported by name
         if file.suffix in ontology.SUFFIXES:
             refuse_outside(file, file)
     scene = load(path)

@@ -81,12 +81,12 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
 def validate(*files: str | Path, deep: bool = False) -> Table:
     """Return the findings in ontology files and their imports: a row for each, with its remedy.
 
-    `deep` also asks HermiT, which needs Java.
+    `deep` also runs HermiT, which needs Java.
 
     Raises
     ------
     KnowledgeError
-        There is no such file, or no Java for what is deep.
+        There is no such file, or no Java for a deep validation.
 
     Examples
     --------
@@ -218,7 +218,7 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     Individuals of other scenes, which the paper's links may name, are left out.
     """
     spoken: set[str] = set()
-    with suppress(SyntaxError):  # of which reading the memory tells
+    with suppress(SyntaxError):  # reading the memory reports it
         kinds = {t.subject for t in memory.triples if getattr(t.object, "value", "") == CORE + "GoalKind"}
         spoken = {
             t.object.value
@@ -288,7 +288,7 @@ def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:
     """Return the content of a memory file, and its prefixes."""
     if not memory.is_file():
         raise KnowledgeError(f"{memory}: no such memory file")
-    Memory.load(memory)  # what it isn't, it says better
+    Memory.load(memory)  # raises the better message
     parser = ox.parse(path=str(memory), format=ox.RdfFormat.TURTLE, base_iri=memory.resolve().as_uri())
     quads = list(parser)
     return quads, dict(parser.prefixes)

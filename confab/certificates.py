@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """The verdict of the checker on a certificate: `refused` says why it proves nothing.
+    """The verdict of the checker on a certificate: `refused` says why it isn't a proof.
 
     None if it proves that there is no plan.
     """
@@ -56,7 +56,7 @@ def checked_certificate(scene: Scene, goals: tuple[str, ...], file: Path) -> Che
     Raises
     ------
     KnowledgeError
-        The file holds no certificate, or a goal names what the scene doesn't have.
+        The file contains no certificate, or a goal mentions terms that the scene doesn't have.
     """
     certificate = read_certificate(file)
     scene.settle()

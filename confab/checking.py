@@ -25,7 +25,7 @@ def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[
     ----------
     graph : KnowledgeGraph
     slice_ : Reading
-        What the plan was made in.
+        The scene in which the plan was made.
     plan : Plan
     goals : sequence of str
         Goals that replaced some of the task's.

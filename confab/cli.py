@@ -1,4 +1,4 @@
-"""The command line: which command is which function. They stand in `confab/commands/`, by their purpose.
+"""The command line: a table of commands and their functions, which are in `confab/commands/`, by purpose.
 
 Results go to stdout, progress and errors to stderr (`confab.terminal`). Exit 0: yes; 1: the answer is no; 2: misuse or
 unreadable input; 3: gave up at a limit; 4: a fault of ours. A command's module is imported when it is asked for, and heavy
@@ -125,6 +125,6 @@ def app() -> None:
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
     """Run the command line: everything ends as an exit code and at most one line on stderr.
 
-    `ending` ends the process if a step continues long after its deadline; without it, as within another program, nothing does.
+    `ending` ends the process if a step continues long after its deadline; within another program, the process isn't ended.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

@@ -127,7 +127,7 @@ def unified(domain: str, problem: str) -> unified_planning.model.Problem:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # it uses outdated names of pyparsing
             return PDDLReader().parse_problem_string(domain, problem)
-    except Exception as error:  # of many kinds, for what it doesn't know
+    except Exception as error:  # of many kinds, for unsupported features
         raise KnowledgeError(f"unified-planning can't read this level: {error}") from error
 
 
@@ -219,7 +219,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
-                planner.skip_checks = True  # some say no to action costs, which they take
+                planner.skip_checks = True  # some reject action costs although they accept them
                 result = planner.solve(task, timeout=seconds)
                 name = engine or planner.name
         except UPException as error:

@@ -53,7 +53,7 @@ def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Interven
     Raises
     ------
     KnowledgeError
-        A text isn't of a known form, or names what the scene doesn't have.
+        A text has no known form, or mentions terms that the scene doesn't have.
     """
     found: list[Intervention] = []
     for text in texts:
@@ -76,7 +76,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     Raises
     ------
     KnowledgeError
-        The text isn't of a known form, or names what the scene doesn't have.
+        The text has no known form, or mentions terms that the scene doesn't have.
     """
     match = re.fullmatch(r"\s*(after|at)=(\S+)\s+(.+?)\s*", text)
     if match is None:
@@ -170,7 +170,7 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Read ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres: a box of which no fact speaks."""
+    """Read ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres: a box that no fact mentions."""
     place, size = (*words, "6x6x12")[:2] if words else ("", "")
     try:
         numbers = tuple(float(number) / 100 for number in size.split("x"))
@@ -298,12 +298,12 @@ class Execution:
 
     @property
     def plan(self) -> Plan:
-        """The plan as it was carried out."""
+        """The plan as it was executed."""
         return self.episode.done
 
     @property
     def reached(self) -> bool:
-        """Whether what was wanted was reached."""
+        """Whether all goals were reached."""
         return self.episode.status is End.REACHED
 
     def json(self) -> dict[str, Any]:
@@ -311,7 +311,7 @@ class Execution:
         return episode_json(self.episode)
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return what is to be said of each step, by its path: surprises, and where the plan changed."""
+        """Return remarks on each step, by its path: surprises, and changes of the plan."""
         notes = {
             event.step.path: "✗ " + (event.code or "; ".join(str(s.symbol) for s in event.surprises))
             for event in self.episode.events
@@ -323,7 +323,7 @@ class Execution:
         return notes
 
     def summary(self) -> str:
-        """Return one line that says how it went."""
+        """Return a summary of the episode in one line."""
         episode = self.episode
         primitives = len(episode.done.primitives)
         text = f"{episode.status.value}: {primitives} primitives done"
@@ -347,7 +347,7 @@ class Execution:
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
-        """Write the episode, whole or not at all, and return where: as JSON if the name ends so, else as Turtle (PROV-O)."""
+        """Write the episode, completely or not at all, and return the path: JSON if the name ends so, otherwise Turtle (PROV-O)."""
         from confab.reasoner.memory.episodes import save_episode
 
         if Path(path).suffix == ".json":
@@ -362,7 +362,7 @@ class Execution:
         return Path(path)
 
     def __rich__(self) -> PlanTree:
-        """Return the plan as it was carried out, for rich."""
+        """Return the executed plan, for rich."""
         from confab.show import plan_tree
 
         return plan_tree(self.episode.done, self.summary(), self.notes())
@@ -412,7 +412,7 @@ def carry_out(
     time_limit: float | None = None,
     **options: Unpack[Options],
 ) -> Execution:
-    """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
+    """Execute a task with the arguments of a caller: see `confab.scene.Scene.execute`."""
     from confab.live import spectator
 
     scene.settle()
@@ -445,7 +445,7 @@ def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> 
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
-    """Return what plans from scratch in a mode; None stands for the fast planner.
+    """Return the planner for planning from scratch in a mode; None denotes the default planner.
 
     Raises
     ------
@@ -497,9 +497,9 @@ def execute(
     seed : int
         Of everything random in physics.
     observer : callable, optional
-        Is told what happens, as it happens.
+        Called with every event.
     prepare : callable, optional
-        Called with the PyBullet world before it begins: plants a fault, say.
+        Called with the PyBullet world before it begins, for instance to inject a fault.
     retry_policy : RetryPolicy
     caution : Caution, optional
         What failed in earlier episodes.
@@ -575,7 +575,7 @@ def _with_both_hands(
     observer: Callable[[Event], None] | None,
     caution: Caution | None,
 ) -> Episode:
-    """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
+    """Execute a plan with all hands at once as far as possible, and the rest in a closed loop."""
     from confab.planner.acting.episode import ExecutedPrimitive, Failure
     from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together

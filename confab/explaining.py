@@ -131,11 +131,11 @@ def explain(
     steps : sequence of behaviour and arguments
         The plan's steps on one level, from the problem's initial state.
     number : int
-        Which of them is to be explained.
+        The step to be explained.
     against : behaviour and arguments, optional
         The alternative; if left out, what else rules would do there.
     labels : Labels, optional
-        To say it in people's words.
+        The labels for the text.
 
     Raises
     ------

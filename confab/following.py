@@ -26,7 +26,7 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Whether anything may be defined; asked first, since most scenes needn't be read for a query."""
+"""Whether definitions may exist; tested first, since most scenes needn't be read for a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:

@@ -24,7 +24,7 @@ RECORD = "run.json"
 
 @dataclass(frozen=True)
 class Run:
-    """A run that was kept: its folder's name, when it was made, by which options, what memory held, and what the page shows.
+    """A stored run: its folder's name, date, options, the state of memory, and the data of its page.
 
     Examples
     --------

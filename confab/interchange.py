@@ -75,7 +75,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     Raises
     ------
     KnowledgeError
-        The file isn't JSON of that form, or a step names what the scene doesn't have; the message says where.
+        The file isn't JSON of that form, or a step mentions terms that the scene doesn't have; the message has the position.
     """
     data = _json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
@@ -93,7 +93,7 @@ def read_certificate(path: Path) -> Certificate:
     Raises
     ------
     KnowledgeError
-        The file isn't JSON of that form; the message says what was wanted.
+        The file isn't JSON of that form; the message says what was expected.
     """
     data = _json(path, "certificate")
     try:
@@ -148,7 +148,7 @@ def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem
     Raises
     ------
     KnowledgeError
-        The data are no step, or name what the scene doesn't have; the message says where.
+        The data are no step, or mention terms that the scene doesn't have; the message has the position.
     """
     where = f"{path}: step {'.'.join(map(str, position))}"
     if not isinstance(data, dict) or not isinstance(data.get("behavior"), str):

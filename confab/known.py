@@ -62,7 +62,7 @@ class Known:
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying: the present knowledge; what was read from it is read again."""
+        """Return the state for pickling and copying: the present knowledge; values read from it are read again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
@@ -70,7 +70,7 @@ class Known:
     def reading(self) -> Reading:
         """The whole scene as a problem, and the table of its names and IRIs.
 
-        `plan` doesn't use it: it reads only what the task can need.
+        `plan` doesn't use it: it reads only the individuals that the task can need.
         """
         self.settle()
         self.knowledge.require_whole()
@@ -163,7 +163,7 @@ class Known:
         Raises
         ------
         KnowledgeError
-            A word names nothing of its kind, or the store is a remote one.
+            A word is unknown, or the store is a remote one.
 
         Examples
         --------
@@ -218,7 +218,7 @@ class Known:
         KnowledgeError
             The scene is symbolic only.
         EmbodimentError
-            Something that physics needs isn't said; the message names it.
+            A statement that physics needs is missing; the message names it.
         """
         from confab.reasoner.embodiment.reading import read_embodiment
 
@@ -241,7 +241,7 @@ class Known:
         return self._mirror.world
 
     def _forget(self) -> None:
-        """Discard what was read before an edit."""
+        """Discard the values read before an edit."""
         for name in ("reading", "names", "embodiment"):
             self.__dict__.pop(name, None)
         self._edited = True
@@ -256,7 +256,7 @@ class Known:
             infer(self.knowledge)
 
     def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
-        """Return what a SPARQL 1.1 query answers, as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
+        """Return the result of a SPARQL 1.1 query as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
 
         The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
 
@@ -266,7 +266,7 @@ class Known:
         Raises
         ------
         KnowledgeError
-            The query isn't SPARQL; the message has line and column. Or it asks another endpoint without leave.
+            The query isn't SPARQL; the message has line and column. Or it queries another endpoint without permission.
         LimitError
             It takes more time, rows or memory than the limits allow.
 
@@ -292,7 +292,7 @@ class Known:
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
 
     def with_episodes(self: S, *files: str | Path) -> S:
-        """Return the scene with saved episodes in it, so that `query` can ask about all of them.
+        """Return the scene with saved episodes in it, so that `query` covers all of them.
 
         Raises
         ------
@@ -317,7 +317,7 @@ class Known:
             with (
                 suppress(KnowledgeError),
                 within((limits or QueryLimits()).seconds),
-            ):  # what can't be planned in can be asked all the same
+            ):  # a scene that can't be planned in can still be queried
                 write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:
             log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
@@ -367,7 +367,7 @@ class Known:
         Raises
         ------
         KnowledgeError
-            There is no such behaviour, or it says something that an update can't say.
+            There is no such behaviour, or it has parts that an update can't express.
         """
         from confab.reasoner.reading.quantification import behavior_named
         from confab.reasoner.updates.converting import update_of
@@ -391,7 +391,7 @@ class Known:
         Raises
         ------
         KnowledgeError
-            There is no object of that name; ``all`` and None stand for every object.
+            There is no object of that name; ``all`` and None denote every object.
         """
         from confab.reasoner.reading.affordance import affordances
 

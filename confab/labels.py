@@ -109,7 +109,7 @@ WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind",
 
 
 def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
-    """Return a pattern of the words in a label that stand for a role, or None; for a role named "onto", the words after "onto"."""
+    """Return a pattern of the words in a label that denote a role, or None; for a role named "onto", the words after "onto"."""
     name = role.lstrip("?")
     if name.lower() in WAYS:
         others = "|".join(re.escape(term.lstrip("?")) for term in terms)
@@ -156,7 +156,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
         Lead to the IRIs.
     problem : Problem
     others : iterable of str
-        Names that the problem doesn't have: of furniture, say.
+        Names that the problem doesn't have: of furniture, for instance.
     """
     domain = problem.domain
     spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}

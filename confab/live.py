@@ -40,7 +40,7 @@ class View:
             self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return what is to be said of each step: done, or being done."""
+        """Return the state of each step: done, or in progress."""
         if self.event is None:
             return {}
         notes = {step.path: "✓" for step in self.event.plan.walk() if _is_done(step, self.event)}
@@ -53,7 +53,7 @@ class View:
         return "; ".join((self.headline(), *self.log[-1:]))
 
     def headline(self) -> str:
-        """Return what is being done, in one line."""
+        """Return the current step in one line."""
         if self.event is None:
             return "planning"
         primitives = self.event.plan.primitives
@@ -91,7 +91,7 @@ class View:
 def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
     """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither.
 
-    `other` is told, too.
+    `other` is another observer.
     """
     if watch and _in_notebook():
         with in_notebook() as observer:
@@ -104,7 +104,7 @@ def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Obs
 
 
 def both(one: Observer | None, other: Observer) -> Observer:
-    """Return what tells two spectators."""
+    """Return an observer that notifies two others."""
 
     def observer(event: Event) -> None:
         if one is not None:

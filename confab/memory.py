@@ -53,17 +53,17 @@ class Memory:
     Attributes
     ----------
     links : Links
-        The paper's p(situated object instance | quantified behaviour); read from a file when it is first asked for.
+        The paper's p(situated object instance | quantified behaviour); read from a file on first access.
     names : Names
         Leads short names to IRIs.
     scene : str
         IRI of the scene that the memory file imports.
     experience : Experience
-        Rules, orders of goals and methods, with what was chosen, passed over and failed.
+        Rules, orders of goals and methods, with counts of choices, rejections and failures.
     trusted : set of replica
         Whose experience may lead: by default the replica that learns here. With any other, planning is strict.
     labels : function, optional
-        What people call the scene's terms, asked for where something is said.
+        Labels of the scene's terms, looked up when a text needs them.
     """
 
     linked: Links | Callable[[], Links]
@@ -109,7 +109,7 @@ class Memory:
         Raises
         ------
         KnowledgeError
-            The memory is missing, broken or newer than this program; the message says what to do.
+            The memory is missing, broken or newer than this program; the message states the remedy.
         """
         url = endpoint(source)
         if url is not None:
@@ -138,12 +138,12 @@ class Memory:
         plan : Plan, Result, Execution or file
             Of an execution all is learned, as by `live`.
         failed : path of a step, optional
-            The step that failed; what came before it worked, what comes after it wasn't tried.
+            The step that failed; the steps before it succeeded, the steps after it weren't tried.
 
         Raises
         ------
         KnowledgeError
-            The plan can't be done in that situation; nothing is learned then.
+            The plan isn't applicable in that situation; the memory is unchanged.
         """
         from confab.planner.acting.episode import Episode
         from confab.planner.experience.lessons import live
@@ -173,7 +173,7 @@ class Memory:
         Raises
         ------
         KnowledgeError
-            The plan can't be done in the scene's situation; nothing is learned then.
+            The plan isn't applicable in the scene's situation; the memory is unchanged.
         """
         from confab.planner.experience.lessons import teach
 
@@ -226,7 +226,7 @@ class Memory:
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
         vain = list(in_vain(problem, episode))
         whole = not episode.interventions and not episode.failures
-        with suppress(LearningError):  # what was done doesn't follow from what was seen in the beginning
+        with suppress(LearningError):  # the executed steps aren't applicable in the initial observation
             if whole or vain:
                 live(self.experience, begun, episode.done if whole else Plan(()), vain=vain)
 
@@ -238,7 +238,7 @@ class Memory:
         Raises
         ------
         KnowledgeError
-            What was written says something else than this memory; the file stays as it was.
+            The written file differs from this memory; the old file stays.
         OSError
             The file can't be written.
         """

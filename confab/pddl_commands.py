@@ -32,7 +32,7 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
     Returns
     -------
     Problem
-        What the scene says.
+        The scene's problem.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def exported(problem: Problem, level: int | None) -> Exported:
     Raises
     ------
     KnowledgeError
-        There is no such level, or none at all.
+        There is no such level, or the scene has none.
     """
     levels = problem.domain.levels
     if not levels:
@@ -82,7 +82,7 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     Raises
     ------
     KnowledgeError
-        There is no such level, or none at all, or the folder can't be written.
+        There is no such level, the scene has none, or the folder can't be written.
     """
     found = exported(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"

@@ -75,7 +75,7 @@ class Report:
 
     @property
     def poured(self) -> float | None:
-        """Mean share of a serving that arrived, over all pours of all rollouts; None if nothing was poured."""
+        """Mean share of a serving that arrived, over all pours of all rollouts; None if there was no pour."""
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 
@@ -90,7 +90,7 @@ class Report:
         }
 
     def _seen(self, rollout: Rollout) -> list[str]:
-        """Return what was seen in the end of the symbols that have a goal."""
+        """Return the final observed values of the symbols that have a goal."""
         return [str(Fact(symbol, rollout.state[symbol])) for symbol in sorted(self.goal) if symbol in rollout.state]
 
     def notes(self) -> dict[tuple[int, ...], str]:

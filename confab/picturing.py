@@ -173,7 +173,7 @@ def class_tree(scene: Known) -> Figure:
 
 
 def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return pairs of class and subclass without those that follow from others, as reasoners write them into files."""
+    """Return pairs of class and subclass without redundant ones, which reasoners write into files."""
     import networkx
 
     graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])

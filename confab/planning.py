@@ -102,15 +102,15 @@ def plan(
     goals, goal : str or iterable of str
         Each like ``cup2 LOCATION location8``; replaces the goal of that symbol. One may be given by either name.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
-        What was learned before; none if left out.
+        The memory; none if left out.
     mode : str
         ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
         ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
         it; behaviours are then numbered among the individuals that were recognised. ``optimal``: as `optimal` says.
     time_limit : float or Deadline, optional
-        Seconds after which the call gives up, or when; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
+        Seconds until the call gives up, or its deadline; `OPTIMAL_SECONDS` if `optimal` is requested without a limit.
     optimal : bool
-        Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
+        Improve the plan until it is proved optimal or a limit is reached, and report the bound; without memory.
     observed : str or Path, optional
         File of observed facts, which replace the scene's.
     engine : str, optional
@@ -120,8 +120,8 @@ def plan(
     level : int, optional
         The level that the engine plans; the lowest if left out.
     leave_levels : bool
-        Whether steps of a lower level may stand where a level has no plan that can be refined; the outcome says where, and
-        what they break that only the level above asks.
+        Whether steps of a lower level may take the place of a level that has no refinable plan; the outcome says where, and
+        which conditions of the upper level they violate.
     minimise : str, optional
         ``makespan``: the plan gets a schedule (`Result.timed`), with its turns taken by any of the actors that could. ``cost``:
         the same as `optimal`. ``steps``: the same, with every step at a cost of 1. If left out, steps are few, without a proof.
@@ -129,9 +129,9 @@ def plan(
     Raises
     ------
     KnowledgeError
-        A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
+        A goal mentions terms that the scene doesn't have, the mode is unknown, or options exclude each other.
     LimitError
-        The time was over before the search began; if it is over later, the outcome says so.
+        The time limit passed before the search began; if it passes later, the outcome says so.
     """
     checked_minimise(minimise)
     if minimise in ("cost", "steps"):
@@ -203,7 +203,7 @@ def _plan(
         return with_goals(scene.problem, goals)
 
     faulty = [*never_done(problem)]
-    if faulty and not seen.whole:  # an individual that was left out may have the value that nothing makes
+    if faulty and not seen.whole:  # an individual that was left out may have the value
         problem = whole()
         faulty = [*never_done(problem)]
 
@@ -306,7 +306,7 @@ AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 class Result:
     """The result of planning: the outcome, and the scene in which it holds.
 
-    `problem` has the individuals that the task can need; `queries` is how many the store was asked. `part` is the part of the
+    `problem` has the individuals that the task can need; `queries` is the number of queries to the store. `part` is the part of the
     scene that the problem was read from, if it isn't the whole scene, and `goals` are those that replaced some of the task's.
     """
 
@@ -418,7 +418,7 @@ class Result:
     def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
         """Return why an alternative isn't in the plan.
 
-        The conditions that it lacks, or the plan with it and its additional cost.
+        The failing conditions, or the plan with the alternative and its additional cost.
 
         Parameters
         ----------
@@ -442,7 +442,7 @@ class Result:
             return other.problem, other.outcome, other.labels
 
         with within(seconds):
-            choice = BY.search(asked) is not None  # what may take part besides is looked for in the whole scene
+            choice = BY.search(asked) is not None  # other individuals are looked up in the whole scene
             if choice and self.part is not None:
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
@@ -492,7 +492,7 @@ class Result:
         return float(cost_of(self.problem, self.plan))
 
     def dearer(self) -> str:
-        """Return what is known of a cheaper plan, and how to ask for it; an empty text if nothing is.
+        """Return the known bound on a cheaper plan, and how to search for it; an empty text if there is none.
 
         Examples
         --------

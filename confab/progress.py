@@ -28,7 +28,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
     Parameters
     ----------
     what : str
-        What is being done.
+        The current stage.
     total : int, optional
         The amount of work; if unknown, the bar shows only the time.
     """
@@ -77,7 +77,7 @@ def tell(what: str) -> None:
 
 
 def be_verbose() -> None:
-    """Say on stderr what each stage takes, and what is logged, until the process ends."""
+    """Print the duration of each stage and log messages on stderr, until the process ends."""
     spoken = logging.getLogger("confab")
     spoken.setLevel(logging.DEBUG)
     if not spoken.handlers:
@@ -88,5 +88,5 @@ def be_verbose() -> None:
 
 
 def quiet() -> bool:
-    """Return whether only results and errors are to be printed (`confab COMMAND --quiet`)."""
+    """Return whether only results and errors are printed (`confab COMMAND --quiet`)."""
     return not log.isEnabledFor(logging.WARNING)

@@ -69,7 +69,7 @@ def with_reach(scene: S) -> S:
     Raises
     ------
     KnowledgeError
-        The scene is symbolic only, or lacks something that physics needs.
+        The scene is symbolic only, or lacks statements that physics needs.
     """
     from confab.reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
     from confab.sim.reach import fingerprint, reach

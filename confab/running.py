@@ -37,7 +37,7 @@ TOLD = 8
 
 @dataclass(frozen=True)
 class Job:
-    """What `run` does: its scene and goals, how it plans, what it films, and where the results go.
+    """The job of `run`: its scene and goals, planning options, video, and target folder.
 
     `memory` is the only file that is read or written as memory. `noise` is the standard deviation of perceived positions in metres.
     """
@@ -57,7 +57,7 @@ def run(job: Job) -> int:
     """Do the main job, print its results, and write its files.
 
     A scene without a robot's body is planned in and the plan is checked. The same is done where PyBullet isn't installed: a
-    remark says first what can't be done, and the exit code is that of misuse.
+    remark first names the obstacle, and the exit code is that of misuse.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def run(job: Job) -> int:
     good = result.outcome.plan is not None and (report is None or report.verified) and (physics or not bodies)
     if job.memory and good:
         with undisturbed(job.memory):
-            if has_content(job.memory):  # another process may have learned meanwhile
+            if has_content(job.memory):  # another process may have changed it
                 remembered = Memory.load(job.memory, scene)
             remembered.learn(scene, result)
             remembered.save(job.memory)
@@ -118,7 +118,7 @@ def run(job: Job) -> int:
 
 
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
-    """Return the first plan that physics doesn't refute, with what is known by then, and what physics says of it.
+    """Return the first plan that physics doesn't refute, with the refutations found and the verdict of physics.
 
     What motion planning refutes is known to the next plan, and is saved if there is one.
     """
@@ -136,7 +136,7 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
 
 
 def verified(scene: Scene, result: Result, job: Job) -> Report:
-    """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
+    """Return the verdict of physics on a plan, with a progress bar on stderr."""
     steps = result.plan.primitives
     video = job.out / "run.mp4" if job.film else None
     tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))

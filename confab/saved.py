@@ -49,7 +49,7 @@ def read_episode(scene: Known, path: Path) -> Execution:
     Raises
     ------
     KnowledgeError
-        The file holds no episode, one of another scene, or names what the scene doesn't have.
+        The file contains no episode, one of another scene, or mentions terms that the scene doesn't have.
     """
     from confab.execution import Execution
 
@@ -100,7 +100,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
     Raises
     ------
     KnowledgeError
-        The file holds no verdicts, or those of another plan.
+        The file contains no verdicts, or those of another plan.
     """
     from confab.physics import Report
     from confab.sim.verdict import Verdict
@@ -143,7 +143,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON object in a file; what is missing or of another form in it is a `KnowledgeError`."""
+    """Yield the JSON object in a file; missing parts or parts of another form raise a `KnowledgeError`."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -164,7 +164,7 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
 def _interventions(
     problem: Problem, data: Data
 ) -> tuple[tuple[tuple[Intervention, float], ...], tuple[Intervention, ...], Problem]:
-    """Return the interventions that happened, those that never came, and the problem with all individuals that came in."""
+    """Return the interventions that took place, those that didn't, and the problem with all added individuals."""
     from confab.execution import parse_intervention
 
     for one in data.get("discovered", []):

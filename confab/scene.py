@@ -168,7 +168,7 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            The file holds no plan, or a step names what this scene doesn't have.
+            The file contains no plan, or a step mentions terms that this scene doesn't have.
         """
         return plan_of(path, self.problem)
 
@@ -202,7 +202,7 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            There is no such level, or it says what PDDL can't say.
+            There is no such level, or it has parts that PDDL can't express.
         """
         from confab.pddl_commands import exported
 
@@ -277,7 +277,7 @@ def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | 
     ------
     KnowledgeError
         No such scene; broken syntax; an endpoint that is down, or slow, or none. A file whose imports can't be found, or that
-        declares no ontology, can be asked; planning in it says what is missing.
+        declares no ontology, can be queried; planning in it reports the missing parts.
 
     Examples
     --------

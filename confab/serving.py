@@ -90,14 +90,14 @@ DESCRIPTION = Path(__file__).with_name("service.ttl")
 
 
 class Worker:
-    """A process that answers queries about a scene as it is now, called from an event loop."""
+    """A process that answers queries about the current scene, called from an event loop."""
 
     def __init__(self, service: Service, nice: int) -> None:
         self.service, self.change = service, 0
         self.process = QueryWorker(service.scene.knowledge, service.limits, nice)
 
     def ready(self) -> None:
-        """Wait until the process has read the scene as it is now."""
+        """Wait until the process has read the current scene."""
         if self.change != self.service.change:
             self.change = self.service.change
             self.process.close()
@@ -153,7 +153,7 @@ class Service:
         raise AssertionError("the last lane has no time limit of its own")
 
     def take(self, event: Event) -> None:
-        """Note an event of an execution: the page shows it, and queries see what was observed."""
+        """Record an event of an execution: the page shows it, and queries see the observed facts."""
         from confab.reasoner.reading.observed import assert_observed
 
         self.following.take(event)
@@ -169,7 +169,7 @@ class Service:
         for worker in self.workers:
             worker.process.close()
         self.threads.shutdown()
-        for worker in self.workers:  # some may have started meanwhile
+        for worker in self.workers:  # some may have started since
             worker.process.close()
 
     def page_json(self, after: int) -> bytes | None:
@@ -179,7 +179,7 @@ class Service:
         return None if self.following.version <= after else json.dumps(self.following.data()).encode()
 
     def turned_json(self, content: bytes) -> bytes:
-        """Return what the page shows after something was turned; plans are made one after the other."""
+        """Return the data of the page after a change; plans are made one after another."""
         try:
             turned = turned_from(json.loads(content or b"{}"))
         except (ValueError, RecursionError, KnowledgeError) as error:
@@ -233,11 +233,11 @@ class Endpoint:
         self.app.router.redirect_slashes = False
 
     async def page(self, request: Request) -> Response:
-        """Answer with the page, which asks for its data."""
+        """Respond with the page, which requests its data."""
         return HTMLResponse(page_html(None, "Confab"), headers={"Cache-Control": "no-store"})
 
     async def data(self, request: Request) -> Response:
-        """Answer with what the page shows."""
+        """Respond with the data of the page."""
         headers = {"Content-Type": "application/json", "Cache-Control": "no-store"}
         if request.method == "POST":
             content = await asyncio.to_thread(self.service.turned_json, await body(request))
@@ -413,7 +413,7 @@ class Connection(H11Protocol):
             min(waiting, key=lambda c: c.deadline.when()).transport.abort()
 
     def handle_events(self) -> None:
-        """Handle what has arrived; once the head of a request has, the application has its own limits."""
+        """Handle the received data; after the head of a request, the application has its own limits."""
         before = self.cycle
         super().handle_events()
         if self.cycle is not before and not self.cycle.response_complete:

@@ -99,7 +99,7 @@ def lengths(plan: Plan) -> str:
 
 
 def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
-    """Return what a plan costs where behaviours have prices, and what is proved of its length or cost."""
+    """Return the cost of a plan if behaviours have prices, and the proved bounds on its length or cost."""
     said = "" if cost is None else f", costs {cost:g}"
     if bound is None:
         return said

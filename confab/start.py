@@ -1,4 +1,4 @@
-"""Start of the command `confab`: Ctrl-C ends it in one line even during imports, and changes nothing after the end.
+"""Start of the command `confab`: Ctrl-C ends it with one line even during imports, and has no effect after the end.
 
 The process ends without freeing its objects one by one, which takes half a second for a large scene.
 """
@@ -26,7 +26,7 @@ def main() -> None:
 
 def _leave(code: int) -> NoReturn:
     """End the process after everything has been written."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all output is complete
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

@@ -53,7 +53,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return len(self.rows)
 
     def __bool__(self) -> bool:
-        """Return the answer of an ASK query; for other queries, whether there is a row."""
+        """Return the truth of an ASK query; for other queries, whether there is a row."""
         return bool(self.rows) if self.truth is None else self.truth
 
     def __iter__(self) -> Iterator[tuple[str | None, ...]]:

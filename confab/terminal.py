@@ -44,7 +44,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
 
     _open_streams()
     try:
-        code = _interruptible(call) or YES  # None where a command decides nothing
+        code = _interruptible(call) or YES  # None if a command returns no code
         sys.stdout.flush()
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
@@ -62,7 +62,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         try:
             sys.stdout.flush()
         except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still buffered has nowhere to go
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # buffered output is discarded
         _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
     except Exception as error:
         if isinstance(error, ModuleNotFoundError) and error.name == "pybullet":
@@ -130,7 +130,7 @@ def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
 
 
 def told(out: Path, text: str) -> None:
-    """Say what was written where: on stdout, or, if that is where it was written, on stderr."""
+    """Print the path of a written file: on stdout or, if the file itself went there, on stderr."""
     if out == Path("-"):
         remark(text)
     else:
@@ -196,13 +196,13 @@ def _usage(error: Any) -> str:
 
 
 def remark(text: str) -> None:
-    """Print a line on stderr, unless only results and errors are to be printed."""
+    """Print a line on stderr, unless only results and errors are printed."""
     if not quiet():
         _say(text)
 
 
 def _say(text: str) -> None:
-    """Print a line on stderr, whatever characters it quotes."""
+    """Print a line on stderr, whichever characters it quotes."""
     line = " ".join(text.split())
     shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
     with suppress(OSError):

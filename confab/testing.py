@@ -33,7 +33,7 @@ BEGUN = 0.05
 
 @dataclass(frozen=True)
 class Check:
-    """A check: its name, whether it passed (None: it could not be made), and what was found."""
+    """A check: its name, whether it passed (None: it could not be made), and a description of the result."""
 
     name: str
     passed: bool | None
@@ -46,7 +46,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Conformance:
-    """What the checks found."""
+    """The results of the checks."""
 
     checks: tuple[Check, ...]
 
@@ -76,7 +76,7 @@ def check_world(
     problem : Problem
         A scene's: its primitives are executed, and its symbols are known.
     steps : sequence of Step, optional
-        Primitives to execute, in order; those of a plan for the problem's goal from what is observed, if left out.
+        Primitives to execute, in order; by default those of a plan for the problem's goal from the observed state.
     stopped_within : float
         Seconds within which `execute` should return after `stop`.
 
@@ -149,7 +149,7 @@ def _known(problem: Problem, symbol: Symbol, value: str) -> bool:
 
 
 def _refusal(world: Guarded, before: State) -> Check:
-    """Check that a primitive that doesn't exist fails, says so, and changes nothing."""
+    """Check that a primitive that doesn't exist fails, reports it, and has no effect."""
     verdict = world.execute(Step((0,), 0, 1, "no such behaviour", ()))
     after = world.observe()
     changed = sorted(str(s) for s in after.keys() | before.keys() if after.get(s) != before.get(s))
@@ -165,7 +165,7 @@ def _refusal(world: Guarded, before: State) -> Check:
 def _stopped(
     world: Guarded, problem: Problem, steps: Sequence[Step], within: float, checks: list[Check]
 ) -> Sequence[Step]:
-    """Check that `stop` ends a primitive, and harms none that comes later; return the steps that are still to be executed."""
+    """Check that `stop` ends a primitive and doesn't affect later ones; return the steps still to be executed."""
     begin = perf_counter()
     world.stop()
     took = perf_counter() - begin

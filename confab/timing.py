@@ -1,4 +1,4 @@
-"""Plans in time at the front desk: when a schedule is asked for, the lanes of its actors, and its form as JSON."""
+"""Plans in time for the public functions: when a schedule is required, the lanes of its actors, and its form as JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import Slot, TimedPlan
 
 Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
-"""What a plan is to have little of."""
+"""The quantity that a plan should minimise."""
 MINIMISE: tuple[Minimise, ...] = ("makespan", "cost", "steps")
 WIDTH = 72
 """Number of columns of a lane."""
@@ -26,7 +26,7 @@ MOST_CRITICAL = 12
 
 
 def checked_minimise(minimise: str | None) -> str | None:
-    """Return what is to be little; raise `KnowledgeError` if there is no such thing."""
+    """Return the quantity to be minimised; raise `KnowledgeError` if there is no such quantity."""
     if minimise is not None and minimise not in MINIMISE:
         raise KnowledgeError(f"--minimise is '{minimise}'; wanted one of {', '.join(MINIMISE)}")
     return minimise
@@ -40,13 +40,13 @@ def with_unit_costs(problem: Problem) -> Problem:
 
 
 def asks_for_times(problem: Problem, minimise: str | None) -> bool:
-    """Return whether a plan has to have a schedule: it is to be short in time, or the task speaks of times."""
+    """Return whether a plan needs a schedule: its makespan is minimised, or the task states times."""
     times = problem.times
     return minimise == "makespan" or (times is not None and bool(times.deadlines or times.windows or times.events))
 
 
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Return a plan whose steps need others meanwhile, and its schedule."""
+    """Return a plan with required concurrency, and its schedule."""
     from confab.planner.timed.concurrent import plan
 
     outcome, timed = plan(problem, Limits(seconds=deadline.left))
@@ -71,7 +71,7 @@ def needs_others_meanwhile(problem: Problem) -> bool:
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether steps that overlap may do what no sequence of them does: something is asked or made at a begin or an end."""
+    """Return whether overlapping steps may do more than any sequence: a condition or effect belongs to a begin or an end."""
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()

@@ -68,7 +68,9 @@ class Element:
 
 @dataclass(frozen=True)
 class Tree:
-    """The behaviour tree of a plan: subtrees by name, the first one the whole; what each leaf asks or does, by its key."""
+    """The behaviour tree of a plan: subtrees by name, the first one the whole; the conditions or action of each leaf, by its
+    key.
+    """
 
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
@@ -298,7 +300,7 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
             return f'Sequence("Sequence", memory={kind == "Once"}, children=[{below}{end}])'
 
 
-def filled(tree: Tree, path: Path, problem: Problem, world: World, told: Callable[[Step], None] | None = None) -> Any:
+def filled(tree: Tree, path: Path, problem: Problem, world: World, observer: Callable[[Step], None] | None = None) -> Any:
     """Return the root of an exported ``tree.py``, its leaves filled by a world: conditions by observation, actions by execution.
 
     Parameters
@@ -309,8 +311,8 @@ def filled(tree: Tree, path: Path, problem: Problem, world: World, told: Callabl
         Its ``tree.py``.
     problem : Problem
     world : World
-    told : callable, optional
-        Is told each primitive before it is executed.
+    observer : callable, optional
+        Called with each primitive before it is executed.
     """
     from py_trees.behaviour import Behaviour
     from py_trees.common import Status
@@ -326,8 +328,8 @@ def filled(tree: Tree, path: Path, problem: Problem, world: World, told: Callabl
                 return Status.SUCCESS if tree.asks(self.key, seen) else Status.FAILURE
             step = tree.leaves[self.key]
             assert isinstance(step, Step)
-            if told is not None:
-                told(step)
+            if observer is not None:
+                observer(step)
             return Status.SUCCESS if world.execute(step).ok else Status.FAILURE
 
     seen_first = world.observe()

@@ -20,7 +20,7 @@ def again_and_again(files: Sequence[str | Path], pause: float = PAUSE) -> Iterat
     while True:
         sleep(pause)
         if _stamps(watched) != seen:
-            sleep(pause)  # who writes a file in several steps is done by then
+            sleep(pause)  # an editor that writes a file in several steps is done by then
             watched = _with_imports(files)
             seen = _stamps(watched)
             yield
@@ -33,7 +33,7 @@ def _with_imports(files: Sequence[str | Path]) -> set[Path]:
         found |= {path, path.with_name(ontology.CATALOG)}
         try:
             found |= set(load(path, tolerant=True).files.values())
-        except KnowledgeError:  # of which validation tells
+        except KnowledgeError:  # reported by validation
             continue
     return found
 

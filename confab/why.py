@@ -95,7 +95,7 @@ class Because:
 
 @dataclass(frozen=True)
 class WhyNot:
-    """Why an alternative isn't in the plan: the conditions that it lacks, or the plan with it and its additional cost.
+    """Why an alternative isn't in the plan: its failing conditions, or the plan with it and its additional cost.
 
     `answer` is the answer as a sentence. `plan` is the complete plan with the alternative, if there is one; `more` is its
     additional cost; `breaks` lists conditions of levels above that this plan violates and the present plan doesn't.
@@ -147,7 +147,7 @@ class WhyNot:
 
 @dataclass(frozen=True)
 class Account:
-    """Why a plan is as it is, step by step; without a plan, why there is none: `proof` states the claims of the certificate."""
+    """An explanation of a plan step by step, or of why there is none: `proof` states the claims of the certificate."""
 
     headline: str
     steps: tuple[Because, ...] = ()
@@ -389,7 +389,7 @@ def why_not(
     Raises
     ------
     KnowledgeError
-        That names what the scene doesn't have.
+        It mentions terms that the scene doesn't have.
     """
     first, _, rest = asked.strip().partition(" ")
     behavior = problem.domain.behaviors.get(first)
@@ -469,7 +469,7 @@ def _fact_told(
     ]
     try:
         symbol, value = parse_fact(problem, fact)
-    except KnowledgeError:  # what the task can't need isn't in the problem, and may be in the scene
+    except KnowledgeError:  # the individual may be in the scene though the task doesn't need it
         problem, outcome, labels = replan([*goals, fact])
         symbol, value = parse_fact(problem, fact)
     else:

@@ -69,7 +69,7 @@ def scene_text(interface: Interface, model: Model, name: str, title: str) -> tup
     Raises
     ------
     KnowledgeError
-        The interface has no scene query, or the query makes nothing of the model.
+        The interface has no scene query, or the query returns nothing from the model.
     """
     if not interface.scene_query:
         raise KnowledgeError(f"{interface.name} has no e:sceneQuery, so its world model makes no scene")
@@ -101,7 +101,7 @@ def scene_of_graph(source: Path, query: str, path: Path) -> int:
     Raises
     ------
     KnowledgeError
-        A file can't be read, or the query makes nothing of the graph.
+        A file can't be read, or the query returns nothing from the graph.
     """
     file = next((one for one in (Path(query), ontology.ROOT / "alignments" / query) if one.is_file()), None)
     if file is None:

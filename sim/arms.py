@@ -62,7 +62,7 @@ class Arm:
 
     @cached_property
     def spherical(self) -> bool:
-        """Whether the last axis goes through the wrist as well."""
+        """Whether the last axis also goes through the wrist."""
         return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
 
     @property

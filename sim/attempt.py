@@ -40,7 +40,7 @@ TOPPLED = 0.5
 """Tilt in radians from which on a body counts as toppled."""
 
 NOWHERE = 100.0
-"""Distance in metres from which on a pose stands for one that the hand cannot take at all."""
+"""Minimum distance in metres of a pose that counts as unreachable for the hand."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres tried in turn where the full one leaves no candidate; above `CLOSE`, since the load may slip on the way."""

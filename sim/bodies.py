@@ -1,6 +1,6 @@
 """Bodies of the world: their shape, mass and appearance.
 
-`KINDS` has a `ShapeKind` for each kind of shape: the function that makes it in PyBullet, and the cylinder that stands for it in
+`KINDS` has a `ShapeKind` for each kind of shape: the function that makes it in PyBullet, and the cylinder that represents it in
 motion planning. A vessel is a wall of revolution. Its collision shape is a bottom cylinder and a ring of flat boxes for each
 segment of the profile; its visual shape is a smooth mesh. Metres and kilograms; a body's frame has its origin in the middle of the
 base, z up.
@@ -288,7 +288,7 @@ def height_of(shape: Shape) -> float:
 
 
 def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
-    """Yield the upright cylinders that stand for a shape in motion planning: lower end, upper end and radius."""
+    """Yield the upright cylinders that represent a shape in motion planning: lower end, upper end and radius."""
     if shape.kind != "turned":
         yield 0.0, height_of(shape), outer_radius(shape)
         return

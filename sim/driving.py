@@ -66,7 +66,7 @@ class Roller:
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
     def free(self, q: Array) -> Flags:
-        """Return at which of the base's positions the robot touches nothing."""
+        """Return the positions of the base at which the robot touches nothing."""
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:

@@ -277,7 +277,7 @@ class Engine:
         self.remembered[name] = self.steps
 
     def sight(self) -> Sight:
-        """Return what the cameras see, and forget the pose of each body that they see to be gone."""
+        """Return the observations of the cameras, and drop the believed poses of bodies that they see to be gone."""
         if self.sighted is None or self.sighted[0] != self.steps:
             self.sighted = self.steps, Sight()
             poses = {name: self._believed(name) for name in self.known}

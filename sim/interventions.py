@@ -30,7 +30,7 @@ def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
 
 
 def put(world: World, name: str, base: Array, orientation: Sequence[float]) -> None:
-    """Put an object with its contents somewhere, at an orientation (a quaternion); a hand that holds it opens."""
+    """Put an object with its contents at a position and an orientation (a quaternion); a hand that holds it opens."""
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
@@ -52,7 +52,7 @@ def push(world: World, name: str, by: Sequence[float]) -> None:
 
 
 def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
-    """Knock an object over, with its contents, away from everything else that stands there."""
+    """Knock an object over, with its contents, away from its neighbours."""
     if name not in world.bodies:
         return
     base, radius = world.truth(name)[1], outer_radius(world.bodies[name].shape)
@@ -66,7 +66,7 @@ def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
 
 
 def put_box(world: World, name: str, place: str, size: Sequence[float]) -> None:
-    """Put a box, of which no fact speaks, at a place; `size` is its width, depth and height in metres."""
+    """Put a box that no fact mentions at a place; `size` is its width, depth and height in metres."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", 0.2, size[2] / 2, numbers=numbers, color=(0.8, 0.6, 0.4, 1.0))
     body = KINDS["box"].make(world.client, shape, world.place(place), np.array(UPRIGHT))

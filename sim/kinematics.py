@@ -139,7 +139,7 @@ def _rolled(arm: Arm, r: Array) -> Array:
 
 
 def _phase(axis: Array, a: Array, b: Array) -> float:
-    """Return the angle about an axis by which `b` has to turn to come nearest to `a`."""
+    """Return the angle about an axis by which `b` must turn to come nearest to `a`."""
     return float(np.arctan2(a @ cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
 
 

@@ -25,7 +25,7 @@ BASE = "base"
 
 
 def urdf_name(mechanism: Mechanism, link: str) -> str:
-    """Return a link's name in the URDF; a mechanism's own name stands for its base."""
+    """Return a link's name in the URDF; a mechanism's own name denotes its base."""
     if link == mechanism.name:
         return BASE
     found = next(one for one in mechanism.links if one.name == link)

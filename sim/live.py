@@ -3,7 +3,7 @@
 Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents.
 Rule 2: an intervention that changes an object of the running primitive stops the primitive.
 Rule 3: a hand at a position without a fact, or an empty tilted hand, is brought upright and lifted before facts are observed.
-Rule 4: what stands somewhere else than at a place of the scene gets a spot of its own (`confab.sim.lookout`).
+Rule 4: an object that stands at no place of the scene gets a spot (`confab.sim.lookout`).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class LiveWorld:
     classes : mapping of class to individuals
         An object that an intervention adds gets the shape of an object of its class.
     problem : Problem, optional
-        What an intervention would lead to is checked against it; without it nothing is discovered.
+        The problem with which interventions are checked; without it, there are no discoveries.
     reaching : str
         The relation of reach facts, for spots that are discovered.
     """
@@ -160,7 +160,7 @@ class LiveWorld:
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a hand with a load upright and up, or an empty one home, as far as that is possible."""
+        """Bring a hand with a load upright and up, or an empty one home, as far as possible."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):

@@ -1,6 +1,6 @@
-"""What a live world comes across that the scene doesn't have: things of which no fact speaks, and spots that are no places.
+"""Discoveries of a live world: objects that no fact mentions, and spots that are no places of the scene.
 
-A *spot* is a place that is made when it is needed: where an object stands that is at none of the scene's places, or where there is
+A *spot* is a place that is created on demand: for an object that stands at none of the scene's places, or where there is
 room on the furniture to put something down. It belongs to the classes that all places of the scene have in common, and shares the
 static facts of the place beside it; which hands reach it is computed.
 """
@@ -42,7 +42,7 @@ SPOTS, TRIED = 3, 12
 """Maximum numbers of free spots that are offered, and of points whose reach is computed."""
 
 HEIGHTS = (0.06, 0.12, 0.18)
-"""Heights in metres above a free spot at which nothing may be near."""
+"""Heights in metres above a free spot that must be empty."""
 
 
 @dataclass
@@ -55,7 +55,7 @@ class Lookout:
     news: list[Discovery] = field(default_factory=list)
 
     def look(self) -> bool:
-        """Discover what is new; return whether anything is."""
+        """Discover new objects and spots; return whether there are any."""
         before = len(self.news)
         spoken_of = {symbol.arguments[0] for symbol in self.world.symbols}
         for name in [name for name in self.world.bodies if name not in spoken_of and self.world.knows(name)]:
@@ -229,7 +229,7 @@ class Lookout:
             return []
 
     def _roomy(self) -> Iterator[Array]:
-        """Yield points of the furniture that bears places, with nothing near them, the roomiest first."""
+        """Yield points of the furniture that bears places, with no object near them, those with the most room first."""
         world = self.world
         places = [world.place(name) for name in world.embodiment.places]
         bodies = [

@@ -60,7 +60,7 @@ class Mechanic:
         return moved(self.mechanism, self.model, name, self.values() if values is None else values)
 
     def frame(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
-        """Return a link's frame (rotation, origin) in the world; the mechanism's own name stands for its base."""
+        """Return a link's frame (rotation, origin) in the world; the mechanism's own name denotes its base."""
         turned, shift = self.moved(name, values)
         zero, origin = self.model.frames[urdf_name(self.mechanism, name)]
         return turned @ zero, turned @ origin + shift

@@ -64,7 +64,7 @@ class Traveller(Protocol):
         """Return the joint values at poses, and which poses are within reach."""
 
     def free(self, q: Array) -> Flags:
-        """Return which joint values touch nothing."""
+        """Return the joint values at which the robot touches nothing."""
 
     def follow(self, poses: Array) -> Array | None:
         """Return the joint values along poses, or None if these can't be followed."""
@@ -78,7 +78,7 @@ class Traveller(Protocol):
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among its obstacles, from which it keeps `margin` metres: says which paths are possible.
+    """An arm among its obstacles, from which it keeps `margin` metres: decides which paths are possible.
 
     Every joint keeps `joint_margin` radians from its limits, and `fold` radians from the stretched arm.
     """
@@ -104,7 +104,7 @@ class Reacher:
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
     def free(self, q: Array) -> Flags:
-        """Return which postures touch nothing."""
+        """Return the postures in which the arm touches nothing."""
         return free(self.mover.at(q), self.mover.spheres.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:

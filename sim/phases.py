@@ -48,7 +48,7 @@ LOOKS = 3
 """Number of attempts at a motion with noisy perception, each after a new look, before its failure counts."""
 
 ANCHORS = 8
-"""Number of stretches of a joint's path, each planned anew from the present positions of hand and joint."""
+"""Number of stretches of a joint's path, each planned from the present positions of hand and joint."""
 
 ASIDE = sorted(
     product((0.0, -0.08), (0.0, -0.1, 0.1, -0.2, 0.2), (0.0, 0.1, 0.2)), key=lambda shift: sum(map(abs, shift))

@@ -315,7 +315,7 @@ def _drops(world: Engine) -> Iterator[tuple[Array, float, Array]]:
 
 
 def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radius: float, color: Array) -> None:
-    """Draw a shaded sphere where nothing nearer covers it."""
+    """Draw a shaded sphere unless a nearer object covers it."""
     window = camera.window(center, radius)
     if window is None:
         return
@@ -349,7 +349,7 @@ def _look(
 
 
 def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Draw an opaque vessel where nothing nearer covers it: the wall that a ray meets first, or the bottom inside."""
+    """Draw an opaque vessel unless a nearer object covers it: the wall that a ray meets first, or the bottom inside."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return

@@ -69,7 +69,7 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
 
 
 def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
-    """Pour a serving: roll about the lip until the serving has left the source, then roll back until nothing more flows."""
+    """Pour a serving: roll about the lip until the serving has left the source, then roll back until the flow ends."""
     attempt = Attempt.begin(world, roles["hand"])
     source, target = roles["source"], attempt.body(roles["target"])
     if attempt.held != source:
@@ -263,7 +263,7 @@ class _Servo:
         raise SkillError("too slow", (self.hand.hand.name,), seconds=MOST_STEPS * self.tick)
 
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
-        """Roll on slowly while nothing flows, and wait while beverage flows; return whether `enough` is `poured`.
+        """Roll on slowly while there is no flow, and wait while beverage flows; return whether `enough` is `poured`.
 
         The flow of the `lag` seconds in which the hand rolls back counts as poured. If the flow stops, `nearly` suffices. The
         result is False if nothing has flowed for a while at the steepest angle.

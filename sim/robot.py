@@ -30,7 +30,7 @@ CLOSING = 0.12
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """The thing or place at which a hand is, and its point then; none of them if the hand is raised.
+    """The object or place at which a hand is, and its position then; all None if the hand is raised.
 
     `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped on its way.
     """

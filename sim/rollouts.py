@@ -105,7 +105,7 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     ValueError
         `workers` is neither a positive number nor a Ray address.
     RuntimeError
-        Three processes died at the same rollout; or Ray is asked for and isn't installed.
+        Three processes died at the same rollout; or Ray is requested and isn't installed.
     """
     finished = {}
     for rollout in _stream(trial, seeds, workers):

@@ -27,7 +27,7 @@ def require_screen() -> None:
     Raises
     ------
     RuntimeError
-        No display is available; the message says what to do.
+        No display is available; the message states the remedy.
     """
     if sys.platform != "linux":
         return

@@ -23,7 +23,7 @@ SETTLING = 120
 """Simulation steps in which bodies and beads come to rest before the first primitive."""
 
 DRAWS = 20
-"""Number of times that deviations are drawn for an object, until it is inside nothing else."""
+"""Maximum number of draws of an object's deviation until the object overlaps no other."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
 """An invisibly small triangle, the visual shape of beads: `confab.sim.picture` draws them, since PyBullet would be slow."""
@@ -112,7 +112,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
 
 
 def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) -> None:
-    """Make an object at a place; deviations that take it into another one are drawn anew.
+    """Make an object at a place; deviations with which it overlaps another one are drawn again.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Several hands at once: skills run concurrently in one world, each as if it were alone.
 
-A skill asks the world to simulate some steps. Here every skill runs in a thread of its own that waits for each step; when all
+A skill requests simulation steps from the world. Here every skill runs in its own thread and waits for each step; when all
 running skills wait, the world makes one step for all of them. Only one thread runs at any time, in a fixed order, so that equal
 calls give equal results.
 """
@@ -65,7 +65,7 @@ class _Job:
         self.paused.release()
 
     def advance(self) -> None:
-        """Let the thread run until it asks for a step, or ends."""
+        """Let the thread run until it requests a step, or ends."""
         self.go.release()
         self.paused.acquire()
         if self.error is not None:

@@ -19,7 +19,7 @@ CLOSING = 360
 """Maximum number of steps of a grasp."""
 
 GROPING = 120
-"""Steps after which a hand that touches a handle with one finger only grasps anew."""
+"""Number of steps after which a hand that touches a handle with one finger only grasps again."""
 
 YIELDS, ASIDE_BY = 6, 0.002
 """Maximum number of times a hand gives way to contact, and the metres by which it does each time."""
@@ -73,7 +73,7 @@ def _grasp(run: Run, phase: Phase) -> None:
 
 
 def _grope(run: Run) -> None:
-    """Grasp anew, centred on a handle that only one finger has touched."""
+    """Grasp again, centred on a handle that only one finger has touched."""
     hand, shift = run.attempt.hand, off_centre(run)
     hand.open(run.spread)
     run.world.run(CLOSING // 6)

@@ -185,7 +185,7 @@ def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Ar
     axis, limit = element.find("axis"), element.find("limit")
     direction = _numbers(None if axis is None else axis.get("xyz"), "1 0 0")
     endless, length = element.get("type") == "continuous", float(np.linalg.norm(direction))
-    if not length and element.get("type") not in MOVABLE:  # a fixed joint's axis means nothing
+    if not length and element.get("type") not in MOVABLE:  # a fixed joint's axis has no meaning
         direction, length = np.array([1.0, 0.0, 0.0]), 1.0
     if not length:
         raise ValueError(f"joint '{element.get('name')}' has an axis without direction")

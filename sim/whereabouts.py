@@ -1,7 +1,7 @@
 """Where hands are: where their own motions have brought them, in three dimensions.
 
 A motion ends at a thing or a place, or with the hand raised. That holds until the hand's next motion, or until the thing has moved
-away from where it was then. A hand that was stopped on its way is lost: it is at nothing that has a name.
+away from where it was then. A hand that was stopped on its way is at no named place.
 """
 
 from __future__ import annotations

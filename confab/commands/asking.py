@@ -1,4 +1,4 @@
-"""Scenes asked in SPARQL, here or as an endpoint."""
+"""SPARQL queries on scenes, here or as an endpoint."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
 
 
 def doubt(scene: Scene, deadline: Deadline) -> None:
-    """Report in one line if `confab validate` would find errors in a user's scene, as far as there is time for it."""
+    """Report in one line if `confab validate` would find errors in a user's scene, if there is time for it."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return

@@ -67,7 +67,7 @@ class Command(click.Command):
     """A command whose outputs differ from its inputs and from each other, and that reads stdin for at most one input."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command, unless one file stands for two things."""
+        """Run the command, unless one file is given for two purposes."""
         read = [p for p in self.params if _reads_stdin(ctx.params.get(p.name or ""), p)]
         if len(read) > 1:
             names = " and ".join(map(_name, read))
@@ -89,7 +89,7 @@ class Command(click.Command):
 
 
 def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
-    """Return whether a parameter's value stands for standard input."""
+    """Return whether a parameter's value denotes standard input."""
     values = given if isinstance(given, tuple) else (given,)
     return any(value in (STDIN, "-") for value in values) and not isinstance(parameter.type, Output)
 
@@ -141,7 +141,7 @@ _VERBOSE = click.option(
 
 
 def QUIET(function: Any) -> Any:  # noqa: N802 - an option as the others
-    """Add the two options that say how much is told."""
+    """Add the two options for the amount of output."""
     return _QUIET(_VERBOSE(function))
 
 

@@ -348,7 +348,7 @@ def execute(
         met = {found.individual for found, _ in execution.episode.discovered}  # of which no other episode knows
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
-        with undisturbed(memory):  # others may have learned meanwhile
+        with undisturbed(memory):  # other processes may have learned meanwhile
             newest = Memory.load(memory, loaded)
             newest.live(loaded.problem, execution.episode)
             newest.save(memory)

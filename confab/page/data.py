@@ -34,15 +34,15 @@ FORMAT = 1
 LARGEST_FILM = 40_000_000
 """Maximum size in bytes of a film that is embedded in the page; a larger one is linked."""
 LEARNED = 8
-"""Maximum number of goals whose learned rules are told."""
+"""Maximum number of goals whose learned rules are shown."""
 MOST_STEPS = 4000
 """Maximum number of steps of a plan whose purposes are computed for the page."""
 MOST_FIXED = 5000
-"""Maximum number of rows for facts that never change and aren't wanted; the page tells the number of the others."""
+"""Maximum number of rows for static facts that aren't goals; the page states the number of the others."""
 
 
 class Interval(TypedDict, total=False):
-    """A part of a row: from `begin` to `end`, what is done or holds, and what its colour means (`tone`).
+    """A part of a row: from `begin` to `end`, a step or a value, and the meaning of its colour (`tone`).
 
     `step` is the ID of the step that it shows. `slack` is the time until which its end may be delayed without delaying the last.
     """
@@ -57,7 +57,7 @@ class Interval(TypedDict, total=False):
 
 
 class Row(TypedDict, total=False):
-    """A lane: its `group` is levels, actors, changes, wanted or fixed; `met` tells whether its goal is met in the end."""
+    """A lane: its `group` is levels, actors, changes, wanted or fixed; `met` says whether its goal holds in the end."""
 
     group: str
     label: str
@@ -117,7 +117,7 @@ class MapData(TypedDict):
 
 
 class Alarm(TypedDict, total=False):
-    """What failed, where, and what was measured."""
+    """A failure: its text, its position, and the measured numbers."""
 
     title: str
     step: str
@@ -142,7 +142,7 @@ class Tile(TypedDict):
 
 
 class GoalData(TypedDict, total=False):
-    """A goal, its value in the beginning and in the end."""
+    """A goal, its initial and its final value."""
 
     label: str
     before: str
@@ -191,7 +191,7 @@ class ReadyQuery(TypedDict):
 
 
 class PageData(TypedDict, total=False):
-    """All that the page shows; `problem` says why nothing could be planned after something was turned."""
+    """The data of the page; `problem` is the reason why planning failed after a change on the page."""
 
     format: int
     title: str
@@ -229,7 +229,7 @@ class Planned(Protocol):
     timed: TimedPlan | None
 
     def dearer(self) -> str:
-        """Return what is known of a cheaper plan."""
+        """Return the known bounds on a cheaper plan."""
 
 
 class Executed(Protocol):
@@ -247,7 +247,7 @@ class Executed(Protocol):
         """Return a note on each step, by its path."""
 
     def summary(self) -> str:
-        """Return one line that says how it went."""
+        """Return a summary of the result in one line."""
 
 
 def page_data(
@@ -258,7 +258,7 @@ def page_data(
     learned: Memory | None = None,
     again: str = "",
 ) -> PageData:
-    """Return what the page shows.
+    """Return the data of the page.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def page_labels(scene: Known, problem: Problem) -> Labels:
 def timeline_data(
     scene: Known, timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], str], reasons: bool = True
 ) -> PageData:
-    """Return what follows from a timeline: title, map, rows and steps.
+    """Return the parts of the page that follow from a timeline: title, map, rows and steps.
 
     Parameters
     ----------
@@ -440,7 +440,7 @@ def _rows(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
 
 
 def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[Row]:
-    """Return as many rows for some bars as it takes for no two in a row to overlap."""
+    """Return the smallest number of rows for some bars in which no two overlap."""
     rows: list[list[Bar]] = []
     for bar in sorted(bars, key=lambda bar: (bar.begin, bar.end)):
         free = next((row for row in rows if row[-1].end <= bar.begin + 1e-6), None)
@@ -475,7 +475,7 @@ def _interval(bar: Bar, labels: Labels) -> Interval:
 
 
 def _tone(timeline: Timeline, symbol: Symbol, value: str) -> str:
-    """Return what a value's colour means: it is wanted, or was so in the beginning, or neither."""
+    """Return the meaning of a value's colour: a goal, an initial goal, or neither."""
     if timeline.problem.goal.get(symbol) == value:
         return "wanted"
     return "start" if timeline.problem.initial.get(symbol, FALSE) == value else "between"
@@ -623,7 +623,7 @@ def _tiles(
 def _alarm(
     timeline: Timeline, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
 ) -> Alarm | None:
-    """Return what failed, or None if nothing did."""
+    """Return the failure, or None if there was none."""
     if execution is not None and execution.reached:
         return None
     reasons = [reason.text for reason in (execution.episode.reasons if execution is not None else ())]

@@ -1,4 +1,4 @@
-"""The page as one file that needs nothing else: no server, no network."""
+"""The page as one self-contained file: no server, no network."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
 
 
 def write_page(path: str | Path, data: PageData) -> Path:
-    """Write the page with its data into a file, whole or not at all, and return where."""
+    """Write the page with its data into a file, completely or not at all, and return the path."""
     from confab.reasoner.files import write_whole
 
     write_whole(Path(path), page_html(data, data["title"]))

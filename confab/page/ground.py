@@ -31,7 +31,7 @@ class Area:
 class Ground:
     """Positions of places (x to the right, y down), areas, connections between places, positions of robots.
 
-    `metric` tells whether positions are metres; else they are a layout. `note` says where the positions come from.
+    `metric` says whether positions are metres; otherwise they are a layout. `note` names the source of the positions.
     """
 
     spots: Mapping[str, Point]

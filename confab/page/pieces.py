@@ -1,4 +1,4 @@
-"""HTML without a script, for what a notebook shows: a plan as a tree, a verdict, a table. It needs `page.css`."""
+"""HTML without a script for notebooks: a plan as a tree, a verdict, a table. It needs `page.css`."""
 
 from __future__ import annotations
 

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from confab.execution import Execution
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of rows that can be turned; the page tells the number of the others, which `with_fact` turns."""
+"""Maximum number of rows that can be changed; the page states the number of the others, which `with_fact` changes."""
 SECONDS = 10.0
 """Limit of planning for the page."""
 
 
 class TurnedIntervention(TypedDict):
-    """An intervention as it is chosen on the page: after which step, world or goal, which symbol, which value."""
+    """An intervention as chosen on the page: after which step, world or goal, which symbol, which value."""
 
     after: str | int
     what: str
@@ -74,7 +74,7 @@ class Sheet:
 
     @cached_property
     def symbols(self) -> dict[str, Symbol]:
-        """The symbols by their words without a value, ``cup1 LOCATION``; those with a goal come first."""
+        """The symbols by their words without a value, ``cup1 LOCATION``; those with a goal first."""
         goal = self.problem.goal
         those = sorted({*self.problem.initial, *goal}, key=lambda s: (s not in goal, s.arguments, s.situation))
         return {" ".join((*s.arguments[:1], s.situation, *s.arguments[1:])): s for s in those}
@@ -111,7 +111,7 @@ class Sheet:
         Raises
         ------
         KnowledgeError
-            There is no such symbol, a goal wants what is no value of it, or the facts can't hold together.
+            There is no such symbol, a goal value is invalid, or the facts are inconsistent.
         """
         symbols = self.symbols
         for key in (*by.get("facts", {}), *by.get("goals", {})):
@@ -206,7 +206,7 @@ def _called(method: str, facts: Sequence[str]) -> str:
 
 
 def ready_queries() -> list[ReadyQuery]:
-    """Return the queries that ship with Confab and ask the scene itself, by name."""
+    """Return the queries that ship with Confab and apply to the scene itself, by name."""
     found: list[ReadyQuery] = []
     for path in sorted((ontology.ROOT / "questions").glob("*.rq")):
         lines = path.read_text(encoding="utf-8").splitlines()

@@ -27,7 +27,7 @@ MOST_HANDS = 8
 class Bar:
     """A step in time.
 
-    `ok` is None if it was not checked, `note` is a remark on its result, `planned` tells that it isn't begun yet. Of a schedule
+    `ok` is None if it was not checked, `note` is a remark on its result, `planned` says that it isn't begun yet. Of a schedule
     it has `actors`, and in `slack` the time by which its end may be later without an effect on the makespan.
     """
 

@@ -19,7 +19,7 @@ MISSING = "the board needs anywidget, which isn't installed; pip install anywidg
 
 
 def board(scene: Known) -> anywidget.AnyWidget:
-    """Return the page of a scene, which a notebook shows; its `result` is what was planned last.
+    """Return the page of a scene, for a notebook; its `result` is the last plan.
 
     Raises
     ------

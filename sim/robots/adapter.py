@@ -1,8 +1,8 @@
-"""The world of a robot that others control: an interface says what is called and read, a transport does it.
+"""The world of an external robot: an interface describes the calls and readings, a transport performs them.
 
-Rule 1: nothing is believed that the world model doesn't show. What it shows and the scene doesn't know is left out.
-Rule 2: an action that takes longer than its time limit, or is stopped, is cancelled; its answer is ignored when it comes.
-Rule 3: a robot that doesn't answer a cancellation is busy, and is told nothing more until it has ended the action.
+Rule 1: only facts shown by the world model are believed. Facts that the scene doesn't know are ignored.
+Rule 2: an action that exceeds its time limit, or is stopped, is cancelled; its late result is ignored.
+Rule 3: a robot that doesn't confirm a cancellation is busy and gets no further calls until the action has ended.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ GRACE = 5.0
 """Seconds that a robot is given to end a cancelled action."""
 
 LOOKS = 3
-"""Number of times that the world model is asked for before the robot counts as out of reach."""
+"""Number of requests for the world model before the robot counts as out of reach."""
 
 T = TypeVar("T")
 

@@ -1,4 +1,4 @@
-"""A robot behind a server that speaks JSON over HTTP.
+"""A robot behind a server with JSON over HTTP.
 
 ========================  ===================================================  ==========================================
 request                   body                                                 answer
@@ -61,7 +61,7 @@ class HttpRobot:
         return status, str(said.get("message") or "")
 
     def cancel(self) -> None:
-        """Ask the server to end the running action."""
+        """Request the server to end the running action."""
         self._asked("/cancel", {}, ANSWERS_WITHIN)
 
     def model(self) -> Model:

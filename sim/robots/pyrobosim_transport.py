@@ -49,7 +49,9 @@ class Pyrobosim:
         np.random.seed(seed % 2**32)
         before = logging.root.manager.disable
         try:
-            logging.disable(logging.INFO)  # worlds and robots log while they are made, before they can be told not to
+            logging.disable(
+                logging.INFO
+            )  # worlds and robots log during construction, before their loggers can be configured
             self.world: Any = WorldYamlLoader().from_file(Path(where))
         except Exception as error:
             raise RobotError(f"{where}: pyrobosim can't read this world ({type(error).__name__}: {error})") from error
@@ -63,7 +65,7 @@ class Pyrobosim:
                 options.rng = np.random.default_rng([seed, number, *kind.encode()])
 
     def _quiet(self) -> None:
-        """Let pyrobosim log nothing but errors: failures are told by verdicts."""
+        """Let pyrobosim log errors only: verdicts report failures."""
         for owner in (self.world, *self.world.robots):
             owner.logger.setLevel(logging.ERROR)
 
@@ -106,7 +108,7 @@ class Pyrobosim:
             robot.cancel_actions()
 
     def model(self) -> Model:
-        """Return rooms, hallways, locations with their spawns, objects as far as the robots know them, robots, and ways."""
+        """Return rooms, hallways, locations with their spawns, objects known to the robots, robots, and paths."""
         world = self.world
         known = {thing.name for robot in world.robots for thing in robot.get_known_objects()}
         spots = [spot for location in world.locations for spot in location.children]

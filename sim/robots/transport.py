@@ -10,7 +10,7 @@ Model: TypeAlias = "Mapping[str, Mapping[str, Any]]"
 
 
 class RobotError(Exception):
-    """A robot can't be reached, or answers with something that can't be understood; the message says which."""
+    """A robot can't be reached, or its response is invalid; the message says which."""
 
 
 class Transport(Protocol):
@@ -20,7 +20,7 @@ class Transport(Protocol):
         """Execute an action and return its status and a message when it has ended; raise `RobotError` if there is no answer."""
 
     def cancel(self) -> None:
-        """End the running action, so that `call` returns; raise `RobotError` if that can't be asked for."""
+        """End the running action, so that `call` returns; raise `RobotError` if that is impossible."""
 
     def model(self) -> Model:
-        """Return the world model as it is now; raise `RobotError` if there is none."""
+        """Return the present world model; raise `RobotError` if there is none."""
