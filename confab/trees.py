@@ -68,9 +68,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Tree:
-    """The behaviour tree of a plan: subtrees by name, the first one the whole; the conditions or action of each leaf, by its
-    key.
-    """
+    """The behaviour tree of a plan: subtrees by name, the whole one first; the conditions or action of each leaf, by key."""
 
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
@@ -300,7 +298,9 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
             return f'Sequence("Sequence", memory={kind == "Once"}, children=[{below}{end}])'
 
 
-def filled(tree: Tree, path: Path, problem: Problem, world: World, observer: Callable[[Step], None] | None = None) -> Any:
+def filled(
+    tree: Tree, path: Path, problem: Problem, world: World, observer: Callable[[Step], None] | None = None
+) -> Any:
     """Return the root of an exported ``tree.py``, its leaves filled by a world: conditions by observation, actions by execution.
 
     Parameters
