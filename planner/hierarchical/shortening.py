@@ -33,8 +33,8 @@ SHUFFLES = 3
 """Number of random orders of the goals before the best one is changed a little at a time."""
 LEAST_EFFORT = 400_000
 """Minimum effort assumed for a first plan, in states times operators: length of plans found at once, against CPU time."""
-DOING = 20
-"""SearchBudget of replaying a primitive, in states times operators."""
+DOING, BEGINNING = 20, 1_000
+"""Work of replaying a primitive, and of beginning a call, in states times operators."""
 MANY = 1.25
 """Minimum number of steps per goal from which on other orders are tried: plan length against CPU time."""
 KEPT = 1.5
@@ -114,7 +114,15 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
     Only steps of the most abstract level are tried. Advice is used for refinements; for goals it would lead to the same steps.
     """
     order = list(call.kept)
+    tried = {tuple(order)}
     for other_order in neighbours(order, random) if len(order) > 1 else ():
+        call.space.check_time()
+        work -= BEGINNING
+        if work <= 0:
+            break
+        if tuple(other_order) in tried:
+            continue
+        tried.add(tuple(other_order))
         goal = {Symbol(cell[0], arguments_of(cell[1])): call.goal[cell] for cell in other_order}
         other = fresh_call(call, replace(call.problem, goal=goal))
         other.space.most_work = work
@@ -126,8 +134,6 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
                 order[:] = other.kept
                 call.steps = other.steps if length(other.steps) < length(call.steps) else call.steps
         work -= other.space.effort + DOING * length(other.steps)
-        if work <= 0:
-            break
 
 
 def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
