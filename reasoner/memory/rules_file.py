@@ -7,34 +7,21 @@ roles are parameters of its own. A `:LearnedMethod` has the refined behaviour (`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 from urllib.parse import quote, unquote
 
 import pyoxigraph as ox
 
+from confab.reasoner.condition_nodes import Node, NodeReader, NodeWriter
 from confab.reasoner.memory.experience import GoalKind, Method, OpenRole, Order, Rule, Said
 from confab.reasoner.names import Names
-from confab.reasoner.symbols import (
-    FALSE,
-    TRUE,
-    AnyOf,
-    ClassCondition,
-    Comparison,
-    Condition,
-    EqualityCondition,
-    RelationCondition,
-    ValueCondition,
-    Witness,
-)
+from confab.reasoner.symbols import FALSE, TRUE, Condition, ValueCondition
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, RDF
 
-Node: TypeAlias = "Mapping[str, Sequence[str]]"
-"""The values of a node by property, without the core's namespace."""
 Words: TypeAlias = "Callable[[Said], str]"
-MOST_INSIDE = 50
-"""Maximum depth of nested conditions; more means that a condition contains itself."""
+T = TypeVar("T")
 
 
 def label(one: Said) -> str:
@@ -84,10 +71,9 @@ class RuleWriter:
 
     def rule(self, rule: Rule, me: str) -> list[str]:
         """Return a rule's properties as the first text, and the triples of its parts."""
-        parts: list[str] = []
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
-        goal = self.condition(rule.goal, terms, me, parts)
-        asks = [self.condition(c, terms, me, parts) for c in rule.asks]
+        nodes = _RuleNodes(me, self.term, terms)
+        goal, *asks = map(nodes.condition, (rule.goal, *rule.asks))
         said = [f":forGoal {goal} ; {self.step(rule.does, terms)}"]
         said += [f":asksFor {', '.join(asks)}"] if asks else []
         said += [f":role {', '.join(terms.values())}"] if terms else []
@@ -95,7 +81,7 @@ class RuleWriter:
             f"{terms[role]} a owl:NamedIndividual, :Parameter ; :index {i} ; :termType {self.term(kind)}"
             for i, (role, kind) in enumerate(rule.kinds)
         ]
-        return [" ; ".join(said), *roles, *parts]
+        return [" ; ".join(said), *roles, *nodes.nodes]
 
     def step(self, does: tuple[str, Sequence[str]], terms: Mapping[str, str]) -> str:
         """Return the properties of a behaviour with its arguments."""
@@ -124,55 +110,46 @@ class RuleWriter:
             lines[0] += f" ; :role {', '.join(roles[method.roles :])}"
         return lines
 
-    def condition(self, one: Condition, terms: dict[str, str], me: str, parts: list[str]) -> str:
-        """Append the triples of a condition and its nested conditions to `parts`; return its name."""
-        name = f"{me}.c{len(parts)}"
-        place = len(parts)
-        parts.append("")
-        no = " ; :negated true" if one.negated else ""
 
-        def put(term: str) -> str:
-            return terms.get(term) or self.term(term)
+class _RuleNodes(NodeWriter):
+    """Writes the conditions of a rule, each named after the rule and its place."""
 
-        def arguments(given: Sequence[str]) -> str:
-            return "".join(f" ; :{a} {put(t)}" for a, t in zip(ARGUMENTS, given, strict=False))
+    def __init__(self, me: str, spelled: Callable[[str], str], terms: Mapping[str, str]) -> None:
+        def variable(name: str, node: str, position: int) -> str:
+            return f"{node}.{quote(name[1:], safe='')}"
 
-        match one:
-            case ValueCondition(situation, given, value):
-                said = (
-                    f":ValueCondition ; :situationType {self.term(situation)}{arguments(given)} ; :value {put(value)}"
-                )
-            case RelationCondition(relation, given):
-                last = f" ; :value {put(given[-1])}" if len(given) > 1 else ""
-                said = f":RelationCondition ; :relation {self.term(relation)}{arguments(given[:-1] if last else given)}{last}"
-            case ClassCondition(term, kind):
-                said = f":ClassCondition ; :about {put(term)} ; :ofClass {self.term(kind)}"
-            case EqualityCondition(left, right):
-                said = f":EqualityCondition ; :about {put(left)} ; :value {put(right)}"
-            case Witness(variable, kind, conditions):
-                inner = {**terms, variable: f"{name}.{quote(variable[1:], safe='')}"}
-                parts.append(f"{inner[variable]} a owl:NamedIndividual, :Variable ; :termType {self.term(kind)}")
-                those = [self.condition(c, inner, me, parts) for c in conditions]
-                said = f":Witness ; :witness {inner[variable]}" + (f" ; :condition {', '.join(those)}" if those else "")
-            case AnyOf(alternatives):
-                groups = []
-                for number, group in enumerate(alternatives):
-                    those = [self.condition(c, terms, me, parts) for c in group]
-                    groups.append(f"{name}.or{number}")
-                    of = f" ; :condition {', '.join(those)}" if those else ""
-                    parts.append(f"{groups[-1]} a owl:NamedIndividual, :AllOf{of}")
-                said = f":AnyOf ; :alternative {', '.join(groups)}"
-            case Comparison():
-                raise TypeError(f"{one} can't be a condition of a rule: rules don't compare amounts")
-        parts[place] = f"{name} a owl:NamedIndividual, {said}{no}"
-        return name
+        super().__init__(":", spelled, lambda kind, position: f"{me}.c{position}", variable, terms)
+
+    def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
+        """Write each alternative of a disjunction as a conjunction named after it; return their nodes."""
+        found = [f"{node}.or{number}" for number in range(len(alternatives))]
+        for name, group in zip(found, alternatives, strict=True):
+            inner = [*map(self.condition, group)]
+            self.nodes.append(self.statement(name, "AllOf", {"condition": inner}))
+        return found
 
 
-class RuleReader:
-    """Reads learned items from the triples of a file."""
+class RuleReader(NodeReader):
+    """Reads learned items from the triples of a file. Properties of the core are without its namespace in `nodes`."""
 
     def __init__(self, nodes: Mapping[str, Node], names: Names | None) -> None:
         self.nodes, self.names = nodes, names
+        self.roles: Mapping[str, str] = {}  # the names of a rule's roles, by their IRIs
+        self.inside, self.count = [], [0]
+
+    def values(self, iri: str, name: str) -> Sequence[str]:
+        """Return the values of a property of a node."""
+        return self.nodes.get(iri, {}).get(name, ())
+
+    def term(self, iri: str) -> str:
+        """Return the name of a role or of a witness's variable, or the short name of anything else."""
+        if iri in self.roles:
+            return self.roles[iri]
+        return "?" + unquote(iri).rsplit(".", 1)[-1] if self.is_a(iri, "Variable") else self.short(iri)
+
+    def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
+        """Return parts in an order that doesn't depend on their IRIs."""
+        return tuple(sorted(parts, key=repr))
 
     def short(self, iri: str) -> str:
         """Return the short name of a term."""
@@ -195,19 +172,8 @@ class RuleReader:
         if "LearnedMethod" in kinds:
             return self.method(iri, node)
         if "GoalKind" in kinds:
-            return GoalKind(self.short(self.one(iri, "situationType")), tuple(map(self.short, self.arguments(iri))))
+            return GoalKind(self.short(self.one(iri, "situationType")), self.arguments(iri))
         return None
-
-    def one(self, iri: str, name: str) -> str:
-        """Return the only value of a property; raise `ValueError` if there is none or more than one."""
-        found = self.nodes.get(iri, {}).get(name, ())
-        if len(found) != 1:
-            raise ValueError(f"<{iri}>: wanted one :{name}, found {len(found)}")
-        return found[0]
-
-    def arguments(self, iri: str) -> list[str]:
-        """Return the arguments of a node in order."""
-        return [value for name in ARGUMENTS for value in self.nodes[iri].get(name, ())[:1]]
 
     def rule(self, iri: str, node: Node) -> Rule:
         """Return the rule of a node."""
@@ -215,13 +181,18 @@ class RuleReader:
         terms = {role: "?" + unquote(role.removeprefix(iri + ".")) for role in roles}
         if len(set(terms.values())) < len(roles) or any("." in name for name in terms.values()):
             terms = {role: f"?role{i}" for i, role in enumerate(roles)}
-        goal = self.condition(self.one(iri, "forGoal"), terms)
+        self.roles = terms
+        goal = self.condition(self.one(iri, "forGoal"))
         if not isinstance(goal, ValueCondition):
             raise ValueError(f"<{iri}>: its :forGoal is no :ValueCondition")
-        asks = tuple(sorted((self.condition(c, terms) for c in node.get("asksFor", ())), key=repr))
-        does = self.short(self.one(iri, "does")), tuple(self.term(a, terms) for a in self.arguments(iri))
+        asks = self.in_order(map(self.condition, node.get("asksFor", ())))
+        does = self.short(self.one(iri, "does")), self.arguments(iri)
         kinds = tuple((terms[role], self.short(self.one(role, "termType"))) for role in roles)
         return Rule(goal, asks, does, kinds)
+
+    def arguments_of(self, iri: str) -> list[str]:
+        """Return the IRIs of the arguments of a node, in order."""
+        return [value for name in ARGUMENTS for value in self.values(iri, name)[:1]]
 
     def method(self, iri: str, node: Node) -> Method:
         """Return the method of a node."""
@@ -229,13 +200,13 @@ class RuleReader:
         opened = sorted(node.get("role", ()), key=lambda role: int(self.one(role, "index")))
         steps = []
         for step in sorted(node.get("step", ()), key=lambda step: int(self.one(step, "index"))):
-            places = tuple(int(self.one(role, "index")) for role in self.arguments(step))
+            places = tuple(int(self.one(role, "index")) for role in self.arguments_of(step))
             steps.append((self.short(self.one(step, "does")), places))
         roles = []
         for role in opened:
             source = becomes = None
             if "isValueOf" in self.nodes[role]:
-                places = tuple(int(self.one(other, "index")) for other in self.arguments(role))
+                places = tuple(int(self.one(other, "index")) for other in self.arguments_of(role))
                 source = self.short(self.one(role, "isValueOf")), places
             if "becomesValueOf" in self.nodes[role]:
                 becomes = self.short(self.one(role, "becomesValueOf"))
@@ -245,42 +216,3 @@ class RuleReader:
             if not 0 <= place < own + len(roles):
                 raise ValueError(f"<{iri}>: names role {place} of {own + len(roles)}, counted from 0")
         return Method(self.short(self.one(iri, "refines")), own, tuple(steps), tuple(roles))
-
-    def term(self, iri: str, terms: Mapping[str, str]) -> str:
-        """Return the role of a term, else its short name."""
-        return terms.get(iri) or self.short(iri)
-
-    def condition(self, iri: str, terms: Mapping[str, str], depth: int = 0) -> Condition:
-        """Return the condition of a node, with its nested conditions."""
-        if depth > MOST_INSIDE:
-            raise ValueError(f"<{iri}>: the condition contains itself")
-        node = self.nodes.get(iri, {})
-        kinds = {kind.removeprefix(CORE) for kind in node.get(RDF + "type", ())}
-        negated = "true" in node.get("negated", ())
-        given = tuple(self.term(a, terms) for a in self.arguments(iri)) if node else ()
-        if "ValueCondition" in kinds:
-            return ValueCondition(
-                self.short(self.one(iri, "situationType")), given, self.term(self.one(iri, "value"), terms), negated
-            )
-        if "RelationCondition" in kinds:
-            last = tuple(self.term(value, terms) for value in node.get("value", ()))
-            return RelationCondition(self.short(self.one(iri, "relation")), (*given, *last), negated)
-        if "ClassCondition" in kinds:
-            return ClassCondition(given[0], self.short(self.one(iri, "ofClass")), negated)
-        if "EqualityCondition" in kinds:
-            return EqualityCondition(given[0], self.term(self.one(iri, "value"), terms), negated)
-        if "Witness" in kinds:
-            sought = self.one(iri, "witness")
-            variable = "?" + unquote(sought.removeprefix(iri + ".")).rsplit(".", 1)[-1]
-            inner = {**terms, sought: variable}
-            those = (self.condition(c, inner, depth + 1) for c in node.get("condition", ()))
-            return Witness(variable, self.short(self.one(sought, "termType")), tuple(sorted(those, key=repr)), negated)
-        if "AnyOf" in kinds:
-            groups = (
-                tuple(
-                    sorted((self.condition(c, terms, depth + 1) for c in self.nodes[g].get("condition", ())), key=repr)
-                )
-                for g in node.get("alternative", ())
-            )
-            return AnyOf(tuple(sorted(groups, key=repr)), negated)
-        raise ValueError(f"<{iri}>: a condition of no known kind")

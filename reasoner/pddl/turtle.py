@@ -6,41 +6,33 @@ shows and edits it. Effects are numbered in the order in which they are made.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import TypeAlias
 
 import pyoxigraph as ox
 
-from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from confab.reasoner.amounts import Measure, bounds, written
+from confab.reasoner.condition_nodes import NodeWriter, Properties, decimal_text, finite, relation_properties
 from confab.reasoner.language import measures
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
-    AnyOf,
     Behavior,
-    ClassCondition,
-    Comparison,
-    Condition,
-    EqualityCondition,
     Fact,
+    Parameter,
     Problem,
-    RelationCondition,
     Rule,
     SituationType,
     Span,
-    Symbol,
     Times,
     Timing,
-    ValueCondition,
-    ValueEffect,
-    Witness,
-    substituted,
 )
 from confab.reasoner.timing import timing_of
-from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS, XSD
+from confab.reasoner.vocabulary import CORE, OWL, RDFS, SKOS, XSD
 
 HEADER = f"""\
 @prefix :        <{{scene}}#> .
@@ -61,6 +53,8 @@ HEADER = f"""\
 CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
 """The origin of a name, written as its label."""
+_Stated: TypeAlias = "tuple[str, str, str, Properties]"
+"""A fact: its subject, the property that states it if there is one, the value, and the properties of a node that states it."""
 
 
 def turtle(problem: Problem, title: str, description: str, labels: Said | None = None) -> str:
@@ -87,9 +81,6 @@ def _quoted(text: str) -> str:
 class _SceneWriter:
     problem: Problem
     labels: dict[str, str]
-    nodes: list[str] = field(default_factory=list)  # of the behaviour being written
-    terms: dict[str, str] = field(default_factory=dict)  # its terms' IRIs
-    where: str = ""
 
     def lines(self) -> Iterator[str]:
         domain = self.problem.domain
@@ -181,7 +172,7 @@ class _SceneWriter:
         limits = (("least", quantity.least), ("most", quantity.most), ("default", Fraction(one.default or 0)))
         for name, limit in limits:
             if limit is not None and (name != "default" or one.default is not None):
-                pairs.append((f"c:{name}Amount", decimal(limit)))
+                pairs.append((f"c:{name}Amount", decimal_text(limit)))
         pairs += [("c:unit", _quoted(quantity.unit))] if quantity.unit else []
         if single:
             pairs.append(("c:valueProperty", f":{one.name}.value"))
@@ -218,32 +209,20 @@ class _SceneWriter:
             yield self.node(relation, kinds, "Holds or not, whatever is done.")
 
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
-        self.where, self.nodes = one.name, []
-        self.terms = {t.name: f":{one.name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
-        timing = timing_of(one)
+        nodes, timing = self.behavior_nodes(one.name, (*one.parameters, *one.variables)), timing_of(one)
         timed = sorted(timing.conditions, key=lambda pair: pair[0] is Span.THROUGHOUT)
         known = {c for _, c in timed}
         asked = [*timed, *((Span.THROUGHOUT, c) for c in one.asked if c not in known)]
-        conditions = [self.spanned(self.condition(c), span) for span, c in asked if c not in (one.priced, one.lasting)]
-        effects = []
-        values = [(span, e) for span, e in timing.effects if isinstance(e, ValueEffect)]
-        changes = [(span, e) for span, e in timing.effects if isinstance(e, AmountEffect)]
-        for position, (span, effect) in enumerate(values, start=1):
-            when = [self.condition(c) for c in effect.when]
-            iri = f":{one.name}.effect{position:03}"
-            at = self.value(Symbol(effect.situation, effect.arguments), effect.value)
-            self.nodes.append(f"{iri} a owl:NamedIndividual, c:ValueEffect ; {at}{_some('c:when', when)} .")
-            effects.append(self.spanned(iri, span))
-        for position, (span, change) in enumerate(changes, start=len(values) + 1):
-            when = [self.condition(c) for c in change.when]
-            iri = f":{one.name}.effect{position:03}"
-            at = " ; ".join([f"c:situationType {self.iri(change.situation)}", *self.arguments(change.arguments)])
-            by = self.side("right", change.amount)
-            said = f'c:AmountEffect ; {at} ; c:change "{change.operation}" ; {by}{_some("c:when", when)}'
-            self.nodes.append(f"{iri} a owl:NamedIndividual, {said} .")
-            effects.append(self.spanned(iri, span))
+        conditions = [
+            _spanned(nodes, nodes.condition(c), span) for span, c in asked if c not in (one.priced, one.lasting)
+        ]
+        made = sorted(timing.effects, key=lambda pair: isinstance(pair[1], AmountEffect))
+        effects = [
+            _spanned(nodes, nodes.effect(f":{one.name}.effect{position:03}", effect), span)
+            for position, (span, effect) in enumerate(made, start=1)
+        ]
         cost = [] if one.cost == 1 else [f"{one.cost:f}"]
-        price = [] if one.price is None else [self.calculation(one.price)]
+        price = [] if one.price is None else [nodes.calculation(one.price)]
         yield self.node(
             one.name,
             "owl:NamedIndividual, c:Behavior",
@@ -252,133 +231,60 @@ class _SceneWriter:
             ("c:index", str(index)),
             ("c:cost", cost),
             ("c:price", price),
-            *self.lasting(one.name, timing),
-            ("c:parameter", [self.terms[p.name] for p in one.parameters]),
+            *self.lasting(one.name, timing, nodes),
+            ("c:parameter", [nodes.terms[p.name] for p in one.parameters]),
             ("c:precondition", conditions),
             ("c:postcondition", effects),
         )
+        yield from self.terms(nodes, one)
+
+    def terms(self, nodes: NodeWriter, one: Behavior | Rule) -> Iterator[str]:
+        """Yield the terms of a behaviour or rule, and the nodes of its parts."""
         for i, parameter in enumerate(one.parameters, start=1):
-            yield self.term(self.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
+            yield self.term(nodes.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
         for variable in one.variables:
-            yield self.term(self.terms[variable.name][1:], "c:Variable", None, variable.kind)
-        yield from self.nodes
+            yield self.term(nodes.terms[variable.name][1:], "c:Variable", None, variable.kind)
+        yield from (f"{statement} ." for statement in nodes.nodes)
 
-    def spanned(self, iri: str, span: Span) -> str:
-        """Say the span of a condition or an effect, if it isn't throughout; return its IRI."""
-        if span is not Span.THROUGHOUT:
-            self.nodes.append(f"{iri} c:during c:{span.value} .")
-        return iri
-
-    def lasting(self, name: str, timing: Timing) -> Iterator[tuple[str, str | Sequence[str]]]:
+    def lasting(self, name: str, timing: Timing, nodes: NodeWriter) -> Iterator[tuple[str, str | Sequence[str]]]:
         """Yield what is said of the duration and the actors of a behaviour."""
         if isinstance(timing.duration, Fraction):
             yield "c:duration", seconds_text(timing.duration)
         elif timing.duration is not None:
-            yield "c:calculatedDuration", self.calculation(timing.duration)
-        yield "c:actor", [self.put(actor) for actor in timing.actors]
+            yield "c:calculatedDuration", nodes.calculation(timing.duration)
+        yield "c:actor", [nodes.put(actor) for actor in timing.actors]
         at = (self.problem.times or Times()).events.get(name)
         if at is not None:
             yield "c:happensAt", seconds_text(at)
 
     def rule(self, name: str, one: Rule) -> Iterator[str]:
-        self.where, self.nodes = name, []
-        self.terms = {t.name: f":{name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
-        conditions = [self.condition(c) for c in one.conditions]
-        head = self.value(Symbol(one.situation, tuple(p.name for p in one.parameters)), TRUE)
-        yield f":{name} a owl:NamedIndividual, c:Rule ; {head}{_some('c:condition', conditions)} ."
-        for i, parameter in enumerate(one.parameters, start=1):
-            yield self.term(self.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
-        for variable in one.variables:
-            yield self.term(self.terms[variable.name][1:], "c:Variable", None, variable.kind)
-        yield from self.nodes
+        nodes = self.behavior_nodes(name, (*one.parameters, *one.variables))
+        conditions = [nodes.condition(c) for c in one.conditions]
+        head = nodes.symbol(one.situation, [p.name for p in one.parameters], TRUE)
+        yield f"{nodes.statement(f':{name}', 'Rule', {**head, 'condition': conditions})} ."
+        yield from self.terms(nodes, one)
 
-    def put(self, term: str) -> str:
-        return self.terms.get(term) or self.iri(term)
+    def behavior_nodes(self, where: str, terms: Iterable[Parameter]) -> NodeWriter:
+        """Return a writer of the conditions and effects of a behaviour or rule, whose terms are named after it."""
+        taken = {t.name: f":{where}.{t.name[1:]}" for t in terms}
+        sought = set(taken.values())
 
-    def value(self, symbol: Symbol, value: str) -> str:
-        """Return the properties that state the value of a symbol, which may contain variables."""
-        said = [f"c:situationType {self.iri(symbol.situation)}", *self.arguments(symbol.arguments)]
-        if not (self.problem.domain.situations[symbol.situation].boolean and value == TRUE):
-            said.append(f"c:value {self.put(value)}")
-        return " ; ".join(said)
+        def variable(name: str, node: str, position: int) -> str:
+            found = f":{where}.{name[1:]}"
+            if found in sought:  # of another part of the behaviour: a node is one term
+                found += f"_{position}"
+            sought.add(found)
+            return found
 
-    def arguments(self, terms: Sequence[str]) -> list[str]:
-        names = (f"c:{name}" for name in ARGUMENTS)
-        return [f"{name} {self.put(term)}" for name, term in zip(names, terms, strict=False)]
-
-    def condition(self, one: Condition) -> str:
-        """Write a condition with its nested conditions; return its IRI."""
-        position = len(self.nodes)
-        self.nodes.append("")
-        iri = f":{self.where}.condition{position:03}"
-        no = " ; c:negated true" if one.negated else ""
-        match one:
-            case ValueCondition(situation, arguments, value):
-                said = f"c:ValueCondition ; {self.value(Symbol(situation, arguments), value)}"
-            case RelationCondition(relation, terms):
-                last = [f"c:value {self.put(terms[-1])}"] if len(terms) > 1 else []
-                parts = [*self.arguments(terms[:-1] if last else terms), *last]
-                said = f"c:RelationCondition ; c:relation {self.iri(relation)} ; {' ; '.join(parts)}"
-            case ClassCondition(term, kind):
-                said = f"c:ClassCondition ; c:about {self.put(term)} ; c:ofClass {self.iri(kind)}"
-            case EqualityCondition(left, right):
-                said = f"c:EqualityCondition ; c:about {self.put(left)} ; c:value {self.put(right)}"
-            case Witness(variable, kind, conditions):
-                if variable in self.terms:  # of another part of the behaviour: a node is one term
-                    own = f"{variable}_{position}"
-                    conditions = tuple(substituted(c, {variable: own}) for c in conditions)
-                    variable = own
-                self.terms[variable] = f":{self.where}.{variable[1:]}"
-                self.nodes.append(self.term(self.terms[variable][1:], "c:Variable", None, kind))
-                inner = [self.condition(c) for c in conditions]
-                said = f"c:Witness ; c:witness {self.terms[variable]}{_some('c:condition', inner)}"
-            case AnyOf(alternatives):
-                groups = [self.group(group) for group in alternatives]
-                said = f"c:AnyOf{_some('c:alternative', groups)}"
-            case Comparison(left, sign, right):
-                said = f'c:Comparison ; c:sign "{sign}" ; {self.side("left", left)} ; {self.side("right", right)}'
-        self.nodes[position] = f"{iri} a owl:NamedIndividual, {said}{no} ."
-        return iri
-
-    def side(self, name: str, one: Expression) -> str:
-        """Return the property for an amount; a number on the right and a symbol on the left need no node."""
-        if name == "right" and isinstance(one, Fraction) and _ends(one):
-            return f"c:amount {decimal(one)}"
-        if name == "left" and isinstance(one, Amount | Measure):
-            return self.measured(one)
-        return f"c:{name} {self.calculation(one)}"
-
-    def calculation(self, one: Expression) -> str:
-        """Write a calculation with its nested ones; return its IRI."""
-        position = len(self.nodes)
-        self.nodes.append("")
-        iri = f":{self.where}.amount{position:03}"
-        match one:
-            case Calculation(sign, left, right):
-                said = f'c:sign "{sign}" ; {self.side("left", left)} ; {self.side("right", right)}'
-            case Amount() | Measure():
-                said = self.measured(one)
-            case number if _ends(number):
-                said = f"c:amount {decimal(number)}"
-            case number:
-                whole = Calculation("/", Fraction(number.numerator), Fraction(number.denominator))
-                said = f'c:sign "/" ; {self.side("left", whole.left)} ; {self.side("right", whole.right)}'
-        self.nodes[position] = f"{iri} a owl:NamedIndividual, c:Calculation ; {said} ."
-        return iri
-
-    def measured(self, one: Amount | Measure) -> str:
-        key, name = ("situationType", one.situation) if isinstance(one, Amount) else ("relation", one.relation)
-        return " ; ".join([f"c:{key} {self.iri(name)}", *self.arguments(one.arguments)])
-
-    def group(self, conditions: Sequence[Condition]) -> str:
-        if len(conditions) == 1:
-            return self.condition(conditions[0])
-        position = len(self.nodes)
-        self.nodes.append("")
-        inner = [self.condition(c) for c in conditions]
-        iri = f":{self.where}.condition{position:03}"
-        self.nodes[position] = f"{iri} a owl:NamedIndividual, c:AllOf{_some('c:condition', inner)} ."
-        return iri
+        situations = self.problem.domain.situations
+        return NodeWriter(
+            "c:",
+            self.iri,
+            lambda kind, position: f":{where}.{kind}{position:03}",
+            variable,
+            taken,
+            lambda situation: situations[situation].boolean,
+        )
 
     def individuals(self) -> Iterator[str]:
         """Yield every individual with its lowest class, in the order in which the classes list them."""
@@ -408,56 +314,71 @@ class _SceneWriter:
             yield from self.above(parent)
 
     def facts(self) -> Iterator[str]:
-        situations, number = self.problem.domain.situations, 0
+        """Yield the facts: by a property where one relates an object to its value, otherwise as nodes."""
+        number = 0
+        for subject, prop, value, properties in (*self.values(), *self.tuples()):
+            if prop:
+                yield f"{self.iri(subject)} {prop} {value} ."
+                continue
+            number += 1
+            yield f"{self.individual.statement(f':fact{number}', 'SituatedObjectInstance', properties)} ."
+
+    def values(self) -> Iterator[_Stated]:
+        """Yield the values of symbols, unless they are the default."""
         for symbol, value in self.problem.initial.items():
-            situation = situations[symbol.situation]
+            situation = self.problem.domain.situations[symbol.situation]
             if value in (situation.default, situation.rest) or (situation.boolean and value == FALSE):
                 continue
-            if situation.quantity is not None:
-                amount = decimal(Fraction(value))
-                if len(symbol.arguments) == 1:
-                    yield f"{self.iri(symbol.arguments[0])} :{situation.name}.value {amount} ."
-                    continue
-                number += 1
-                said = self.measured(Amount(symbol.situation, symbol.arguments))
-                yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {said} ; c:amount {amount} ."
-            elif len(symbol.arguments) == 1 and not situation.boolean:
-                yield f"{self.iri(symbol.arguments[0])} :{situation.name}.value {self.iri(value)} ."
+            single = len(symbol.arguments) == 1 and not situation.boolean
+            prop = f":{situation.name}.value" if single else ""
+            if situation.quantity is None:
+                properties = self.individual.symbol(symbol.situation, symbol.arguments, value)
+                yield symbol.arguments[0], prop, self.iri(value), properties
             else:
-                number += 1
-                yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {self.value(symbol, value)} ."
+                amount = decimal_text(Fraction(value))
+                properties = self.individual.symbol(symbol.situation, symbol.arguments)
+                yield symbol.arguments[0], prop, amount, {**properties, "amount": [amount]}
+
+    def tuples(self) -> Iterator[_Stated]:
+        """Yield the tuples of relations."""
         for relation, tuples in self.problem.relations.items():
-            binary = all(len(row) == 2 for row in tuples)
+            prop = self.iri(relation) if all(len(row) == 2 for row in tuples) else ""
             for row in sorted(tuples):
                 if relation in self.measures:
-                    amount = decimal(Fraction(row[-1]))
-                    if binary:
-                        yield f"{self.iri(row[0])} {self.iri(relation)} {amount} ."
-                        continue
-                    number += 1
-                    said = self.measured(Measure(relation, row[:-1]))
-                    yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {said} ; c:amount {amount} ."
-                    continue
-                if binary:
-                    yield f"{self.iri(row[0])} {self.iri(relation)} {self.iri(row[1])} ."
-                    continue
-                number += 1
-                last = [f"c:value {self.iri(row[-1])}"] if len(row) > 1 else []
-                parts = " ; ".join([*self.arguments(row[:-1] if last else row), *last])
-                kinds = "owl:NamedIndividual, c:SituatedObjectInstance"
-                yield f":fact{number} a {kinds} ; c:relation {self.iri(relation)} ; {parts} ."
+                    amount = decimal_text(Fraction(row[-1]))
+                    properties = self.individual.measured(Measure(relation, row[:-1]))
+                    yield row[0], prop, amount, {**properties, "amount": [amount]}
+                else:
+                    properties = relation_properties(self.iri(relation), [*map(self.iri, row)])
+                    yield row[0], prop, self.iri(row[-1]), properties
+
+    @cached_property
+    def individual(self) -> NodeWriter:
+        """A writer of nodes without variables."""
+        return self.behavior_nodes("", ())
 
     def task(self) -> Iterator[str]:
         goals = [Fact(symbol, part) for symbol, value in self.problem.goal.items() for part in value.split(",")]
         iris = [f":goal{i}" for i in range(1, len(goals) + 1)]
-        yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{_some("c:goal", iris)} .'
+        goal = f" ; c:goal {', '.join(iris)}" if iris else ""
+        yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{goal} .'
         for iri, fact in zip(iris, goals, strict=True):
-            if self.problem.domain.situations[fact.symbol.situation].quantity is not None:
+            symbol = fact.symbol
+            if self.problem.domain.situations[symbol.situation].quantity is not None:
                 [(sign, limit)] = bounds(fact.value)
-                at = self.measured(Amount(fact.symbol.situation, fact.symbol.arguments))
-                yield f'{iri} a owl:NamedIndividual, c:Comparison ; {at} ; c:sign "{sign}" ; c:amount {decimal(limit)} .'
+                properties = self.individual.symbol(symbol.situation, symbol.arguments)
+                properties |= {"sign": [sign], "amount": [decimal_text(limit)]}
+                yield f"{self.individual.statement(iri, 'Comparison', properties)} ."
                 continue
-            yield f"{iri} a owl:NamedIndividual, c:ValueCondition ; {self.value(fact.symbol, fact.value)} ."
+            properties = self.individual.symbol(symbol.situation, symbol.arguments, fact.value)
+            yield f"{self.individual.statement(iri, 'ValueCondition', properties)} ."
+
+
+def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
+    """Say the span of a condition or an effect, if it isn't throughout; return its IRI."""
+    if span is not Span.THROUGHOUT:
+        nodes.nodes.append(f"{iri} c:during c:{span.value}")
+    return iri
 
 
 def seconds_text(seconds: Fraction) -> str:
@@ -466,25 +387,8 @@ def seconds_text(seconds: Fraction) -> str:
     >>> seconds_text(Fraction(5, 2))
     '"PT2.5S"^^xsd:dayTimeDuration'
     """
-    text = written(seconds) if _ends(seconds) else written(Fraction(round(seconds * 10**12), 10**12))
+    text = written(seconds) if finite(seconds) else written(Fraction(round(seconds * 10**12), 10**12))
     return f'"PT{text}S"^^xsd:dayTimeDuration'
-
-
-def _ends(number: Fraction) -> bool:
-    """Return whether a number has a finite decimal form."""
-    return "/" not in written(number)
-
-
-def decimal(number: Fraction) -> str:
-    """Return a number as a decimal in Turtle; an infinite decimal fraction is cut off after thirty places."""
-    text = written(number)
-    if "/" in text:
-        text = written(Fraction(round(number * 10**30), 10**30))
-    return text if "." in text else f"{text}.0"
-
-
-def _some(key: str, values: Sequence[str]) -> str:
-    return f" ; {key} {', '.join(values)}" if values else ""
 
 
 def _banner(text: str) -> str:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import ClassVar
 
 from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import (
-    COMPARING,
     OPERATIONS,
     Amount,
-    Calculation,
     Expression,
     Measure,
     terms_of,
 )
+from confab.reasoner.condition_nodes import Node, NodeReader
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import groups, mentions
 from confab.reasoner.names import Names, local_name
@@ -24,8 +23,6 @@ from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import (
     HIGHEST_COST,
     HIGHEST_LEVEL,
-    Node,
-    decimal,
     is_a,
     ordered,
     whole_number,
@@ -36,14 +33,12 @@ from confab.reasoner.symbols import (
     TRUE,
     Aggregate,
     AmountEffect,
-    AnyOf,
     Behavior,
     Comparison,
     Condition,
     Effect,
     EqualityCondition,
     Parameter,
-    RelationCondition,
     Rule,
     Span,
     Timing,
@@ -54,17 +49,12 @@ from confab.reasoner.symbols import (
 from confab.reasoner.timing import projected, seconds_of
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
 
-SIGNS = ("+", "-", "*", "/")
-DEEPEST = 50
-"""Maximum depth of nested conditions."""
-MOST_CONDITIONS = 10_000
-"""Maximum number of conditions in a behaviour, each counted once per occurrence."""
-
 
 @dataclass(frozen=True)
-class Parts:
+class Parts(NodeReader):
     """The nodes of behaviours, conditions and situation types, read as values."""
 
+    error: ClassVar[type[ValueError]] = KnowledgeError
     nodes: Mapping[str, Node]
     names: Names
     terms: set[str]
@@ -75,18 +65,11 @@ class Parts:
         default_factory=dict
     )  # those of the current item, and the term for each individual
     inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
-    count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
+    count: list[int] = field(default_factory=lambda: [0])
 
-    def values(self, iri: str, name: str) -> Sequence[str]:
-        """Return the values of a property of a node."""
-        return self.nodes.get(iri, {}).get(CORE + name, ())
-
-    def one(self, iri: str, name: str) -> str:
-        """Return the one value of a property; a node has to have exactly one."""
-        found = self.values(iri, name)
-        if len(found) != 1:
-            raise KnowledgeError(f"<{iri}>: wanted one :{name}, found {len(found)}; state it in the ontology")
-        return found[0]
+    def short(self, iri: str) -> str:
+        """Return the short name of an IRI."""
+        return self.names.short(iri)
 
     def number(self, iri: str, name: str, least: int, most: int, default: int | None = None) -> int:
         """Return the value of a property as a whole number between bounds."""
@@ -120,26 +103,6 @@ class Parts:
             raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
         return cost
 
-    def decimal(self, iri: str, name: str) -> Fraction | None:
-        """Return the exact number of a property; None if it has none."""
-        if not self.values(iri, name):
-            return None
-        return decimal(self.one(iri, name), f"<{iri}>: :{name}")
-
-    def word(self, iri: str, name: str, known: Sequence[str]) -> str:
-        """Return the value of a property, which has to be one of some known words."""
-        said = self.one(iri, name)
-        if said not in known:
-            raise KnowledgeError(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
-        return said
-
-    def flag(self, iri: str, name: str) -> bool:
-        """Return whether a boolean property is stated true."""
-        said = set(self.values(iri, name))
-        if said - {"true", "false", "1", "0"} or len(said) > 1:
-            raise KnowledgeError(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
-        return bool(said & {"true", "1"})
-
     def term(self, iri: str) -> str:
         """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
         if iri in self.terms:
@@ -162,25 +125,25 @@ class Parts:
             )
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
+    def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
+        """Return the variable of a witness, and the conditions of its class, if situations define it."""
+        return self.parameter(iri), self.membership(iri)
+
     def membership(self, iri: str) -> tuple[Condition, ...]:
         """Return the conditions of a term's class, if situations define it."""
         return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
 
-    def arguments(self, iri: str) -> tuple[str, ...]:
-        """Return the argument terms of a node, in order."""
-        return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
-
     def situation(self, iri: str) -> str:
         """Return the situation type of a condition, an effect or a calculation."""
         situation = self.one(iri, "situationType")
-        if situation not in self.nodes or not is_a(self.nodes[situation], "SituationType"):
+        if not self.is_a(situation, "SituationType"):
             raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
         return situation
 
-    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+    def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
         """Return situation type, arguments and value; the value of a boolean symbol may be its last argument."""
         situation = self.situation(iri)
-        if is_a(self.nodes[situation], "Amount"):
+        if self.is_a(situation, "Amount"):
             raise KnowledgeError(
                 f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
                 "use a :Comparison or an :AmountEffect"
@@ -191,21 +154,25 @@ class Parts:
             arguments, value = (*arguments, *value), []
         return self.names.short(situation), arguments, value[0] if value else TRUE
 
-    def condition(self, iri: str) -> Condition:
-        """Return a condition; a recursive or too deeply nested one is a fault."""
-        if iri not in self.nodes:
-            raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
-        if iri in self.inside or len(self.inside) > DEEPEST:
-            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
-            raise KnowledgeError(f"<{iri}>: the condition {what}; take it out of one of them")
-        self.count[self.inside[0] if self.inside else ""] += 1
-        if self.inside and self.count[self.inside[0]] > MOST_CONDITIONS:
+    def relation(self, iri: str) -> str:
+        """Return the relation of a condition or a calculation."""
+        relation = self.one(iri, "relation")
+        if not self.is_a(relation, "Relation", "ReachRelation"):
+            raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+        return self.names.short(relation)
+
+    def of_class(self, term: str, kind: str, negated: bool) -> Condition:
+        """Return the condition of a class, by what defines it."""
+        return self.definitions.condition(term, kind, negated)
+
+    def measured(self, iri: str) -> Amount | Measure:
+        """Return the amount of an object, or the number of a relation."""
+        found = super().measured(iri)
+        if isinstance(found, Amount) and not self.is_a(situation := self.situation(iri), "Amount"):
             raise KnowledgeError(
-                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
+                f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
+                "declare it as :Amount, or use a value condition or effect"
             )
-        self.inside.append(iri)
-        found = self._of_all(iri)
-        self.inside.pop()
         return found
 
     def classes_in(self, iri: str) -> list[str]:
@@ -225,12 +192,12 @@ class Parts:
             )
         return found
 
-    def _of_all(self, iri: str) -> Condition:
+    def read(self, iri: str) -> Condition:
         """Return a condition; a class in the place of an individual means all its members."""
         kinds = self.classes_in(iri)
         for kind in kinds:
             self.standing[kind] = f"?each{len(self.standing) or ''}"
-        found = self._condition(iri)
+        found = self.absence(iri) if self.is_a(iri, "AbsenceCondition") else super().read(iri)
         for kind in reversed(kinds):
             term = self.standing.pop(kind)
             contrary = replace(found, negated=not found.negated)
@@ -238,95 +205,12 @@ class Parts:
             found = Witness(term, self.names.short(self.definitions.base(kind)), inner, negated=True)
         return found
 
-    def _condition(self, iri: str) -> Condition:
-        node, negated = self.nodes[iri], self.flag(iri, "negated")
-        if is_a(node, "ValueCondition"):
-            return ValueCondition(*self.situation_and_value(iri), negated)
-        if is_a(node, "RelationCondition"):
-            arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
-            relation = self.one(iri, "relation")
-            if relation not in self.nodes or not is_a(self.nodes[relation], "Relation", "ReachRelation"):
-                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
-            return RelationCondition(self.names.short(relation), arguments, negated)
-        if is_a(node, "ClassCondition"):
-            return self.definitions.condition(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
-        if is_a(node, "EqualityCondition"):
-            return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
-        if is_a(node, "AbsenceCondition"):
-            name, _, value = self.situation_and_value(iri)
-            anyone, kind = "?anyone", self.one(iri, "ofClass")
-            inner = (ValueCondition(name, (anyone,), value), *self.definitions.beyond_base(anyone, kind))
-            return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not negated)
-        if is_a(node, "Witness"):
-            sought = self.one(iri, "witness")
-            variable, inner = self.parameter(sought), (*self.conditions(iri, "condition"), *self.membership(sought))
-            return Witness(variable.name, variable.kind, inner, negated)
-        if is_a(node, "AnyOf"):
-            groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
-            return AnyOf(tuple(groups), negated)
-        if is_a(node, "AllOf"):
-            return AnyOf((self.conditions(iri, "condition"),), negated)
-        if is_a(node, "Comparison"):
-            sign = self.word(iri, "sign", tuple(COMPARING))
-            return Comparison(self.left(iri), sign, self.right(iri), negated)
-        raise KnowledgeError(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
-
-    def left(self, iri: str) -> Expression:
-        """Return the left side of a comparison or calculation: its own amount, if it has no other."""
-        return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
-
-    def right(self, iri: str) -> Expression:
-        """Return the right side of a comparison, calculation or effect: its own number, if it has no other."""
-        if self.values(iri, "right"):
-            return self.expression(self.one(iri, "right"))
-        number = self.decimal(iri, "amount")
-        if number is None:
-            raise KnowledgeError(
-                f"<{iri}> has neither :amount nor :right; state a number, or what it is worked out from"
-            )
-        return number
-
-    def measured(self, iri: str) -> Expression:
-        """Return the amount of an object, or the number of a relation."""
-        if self.values(iri, "relation"):
-            relation = self.one(iri, "relation")
-            if relation not in self.nodes or not is_a(self.nodes[relation], "Relation", "ReachRelation"):
-                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
-            return Measure(self.names.short(relation), self.arguments(iri))
-        situation = self.situation(iri)
-        if not is_a(self.nodes[situation], "Amount"):
-            raise KnowledgeError(
-                f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
-                "declare it as :Amount, or use a value condition or effect"
-            )
-        return Amount(self.names.short(situation), self.arguments(iri))
-
-    def expression(self, iri: str) -> Expression:
-        """Return an amount, a number or a calculation."""
-        if iri not in self.nodes:
-            raise KnowledgeError(f"<{iri}> is used as a calculation but isn't declared as one")
-        if iri in self.inside or len(self.inside) > DEEPEST:
-            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
-            raise KnowledgeError(f"<{iri}>: the calculation {what}; take it out of one of them")
-        self.inside.append(iri)
-        if self.values(iri, "sign"):
-            found: Expression = Calculation(self.word(iri, "sign", SIGNS), self.left(iri), self.right(iri))
-        else:
-            number = self.decimal(iri, "amount")
-            found = self.measured(iri) if number is None else number
-        self.inside.pop()
-        return found
-
-    def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
-        """Return the conditions under a property of a node."""
-        return tuple(condition for value in self.values(iri, name) for condition in self.group(value))
-
-    def group(self, iri: str) -> tuple[Condition, ...]:
-        """Return a condition, or the conditions of a conjunction."""
-        found = self.condition(iri)
-        if is_a(self.nodes[iri], "AllOf") and isinstance(found, AnyOf) and not found.negated:
-            return found.alternatives[0]
-        return (found,)
+    def absence(self, iri: str) -> Condition:
+        """Return the condition that no individual of a class has a value."""
+        name, _, value = self.symbol(iri)
+        anyone, kind = "?anyone", self.one(iri, "ofClass")
+        inner = (ValueCondition(name, (anyone,), value), *self.definitions.beyond_base(anyone, kind))
+        return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not self.flag(iri, "negated"))
 
     def effect(self, iri: str) -> Effect:
         """Return an effect; with a class in the place of an individual, on every member for which `when` holds."""
@@ -339,7 +223,7 @@ class Parts:
             )
         for kind in kinds:
             self.standing[kind] = "?each"
-        of_amount = is_a(self.nodes[iri], "AmountEffect")
+        of_amount = self.is_a(iri, "AmountEffect")
         found = self.amount_effect(iri) if of_amount else self.value_effect(iri)
         for kind in kinds:
             term = self.standing.pop(kind)
@@ -349,7 +233,7 @@ class Parts:
 
     def value_effect(self, iri: str) -> ValueEffect:
         """Return an effect that gives a symbol a value."""
-        situation, arguments, value = self.situation_and_value(iri)
+        situation, arguments, value = self.symbol(iri)
         if self.flag(iri, "negated"):
             value = FALSE
         return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
@@ -425,7 +309,7 @@ class Parts:
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
         """Return a rule of a situation type with arguments of some classes; an individual among its terms becomes an equality."""
-        situation, arguments, value = self.situation_and_value(iri)
+        situation, arguments, value = self.symbol(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
         parameters, variables, conditions = self.head_and_body(iri, situation, arguments, kinds)

@@ -28,6 +28,7 @@ from confab.reasoner.amounts import (
     inside,
     written,
 )
+from confab.reasoner.condition_nodes import Node
 from confab.reasoner.derivation import circles, needed
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import DomainError, walk
@@ -42,7 +43,6 @@ from confab.reasoner.reading.rows import (
     HIGHEST_LEVEL,
     HIGHEST_NUMBER,
     Member,
-    Node,
     Schema,
     Triple,
     classes_of,

@@ -16,6 +16,7 @@ from confab.reasoner.amounts import (
     exact,
     written,
 )
+from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
@@ -33,7 +34,6 @@ HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
 HIGHEST_NUMBER = 10**9
 
-Node = Mapping[str, Sequence[str]]
 Triple = tuple[str, str, str]
 Member = tuple[str, str, int]
 """An individual, a class of it, and its index."""

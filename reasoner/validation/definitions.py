@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 
 import pyoxigraph as ox
 
+from confab.reasoner.condition_nodes import Node
 from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.definitions import Definitions
-from confab.reasoner.reading.rows import Node, Schema
+from confab.reasoner.reading.rows import Schema
 from confab.reasoner.symbols import (
     ClassCondition,
     Domain,

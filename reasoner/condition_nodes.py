@@ -1,0 +1,443 @@
+"""Conditions, effects and calculations as RDF nodes: the properties of each kind, and how they are written and read.
+
+A node is an individual of a class of the core (``:ValueCondition``, ``:AmountEffect``, ``:Calculation``). Its properties are
+those of the table; ``:negated true`` stands beside them where a condition is negated.
+
+========================  =====================================================================
+class                     properties
+========================  =====================================================================
+`:ValueCondition`         ``:situationType``, arguments, ``:value``
+`:RelationCondition`      ``:relation``, arguments, the last of several as ``:value``
+`:ClassCondition`         ``:about``, ``:ofClass``
+`:EqualityCondition`      ``:about``, ``:value``
+`:Witness`                ``:witness``, ``:condition`` for each condition on it
+`:AnyOf`                  ``:alternative`` for each condition or `:AllOf`
+`:AllOf`                  ``:condition`` for each condition
+`:Comparison`             ``:sign``; on its left an amount or ``:left``, on its right ``:amount`` or ``:right``
+`:Calculation`            as a comparison; or an amount alone; or ``:amount`` alone
+`:ValueEffect`            as a value condition, ``:when`` for each condition
+`:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
+========================  =====================================================================
+
+Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is a situation type with its arguments, or a relation
+with all of its arguments but the number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import ClassVar, TypeAlias, TypeVar
+
+from confab.reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, exact, written
+from confab.reasoner.symbols import (
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    Effect,
+    EqualityCondition,
+    Parameter,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, TYPE
+
+T = TypeVar("T")
+Node: TypeAlias = "Mapping[str, Sequence[str]]"
+"""The values of a node by property, both as IRIs, or as the text of a literal."""
+Properties: TypeAlias = "dict[str, list[str]]"
+"""The values of a node's properties, by the properties' names in the core."""
+STRINGS = ("sign", "change", "aggregate")
+"""Properties whose values are words."""
+SIGNS = ("+", "-", "*", "/")
+DEEPEST = 50
+"""Maximum depth of nested conditions and calculations."""
+MOST_CONDITIONS = 10_000
+"""Maximum number of conditions inside one, each counted once per occurrence."""
+DECIMALS = 30
+"""Number of decimals of a number without a finite decimal form."""
+
+
+# ---------------------------------------------------------------------------------------------------------- properties
+
+
+def argument_properties(terms: Sequence[str]) -> Properties:
+    """Return the properties that name arguments."""
+    return {name: [term] for name, term in zip(ARGUMENTS, terms, strict=False)}
+
+
+def symbol_properties(situation: str, arguments: Sequence[str], value: str | None = None) -> Properties:
+    """Return the properties that name a symbol and its value; without a value, those of an amount or of a true symbol."""
+    found = {"situationType": [situation], **argument_properties(arguments)}
+    return found if value is None else {**found, "value": [value]}
+
+
+def relation_properties(relation: str, terms: Sequence[str]) -> Properties:
+    """Return the properties that name a relation and its arguments."""
+    *first, last = terms
+    found = {"relation": [relation], **argument_properties(first or [last])}
+    return {**found, "value": [last]} if first else found
+
+
+def class_properties(term: str, kind: str) -> Properties:
+    """Return the properties that name an individual and its class."""
+    return {"about": [term], "ofClass": [kind]}
+
+
+def equality_properties(left: str, right: str) -> Properties:
+    """Return the properties that name two individuals that are the same."""
+    return {"about": [left], "value": [right]}
+
+
+# ------------------------------------------------------------------------------------------------------------- writing
+
+
+class NodeWriter:
+    """Writes the nodes of a behaviour, rule or learned item as statements of Turtle.
+
+    Parameters
+    ----------
+    prefix : str
+        The prefix of the core in the file.
+    spelled : callable
+        Returns the Turtle term of an individual, a class, a relation or a situation type.
+    named : callable
+        Returns the Turtle term of a new node: of its kind (``condition``, ``amount``), and its position among the nodes.
+    variable : callable
+        Returns the Turtle term of the variable of a witness: of its name, the node of the witness, and that node's position.
+    terms : mapping of variable to Turtle term
+        Parameters and variables outside of the conditions.
+    boolean : callable, optional
+        Returns whether the value `TRUE` of a situation type goes without saying.
+
+    Attributes
+    ----------
+    nodes : list of str
+        The statements, without the full stop; a node stands before the nodes inside it.
+    """
+
+    def __init__(
+        self,
+        prefix: str,
+        spelled: Callable[[str], str],
+        named: Callable[[str, int], str],
+        variable: Callable[[str, str, int], str],
+        terms: Mapping[str, str],
+        boolean: Callable[[str], bool] = lambda situation: False,
+    ) -> None:
+        self.prefix, self.spelled, self.named, self.variable, self.boolean = prefix, spelled, named, variable, boolean
+        self.terms = dict(terms)
+        self.nodes: list[str] = []
+
+    def put(self, term: str) -> str:
+        """Return the Turtle term of a variable or an individual."""
+        return self.terms.get(term) or self.spelled(term)
+
+    def said(self, properties: Properties) -> list[str]:
+        """Return properties as predicates with their objects."""
+        found = []
+        for name, values in properties.items():
+            objects = [f'"{value}"' for value in values] if name in STRINGS else values
+            found += [f"{self.prefix}{name} {', '.join(objects)}"] if objects else []
+        return found
+
+    def statement(self, node: str, kind: str, properties: Properties, negated: bool = False) -> str:
+        """Return the statement of a node."""
+        head = f"{node} a owl:NamedIndividual, {self.prefix}{kind}"
+        return " ; ".join([head, *self.said({**properties, "negated": ["true"] if negated else []})])
+
+    def reserved(self, kind: str) -> tuple[str, int]:
+        """Return a new node, and its position among the statements."""
+        self.nodes.append("")
+        return self.named(kind, len(self.nodes) - 1), len(self.nodes) - 1
+
+    def symbol(self, situation: str, arguments: Sequence[str], value: str | None = None) -> Properties:
+        """Return the properties of a symbol with its value."""
+        if value == TRUE and self.boolean(situation):
+            value = None
+        own = None if value is None else self.put(value)
+        return symbol_properties(self.spelled(situation), [*map(self.put, arguments)], own)
+
+    def condition(self, one: Condition) -> str:
+        """Write a condition with its nested conditions; return its node."""
+        node, position = self.reserved("condition")
+        match one:
+            case ValueCondition(situation, arguments, value):
+                kind, properties = "ValueCondition", self.symbol(situation, arguments, value)
+            case RelationCondition(relation, arguments):
+                kind = "RelationCondition"
+                properties = relation_properties(self.spelled(relation), [*map(self.put, arguments)])
+            case ClassCondition(term, of):
+                kind, properties = "ClassCondition", class_properties(self.put(term), self.spelled(of))
+            case EqualityCondition(left, right):
+                kind, properties = "EqualityCondition", equality_properties(self.put(left), self.put(right))
+            case Witness(variable, of, conditions):
+                before, sought = dict(self.terms), self.variable(variable, node, position)
+                self.terms[variable] = sought
+                self.nodes.append(self.statement(sought, "Variable", {"termType": [self.spelled(of)]}))
+                kind, properties = "Witness", {"witness": [sought], "condition": [*map(self.condition, conditions)]}
+                self.terms = before
+            case AnyOf(alternatives):
+                kind, properties = "AnyOf", {"alternative": self.groups(alternatives, node)}
+            case Comparison(left, sign, right):
+                kind = "Comparison"
+                properties = {"sign": [sign], **self.side("left", left), **self.side("right", right)}
+        self.nodes[position] = self.statement(node, kind, properties, one.negated)
+        return node
+
+    def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
+        """Write the alternatives of a disjunction; return their nodes: of a single condition, the node of that condition."""
+        return [self.condition(group[0]) if len(group) == 1 else self.all_of(group) for group in alternatives]
+
+    def all_of(self, conditions: Sequence[Condition]) -> str:
+        """Write a conjunction; return its node."""
+        node, position = self.reserved("condition")
+        self.nodes[position] = self.statement(node, "AllOf", {"condition": [*map(self.condition, conditions)]})
+        return node
+
+    def measured(self, one: Amount | Measure) -> Properties:
+        """Return the properties of an amount, or of a number that a relation gives."""
+        if isinstance(one, Amount):
+            return self.symbol(one.situation, one.arguments)
+        return {"relation": [self.spelled(one.relation)], **argument_properties([*map(self.put, one.arguments)])}
+
+    def side(self, name: str, one: Expression) -> Properties:
+        """Return the properties of one side; an amount on the left and a decimal on the right need no node of their own."""
+        if name == "right" and isinstance(one, Fraction) and finite(one):
+            return {"amount": [decimal_text(one)]}
+        if name == "left" and isinstance(one, Amount | Measure):
+            return self.measured(one)
+        return {name: [self.calculation(one)]}
+
+    def calculation(self, one: Expression) -> str:
+        """Write a calculation with its nested ones; return its node."""
+        node, position = self.reserved("amount")
+        match one:
+            case Calculation(sign, left, right):
+                properties = {"sign": [sign], **self.side("left", left), **self.side("right", right)}
+            case Amount() | Measure():
+                properties = self.measured(one)
+            case number if finite(number):
+                properties = {"amount": [decimal_text(number)]}
+            case number:
+                over, under = Fraction(number.numerator), Fraction(number.denominator)
+                properties = {"sign": ["/"], **self.side("left", over), **self.side("right", under)}
+        self.nodes[position] = self.statement(node, "Calculation", properties)
+        return node
+
+    def effect(self, node: str, one: Effect) -> str:
+        """Write an effect as a given node; return that node."""
+        when = {"when": [*map(self.condition, one.when)]}
+        if isinstance(one, AmountEffect):
+            changed = {**self.symbol(one.situation, one.arguments), "change": [one.operation]}
+            kind, properties = "AmountEffect", {**changed, **self.side("right", one.amount)}
+        else:
+            kind, properties = "ValueEffect", self.symbol(one.situation, one.arguments, one.value)
+        self.nodes.append(self.statement(node, kind, {**properties, **when}))
+        return node
+
+
+def finite(number: Fraction) -> bool:
+    """Return whether a number has a finite decimal form."""
+    return "/" not in written(number)
+
+
+def decimal_text(number: Fraction) -> str:
+    """Return a number as a decimal in Turtle; an infinite decimal fraction is rounded.
+
+    >>> decimal_text(Fraction(2)), decimal_text(Fraction(1, 8))
+    ('2.0', '0.125')
+    """
+    text = written(number if finite(number) else Fraction(round(number * 10**DECIMALS), 10**DECIMALS))
+    return text if "." in text else f"{text}.0"
+
+
+# ------------------------------------------------------------------------------------------------------------- reading
+
+
+class NodeReader:
+    """Reads conditions and calculations from nodes.
+
+    Names of terms, classes, relations and situation types are those that `term` and `short` return. A subclass checks what it
+    knows of them.
+
+    Attributes
+    ----------
+    error : type of ValueError
+    nodes : mapping of IRI to node
+    inside : list of str
+        The nodes that are being read, each inside the one before it.
+    count : list of int
+        The number of conditions read inside the first of them.
+    """
+
+    error: ClassVar[type[ValueError]] = ValueError
+    nodes: Mapping[str, Node]
+    inside: list[str]
+    count: list[int]
+
+    def short(self, iri: str) -> str:
+        """Return the name of a class, a relation, a situation type or an individual."""
+        raise NotImplementedError
+
+    def term(self, iri: str) -> str:
+        """Return the name of a variable or an individual."""
+        raise NotImplementedError
+
+    def values(self, iri: str, name: str) -> Sequence[str]:
+        """Return the values of a property of a node."""
+        return self.nodes.get(iri, {}).get(CORE + name, ())
+
+    def one(self, iri: str, name: str) -> str:
+        """Return the one value of a property; a node has to have exactly one."""
+        found = self.values(iri, name)
+        if len(found) != 1:
+            raise self.error(f"<{iri}>: wanted one :{name}, found {len(found)}; state it once")
+        return found[0]
+
+    def is_a(self, iri: str, *kinds: str) -> bool:
+        """Return whether a node is of one of some classes of the core."""
+        types = self.nodes.get(iri, {}).get(TYPE, ())
+        return any(CORE + kind in types for kind in kinds)
+
+    def word(self, iri: str, name: str, known: Sequence[str]) -> str:
+        """Return the value of a property, which has to be one of some known words."""
+        said = self.one(iri, name)
+        if said not in known:
+            raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
+        return said
+
+    def decimal(self, iri: str, name: str) -> Fraction | None:
+        """Return the exact number of a property; None if it has none."""
+        if not self.values(iri, name):
+            return None
+        said = self.one(iri, name)
+        if (found := exact(said)) is None:
+            raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted a number, like 2 or 1.5")
+        return found
+
+    def flag(self, iri: str, name: str) -> bool:
+        """Return whether a boolean property is stated true."""
+        said = set(self.values(iri, name))
+        if said - {"true", "false", "1", "0"} or len(said) > 1:
+            raise self.error(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
+        return bool(said & {"true", "1"})
+
+    def arguments(self, iri: str) -> tuple[str, ...]:
+        """Return the arguments of a node, in order."""
+        return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
+
+    def situation(self, iri: str) -> str:
+        """Return the IRI of the situation type of a node."""
+        return self.one(iri, "situationType")
+
+    def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+        """Return the situation type, the arguments and the value of a node."""
+        value = self.term(self.one(iri, "value")) if self.values(iri, "value") else TRUE
+        return self.short(self.situation(iri)), self.arguments(iri), value
+
+    def relation(self, iri: str) -> str:
+        """Return the relation of a node."""
+        return self.short(self.one(iri, "relation"))
+
+    def of_class(self, term: str, kind: str, negated: bool) -> Condition:
+        """Return the condition that a term is an individual of a class, given as an IRI."""
+        return ClassCondition(term, self.short(kind), negated)
+
+    def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
+        """Return the variable of a witness, and the conditions that follow from its class."""
+        return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
+
+    def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
+        """Return the conditions of a conjunction, or the alternatives of a disjunction, in the order of the value."""
+        return tuple(parts)
+
+    def entered(self, iri: str, what: str) -> None:
+        """Begin to read a node; raise an error if it is inside itself or too deep."""
+        if iri not in self.nodes:
+            raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or mend the name")
+        if iri in self.inside or len(self.inside) > DEEPEST:
+            how = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
+            raise self.error(f"<{iri}>: the {what} {how}; take it out of one of them")
+        self.inside.append(iri)
+
+    def condition(self, iri: str) -> Condition:
+        """Return a condition; a recursive or too deeply nested one is a fault."""
+        self.entered(iri, "condition")
+        self.count[0] = self.count[0] + 1 if len(self.inside) > 1 else 0
+        if self.count[0] > MOST_CONDITIONS:
+            raise self.error(
+                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
+            )
+        found = self.read(iri)
+        self.inside.pop()
+        return found
+
+    def read(self, iri: str) -> Condition:
+        """Return the condition of a node that is declared."""
+        negated = self.flag(iri, "negated")
+        if self.is_a(iri, "ValueCondition"):
+            return ValueCondition(*self.symbol(iri), negated)
+        if self.is_a(iri, "RelationCondition"):
+            arguments = (*self.arguments(iri), *map(self.term, self.values(iri, "value")))
+            return RelationCondition(self.relation(iri), arguments, negated)
+        if self.is_a(iri, "ClassCondition"):
+            return self.of_class(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
+        if self.is_a(iri, "EqualityCondition"):
+            return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
+        if self.is_a(iri, "Witness"):
+            variable, more = self.sought(self.one(iri, "witness"))
+            return Witness(variable.name, variable.kind, (*self.conditions(iri, "condition"), *more), negated)
+        if self.is_a(iri, "AnyOf"):
+            return AnyOf(self.in_order(map(self.group, self.values(iri, "alternative"))), negated)
+        if self.is_a(iri, "AllOf"):
+            return AnyOf((self.conditions(iri, "condition"),), negated)
+        if self.is_a(iri, "Comparison"):
+            sign = self.word(iri, "sign", tuple(COMPARING))
+            return Comparison(self.left(iri), sign, self.right(iri), negated)
+        raise self.error(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+
+    def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
+        """Return the conditions under a property of a node."""
+        return self.in_order(condition for value in self.values(iri, name) for condition in self.group(value))
+
+    def group(self, iri: str) -> tuple[Condition, ...]:
+        """Return a condition, or the conditions of a conjunction."""
+        found = self.condition(iri)
+        if self.is_a(iri, "AllOf") and isinstance(found, AnyOf) and not found.negated:
+            return found.alternatives[0]
+        return (found,)
+
+    def left(self, iri: str) -> Expression:
+        """Return the left side of a comparison or calculation: its own amount, if it has no other."""
+        return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
+
+    def right(self, iri: str) -> Expression:
+        """Return the right side of a comparison, calculation or effect: its own number, if it has no other."""
+        if self.values(iri, "right"):
+            return self.expression(self.one(iri, "right"))
+        number = self.decimal(iri, "amount")
+        if number is None:
+            raise self.error(f"<{iri}> has neither :amount nor :right; state a number, or what it is worked out from")
+        return number
+
+    def measured(self, iri: str) -> Amount | Measure:
+        """Return the amount of an object, or the number of a relation."""
+        if self.values(iri, "relation"):
+            return Measure(self.relation(iri), self.arguments(iri))
+        return Amount(self.short(self.situation(iri)), self.arguments(iri))
+
+    def expression(self, iri: str) -> Expression:
+        """Return an amount, a number or a calculation."""
+        self.entered(iri, "calculation")
+        if self.values(iri, "sign"):
+            found: Expression = Calculation(self.word(iri, "sign", SIGNS), self.left(iri), self.right(iri))
+        else:
+            number = self.decimal(iri, "amount")
+            found = self.measured(iri) if number is None else number
+        self.inside.pop()
+        return found
