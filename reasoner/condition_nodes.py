@@ -371,7 +371,7 @@ class NodeReader:
         self.count[0] = self.count[0] + 1 if len(self.inside) > 1 else 0
         if self.count[0] > MOST_CONDITIONS:
             raise self.error(
-                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
+                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted once per occurrence; say less"
             )
         found = self.read(iri)
         self.inside.pop()
