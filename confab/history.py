@@ -16,7 +16,7 @@ from confab.reasoner.names import nearest
 from confab.table import Table
 
 if TYPE_CHECKING:
-    from confab.page.data import PageData
+    from confab.page.schema import PageData
 
 RECORD = "run.json"
 """The file in a run's folder by which it is known."""
@@ -127,11 +127,17 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
     KnowledgeError
         There is no run of such a name.
     """
+    by_name = _by_name(those, (one, other))
+    return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))
+
+
+def _by_name(those: Sequence[Run], wanted: Sequence[str]) -> dict[str, Run]:
+    """Return the runs by name, or raise a KnowledgeError if one that is wanted isn't there."""
     by_name = {run.name: run for run in those}
-    for name in (one, other):
+    for name in wanted:
         if name not in by_name:
             raise KnowledgeError(f"no run '{name}'{nearest(name, by_name)} (runs: {', '.join(by_name)})")
-    return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))
+    return by_name
 
 
 def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
@@ -150,12 +156,20 @@ def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
             yield f"in the end ({goal})", ends[0].get(goal, "not a goal"), ends[1].get(goal, "not a goal")
 
 
-def history_html(those: Sequence[Run], title: str) -> str:
-    """Return the page on which runs are shown and compared."""
+def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) -> str:
+    """Return the page on which runs are shown and compared: at first those that are named, else the last.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no run of such a name.
+    """
     from confab.page.frozen import page_html
 
-    shown = [{"name": run.name, "when": run.when, "figures": run.figures(), "page": run.page} for run in those]
-    return page_html({"title": title, "runs": shown}, title)
+    by_name = _by_name(those, names)
+    shown = [those.index(by_name[name]) for name in names] or [len(those) - 1]
+    told = [{"name": run.name, "when": run.when, "figures": run.figures(), "page": run.page} for run in those]
+    return page_html({"title": title, "runs": told, "shown": shown}, title)
 
 
 def _text(value: object) -> str:

@@ -20,6 +20,13 @@ from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fa
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""
 PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation ?property"
+WORD = r"[\w-]+(?:\.\w+)*"
+NAMED = re.compile(
+    rf"<(?P<symbol>{WORD}(?:, {WORD})+)> is (?P<value>{WORD})"
+    rf"|(?P<of>\w+) of (?P<about>{WORD}(?:, {WORD})*): "
+    rf"|(?P<words>{WORD}(?: {WORD})*)"
+)
+"""A symbol with a value, a symbol before a colon, or words, among which facts may be."""
 AT_ONCE = 400
 """Maximum number of labels in one query."""
 
@@ -57,6 +64,40 @@ class Labels:
         subject = [self.placed(about)] if about else []
         words = [*subject, verb, *map(self.name, (*rest, *value))]
         return denied(_joined(words)) if boolean and fact.value == FALSE else _joined(words)
+
+    def sentence(self, text: str) -> str:
+        """Return a text in which facts and individuals by name are replaced by sentences and labels.
+
+        >>> import confab
+        >>> scene = confab.load("beverage-serving")
+        >>> labels_of(scene.knowledge, scene.names, scene.problem).sentence("since cup1 LOCATION location7, in left_hand")
+        'since cup 1 is at location 7, in left hand'
+        """
+        return NAMED.sub(self._replaced, text)
+
+    def _replaced(self, found: re.Match[str]) -> str:
+        """Return what stands for a symbol with its value, for a symbol before a colon, or for words."""
+        situations = self.domain.situations
+        *arguments, situation = (found["symbol"] or f"{found['about']}, {found['of']}").split(", ")
+        if found["words"] is None:
+            if situation not in situations:
+                return found[0]
+            symbol = Symbol(situation, tuple(arguments))
+            return f"{self.about(symbol)}: " if found["value"] is None else self.fact(Fact(symbol, found["value"]))
+        words, said = found["words"].split(" "), list[str]()
+        while words:
+            kind = situations.get(words[1]) if len(words) > 1 else None
+            length = 1 if kind is None else 2 + len(kind.arguments)
+            if words[0] in situations and words[1:] and words[1] in self.words:
+                said.append(f"“{self.fact(Fact(Symbol(words[0], ('',)), words[1]))}”")
+                words = words[2:]
+                continue
+            these, words = words[:length], words[length:]
+            if kind is not None and len(these) == length:
+                said.append(self.fact(Fact(Symbol(kind.name, (these[0], *these[2:-1])), these[-1])))
+            else:
+                said += [word if word in self.domain.behaviors else self.words.get(word, word) for word in these]
+        return " ".join(said)
 
     def placed(self, name: str) -> str:
         """Return the label of an individual as a noun: "the place in the box" where the label is "in the box"."""

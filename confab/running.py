@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from shlex import join
 from typing import TYPE_CHECKING
 
 from confab.history import RECORD, record
@@ -51,6 +52,15 @@ class Job:
     noise: float = 0.0
     film: bool = True
     gui: bool = False
+
+    @property
+    def command(self) -> str:
+        """The command that does the same, apart from where the results go."""
+        given = {"--mode": self.mode, "--seed": str(self.seed), "--noise": f"{self.noise:g}"}
+        first = {"--mode": DEFAULT_MODE, "--seed": "0", "--noise": "0"}
+        options = [part for name, value in given.items() if value != first[name] for part in (name, value)]
+        memory = [] if self.memory is None else ["--memory", str(self.memory)]
+        return join(["confab", "run", self.scene, *(f"--goal={goal}" for goal in self.goals), *options, *memory])
 
 
 def run(job: Job) -> int:
@@ -158,7 +168,7 @@ def written(scene: Scene, result: Result, report: Report | None, learned: Memory
     out, paths = job.out, {}
     if result.outcome.plan is not None:
         paths["plan"] = result.save(out / "plan.json")
-    data = page_data(scene, result, report, learned=learned)
+    data = page_data(scene, result, report, learned=learned, again=job.command)
     paths["report"] = write_page(out / "report.html", data)
     how = {"goals": list(job.goals), "mode": job.mode, "seed": job.seed, "noise": job.noise}
     paths["record"] = record(out, data, how, "" if learned is None else learned.said())

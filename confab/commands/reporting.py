@@ -72,7 +72,7 @@ def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) 
     if out is not None:
         from confab.reasoner.files import write_whole
 
-        write_whole(out, history_html(found, f"Runs in {folder.name or folder}"))
+        write_whole(out, history_html(found, f"Runs in {folder.name or folder}", names))
         told(out, f"{len(found)} runs")
         return
     table = compared(found, *names) if names else listed(found)

@@ -8,8 +8,8 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-from confab.page.data import PageData
 from confab.page.markup import asset, script
+from confab.page.schema import PageData
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:

@@ -8,7 +8,9 @@ from functools import cached_property
 
 from confab.known import Known
 from confab.labels import Labels
-from confab.page.data import PageData, page_labels, timeline_data
+from confab.page.data import page_labels, timeline_data
+from confab.page.results import goals_of
+from confab.page.schema import PageData, Row
 from confab.page.timeline import Bar, Period, Timeline
 from confab.planner.acting.executive import Event
 from confab.planner.plan import Step
@@ -108,7 +110,13 @@ class Following:
                 {"name": "primitives done", "text": f"{done} of {len(event.plan.primitives)}"},
                 {"name": "interventions and changes of plan", "text": str(len(marks))},
             ],
-            "goals": [],
+            "rows": data["rows"] if over else [_still_open(row) for row in data["rows"]],
+            "goals": goals_of(timeline, self.labels, planned=True),
             "again": "",
         }
         return data
+
+
+def _still_open(row: Row) -> Row:
+    """Return a row without the remark that its goal isn't met, as long as it may still be."""
+    return {key: value for key, value in row.items() if key != "met" or value}  # type: ignore[return-value]

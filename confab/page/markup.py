@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from html import escape
+from math import pi
 from pathlib import Path
 
 EMPTY = frozenset({"br", "circle", "img", "line", "path", "rect", "source", "use"})
@@ -47,6 +49,37 @@ def joined(*parts: object) -> Markup:
 def number(value: float) -> str:
     """Return a number as text with about three significant digits."""
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+UNITS = {"m": ("mm", 1000.0), "rad": ("°", 180 / pi), "n": ("N", 1.0), "s": ("s", 1.0)}
+"""Units of measurements by the ends of their names: the one that is shown, and by what the value is multiplied."""
+MEASURED = re.compile(r" \(\w+ [-\d.e+]+(, \w+ [-\d.e+]+)*\)$")
+
+
+def measurement(name: str, value: float) -> tuple[str, str]:
+    """Return a measurement's name and value in words.
+
+    >>> measurement("tip_error_m", 0.0041), measurement("tilt_rad", 0.5), measurement("beads", 12)
+    (('tip error', '4.1 mm'), ('tilt', '28.6°'), ('beads', '12'))
+    """
+    words, _, end = name.rpartition("_")
+    unit, factor = UNITS.get(end, ("", 1.0)) if words else ("", 1.0)
+    shown = number(0.0 if abs(value * factor) < 1e-3 else value * factor)
+    return (words if unit else name).replace("_", " "), shown + (unit if unit == "°" else f" {unit}" if unit else "")
+
+
+def spaced(name: str) -> str:
+    """Return the words of a name.
+
+    >>> spaced("sourcePlace"), spaced("beside_place")
+    ('source place', 'beside place')
+    """
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).replace("_", " ").lower()
+
+
+def plain(note: str) -> str:
+    """Return a note of a verdict without the measurements at its end."""
+    return MEASURED.sub("", note)
 
 
 @cache

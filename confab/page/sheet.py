@@ -11,7 +11,8 @@ from confab import ontology
 from confab.accepting import check_goal, possible
 from confab.known import Known
 from confab.labels import Labels, labels_of
-from confab.page.data import PageData, ReadyQuery, Turnable, TurnableRow, page_data
+from confab.page.data import page_data
+from confab.page.schema import PageData, ReadyQuery, Turnable, TurnableRow
 from confab.planner.plan import Limits
 from confab.planner.solve import DEFAULT_MODE, Request, solve
 from confab.planning import Result

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from confab.known import Known
-from confab.page.data import PageData
 from confab.page.markup import asset, script
+from confab.page.schema import PageData
 from confab.page.sheet import Sheet, turned_from
 from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError

@@ -17,11 +17,12 @@ from click.testing import CliRunner
 import confab
 from confab.cli import app
 from confab.memory import Memory
-from confab.page.data import PageData, page_data
+from confab.page.data import page_data
 from confab.page.frozen import page_html, write_page
 from confab.page.ground import ground_of
 from confab.page.markup import script
 from confab.page.notebook import SHOWN
+from confab.page.schema import PageData
 from confab.page.sheet import Sheet, Turned, turned_from
 from confab.page.timeline import of_episode, of_plan, of_rollout
 from confab.planner.plan import Plan
@@ -97,7 +98,7 @@ def test_steps_are_told_in_labels_with_their_reasons_and_names(pages: dict[str, 
 def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, PageData]) -> None:
     data = pages["failed"]
     assert (data["good"], data["status"]) == (False, "failed in physics")
-    assert data["alarm"]["measured"] == [("joint lag rad", "0.0863")]
+    assert data["alarm"]["measured"] == [("joint lag", "4.94°")]
     assert data["alarm"]["lines"][1].startswith("slip or drop")
     assert [bar["tone"] for row in data["rows"] if row["group"] == "actors" for bar in row["bars"]].count("failed") == 1
 
@@ -105,11 +106,13 @@ def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, Pa
 def test_every_kind_of_run_says_how_it_ended(pages: dict[str, PageData]) -> None:
     assert (pages["towers-small"]["good"], pages["towers-small"]["status"]) == (True, "a plan, checked")
     assert (pages["episode"]["good"], pages["episode"]["status"]) == (True, "reached")
-    assert [mark["text"] for mark in pages["episode"]["marks"]][:2] == list(FIGURE_8)
+    told = [f"it {what} that cup 2 is at location 8" for what in ("happens", "is wanted")]
+    assert [mark["text"] for mark in pages["episode"]["marks"]][:2] == told
     assert (pages["none"]["good"], pages["none"]["status"]) == (False, "unsolvable")
     assert any("An independent checker" in line for line in pages["none"]["alarm"]["lines"])
     assert pages["learned"]["learned"]["rules"]
-    assert all(data["again"].startswith(("confab run", "confab execute")) for data in pages.values())
+    assert all(data["again"].startswith(("confab run", "confab execute", "confab plan")) for data in pages.values())
+    assert pages["none"]["again"] == "confab plan beverage-serving '--goal=cup2 LOCATION location7'"
 
 
 def test_a_colour_means_one_thing(serving_plan: confab.Result, pages: dict[str, PageData]) -> None:
@@ -221,7 +224,7 @@ def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene
     assert "no_place" in Sheet(scene).answer(turned)["problem"]
 
 
-@pytest.mark.parametrize("name", ["towers-small", "house-small", "canal-small"])
+@pytest.mark.parametrize("name", ["house-small", "canal-small"])
 def test_any_world_can_be_turned(name: str) -> None:
     sheet = Sheet(confab.load(name))
     turnable = sheet.turnable()
@@ -333,6 +336,22 @@ def test_a_click_on_a_lane_moves_the_clock_the_map_and_the_plan(
 
 
 @needs_browser
+def test_a_long_plan_is_folded_and_a_click_tells_what_a_narrow_bar_leaves_out(browser: Browser, tmp_path: Path) -> None:
+    scene = confab.generate("served", tmp_path / "served.ttl", objects=20)
+    browser.open(write_page(tmp_path / "page.html", page_data(scene, scene.plan())).as_uri(), 420)
+    browser.wait("document.querySelector('.plan') !== null")
+    assert browser.run("document.querySelectorAll('.plan > li > details[open]').length") == 0
+    assert browser.run("document.querySelectorAll('.goals tbody tr').length") == 9
+    spots = "document.querySelectorAll('.map .spot').length"
+    before = browser.run(spots)
+    browser.click(".map button")
+    assert browser.run(spots) > before
+    browser.click(".row.changes .bar:not(.many)")
+    assert " · cup 1 carries no beverage (0 to " in browser.run(SAID)
+    assert browser.faults == []
+
+
+@needs_browser
 def test_a_fact_is_turned_and_a_query_asked_on_the_served_page(browser: Browser, served: Server) -> None:
     browser.open(served.url)
     lengths = "[...document.querySelectorAll('.tile')].map((e) => e.textContent).join(' ')"
@@ -439,6 +458,6 @@ def test_plan_and_execute_write_a_page_and_learning_a_curve(tmp_path: Path) -> N
     assert run(app, ["execute", "beverage-serving", "--report", str(page)]).exit_code == 0
     assert '"status":"reached"' in page.read_text()
     learn = ["learn", "beverage-serving", "--memory", str(tmp_path / "m.ttl")]
-    assert run(app, [*learn, "--plot", str(curve), "--rounds", "2"]).exit_code == 0
+    assert run(app, [*learn, "--plot", str(curve), "--rounds", "1"]).exit_code == 0
     assert "</svg>" in curve.read_text()
     assert run(app, [*learn, "--plot", str(tmp_path / "curve.txt")]).exit_code != 0

@@ -2,12 +2,13 @@
 // notebook's kernel). It shows one JSON object (docs/page.md), wherever that comes from; `start` and `render` below say where.
 
 const FEW = 40, MANY = 200; // rows shown at first, and by each further click
+const UNFOLDED = 8; // most steps of the first level that stand open, most goals and most empty places that aren't folded
 const natural = new Intl.Collator("en", { numeric: true }).compare;
 const GROUPS = {
-  levels: "the plan by level", actors: "who does what", changes: "what changes", wanted: "wanted, and so all the time", fixed: "never changes",
+  levels: "steps by level", actors: "primitives by actor", changes: "facts that change", wanted: "goals about facts that don't change", fixed: "other facts that don't change",
 };
 const TONES = [
-  ["action", "being done"], ["planned", "still to be done"], ["failed", "failed"], ["start", "as in the beginning"],
+  ["action", "done"], ["planned", "still to be done"], ["failed", "failed"], ["start", "as in the beginning"],
   ["between", "neither that nor wanted"], ["wanted", "as wanted"],
 ];
 
@@ -35,6 +36,13 @@ const wide = (() => {
     return known.get(word);
   };
 })();
+
+/** Rows of a table for some values, a few at first; a button in a row of its own opens more of them. */
+const lined = (values, row, columns, few = FEW) => {
+  const left = values.slice(few);
+  const more = left.length > 0 && made("tr", {}, made("td", { colspan: columns }, made("button", { type: "button", class: "more", onclick: () => more.replaceWith(...lined(left, row, columns, MANY)) }, `${left.length} more`)));
+  return [...values.slice(0, few).map(row), ...(more ? [more] : [])];
+};
 
 /** Elements for some values, a few at first; a button opens more of them. */
 const folded = (values, element, few = FEW, step = MANY) => {

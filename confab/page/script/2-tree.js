@@ -2,6 +2,7 @@
 const tree = (page) => {
   const { steps } = page.data, below = new Map(), word = page.word;
   for (const step of steps) below.set(lead(step.id), [...(below.get(lead(step.id)) || []), step]);
+  const few = (below.get("") || []).length <= UNFOLDED;
   let kept = null;
   if (word) {
     kept = new Set();
@@ -10,7 +11,7 @@ const tree = (page) => {
       for (let id = step.id; ; id = lead(id)) { kept.add(id); if (!id.includes(".")) break; }
     }
   }
-  const list = (id) => folded((below.get(id) || []).filter((step) => !kept || kept.has(step.id)), item, MANY);
+  const list = (id) => folded((below.get(id) || []).filter((step) => !kept || kept.has(step.id)), item, id || kept ? MANY : FEW);
   const pairs = (facts) => made("dl", {}, facts.map(([name, value]) => made("div", {}, made("dt", {}, name), made("dd", {}, value))));
   const reasons = (needs) => made("p", { class: "why" }, "needed: ", needs.slice(0, 2).map((need) => made("span", {}, need)),
     needs.length > 2 && made("details", { class: "others" }, made("summary", {}, `and ${needs.length - 2} more`), needs.slice(2).map((need) => made("span", {}, need))));
@@ -28,7 +29,7 @@ const tree = (page) => {
       step.needs && reasons(step.needs), step.facts && pairs(step.facts),
     ].filter(Boolean);
     if (!inner && !body.length) return made("li", { "data-step": step.id }, made("div", {}, head));
-    const opened = page.opened.has(step.id) || kept !== null || (!step.id.includes(".") && !page.closed.has(step.id));
+    const opened = page.opened.has(step.id) || kept !== null || (few && !step.id.includes(".") && !page.closed.has(step.id));
     const hold = made("div", {});
     const fill = () => { if (!hold.childNodes.length) clear(hold, body, inner && made("ul", {}, list(step.id))); };
     if (opened) fill();

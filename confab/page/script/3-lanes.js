@@ -22,13 +22,13 @@ class Lanes {
     });
   }
 
-  /** The rows of a group that are shown: those that fail first, in natural order, with a word in them. */
+  /** The rows of a group that are shown, with a word in them: goals that aren't met, then what is another in the end, in natural order. */
   rows(group) {
     const word = this.page.word;
     const has = (row) => !word || row.label.toLowerCase().includes(word) || row.bars.some((bar) => bar.label.toLowerCase().includes(word));
     const found = this.page.data.rows.filter((row) => row.group === group && has(row));
     if (group === "levels") return found;
-    const rank = (row) => (row.met === false ? 0 : row.met ? 1 : 2);
+    const rank = (row) => (row.met === false ? 0 : row.bars.length && row.bars[0].label !== row.bars[row.bars.length - 1].label ? 1 : row.met ? 2 : 3);
     return found.sort((a, b) => (group === "actors" ? 0 : rank(a) - rank(b)) || natural(a.label, b.label));
   }
 
@@ -92,10 +92,10 @@ class Lanes {
 
   bar(bar, row) {
     const width = ((bar.end - bar.begin) * this.width) / this.page.data.end;
-    const lines = row.group === "levels" || row.group === "actors" ? 2 : 1;
-    const room = width - 3, first = bar.label.split(" ")[0], doing = row.group === "levels" || row.group === "actors";
-    // Of what is done at least the whole verb is shown, or nothing; a value ends in dots. The title has all of it.
-    const fits = room > (doing ? 60 : 20) ? bar.label : doing && room > wide(first) * (row.group === "levels" ? 1.25 : 1) ? first : "";
+    const doing = row.group === "levels" || row.group === "actors", lines = doing ? 2 : 1, first = bar.label.split(" ")[0];
+    // Of what is done at least the whole verb is shown, of a value at least some letters, or nothing. A click tells all of it.
+    const room = (words) => wide(words) * (row.group === "actors" ? 1 : 1.2) <= width - (row.group === "actors" ? 4 : 9);
+    const fits = doing ? (!room(first) ? "" : width > 60 ? bar.label : first) : room(bar.label) || width > 44 ? bar.label : "";
     const words = (bar.tone === "failed" ? "✗ " : "") + fits;
     const title = `${bar.label}${bar.note ? `: ${bar.note}` : ""} (${figure(bar.begin)} to ${figure(bar.end)} ${this.page.data.unit})`;
     const element = made("div", { class: `bar ${bar.tone} lines${lines}`, title, "data-step": bar.step, "data-begin": bar.begin,
@@ -133,7 +133,8 @@ class Lanes {
     }
     if (!event.target.closest(".track")) return;
     this.page.seek(this.timeAt(event.clientX));
-    if (bar && bar.dataset.step) this.page.open(bar.dataset.step);
+    if (bar && bar.dataset.step !== undefined) this.page.open(bar.dataset.step);
+    else if (bar) this.page.said.append(` · ${bar.closest(".row").querySelector(".who").textContent} ${bar.title}`);
   }
 
   zoomed(zoom, at = this.page.time) {

@@ -8,6 +8,7 @@ class Plot {
     this.caption = made("figcaption", {});
     this.element = made("figure", { class: "map" }, this.picture, this.list, this.told, this.caption);
     this.open = new Set();
+    this.whole = false;
   }
 
   at(thing, time) {
@@ -20,22 +21,26 @@ class Plot {
     const { map } = this.page.data;
     this.element.hidden = !map;
     if (!map) return;
-    const where = map.things.map((thing) => this.at(thing, time)), key = `${this.picture.clientWidth}|${[...this.open]}|${where.map((one) => one[0])}`;
+    const where = map.things.map((thing) => this.at(thing, time)), key = `${this.picture.clientWidth}|${this.whole}|${[...this.open]}|${where.map((one) => one[0])}`;
     if (key === this.key && map === this.drawnOf) return;
     this.key = key;
     this.drawnOf = map;
     const ordered = !map.metric && !map.ways.length; // such places stand in as many columns as there is room for
-    const columns = Math.max(2, Math.floor(this.picture.clientWidth / 80));
-    const places = ordered ? map.places.map((place, number) => ({ ...place, at: [number % columns, Math.floor(number / columns)] })) : map.places;
+    const columns = Math.max(2, Math.floor(this.picture.clientWidth / 80)), narrow = this.picture.clientWidth < 700;
+    const used = new Set(map.things.flatMap((thing) => thing.at.map(([, place]) => place))), empty = map.places.filter((place) => !used.has(place.id));
+    const folds = ordered && used.size > 0 && empty.length > UNFOLDED, shown = folds && !this.whole ? map.places.filter((place) => used.has(place.id)) : map.places;
+    const turned = narrow && !map.metric && !ordered; // what connects places has no direction: on a narrow page it runs down
+    const places = ordered ? shown.map((place, number) => ({ ...place, at: [number % columns, Math.floor(number / columns)] }))
+      : turned ? map.places.map((place) => ({ ...place, at: [place.at[1], place.at[0]] })) : map.places;
     const points = [...places.map((place) => place.at), ...map.areas.flatMap((area) => area.corners), ...map.robots.map((robot) => robot.at)];
     const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
     const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const width = Math.max(220, this.picture.clientWidth), edge = Math.min(60, width / 8);
     const wide = Math.max(right - left, 1e-6), high = Math.max(bottom - top, 1e-6);
     let scale = (width - 2 * edge) / wide;
-    const tallest = Math.min(this.page.data.film ? 560 : 430, Math.max(260, width * 0.9));
+    const tallest = turned ? width * 1.9 : Math.min(this.page.data.film ? 560 : 430, Math.max(260, width * 0.9));
     if (map.metric && high * scale > tallest - 2 * edge) scale = (tallest - 2 * edge) / high;
-    const down = map.metric ? scale : ordered ? 62 : Math.min(scale, Math.max((tallest - 2 * edge) / high, 1e-6));
+    const down = map.metric ? scale : ordered ? 74 : Math.min(turned ? Infinity : 1.4 * scale, Math.max((tallest - 2 * edge) / high, 1e-6));
     const shift = (width - wide * scale) / 2, height = high * down + 2 * edge;
     const to = ([x, y]) => [shift + (x - left) * scale, edge + (y - top) * down];
     const spots = new Map(places.map((place) => [place.id, { ...place, xy: to(place.at), things: [] }]));
@@ -74,14 +79,15 @@ class Plot {
       const names = spot.things.map(({ thing }) => thing.label).sort(natural);
       if (names.length) {
         const opened = this.open.has(spot.id) || names.length <= 2;
-        const lines = opened ? names : [names[0], `+ ${names.length - 1} more`];
+        const lines = names.length <= 2 ? names : opened ? [...names, "fold"] : [names[0], `+ ${names.length - 1} more`];
         labels.push({ lines, kind: "thing-name", x, y, size, first: true, spot, opens: names.length > 2 });
       }
       labels.push({ words: spot.label, kind: "place", x, y, size, spot });
     }
     this.place(svg, labels, width, height, [...spots.values()].map((spot) => ({ x: spot.xy[0] - size, y: spot.xy[1] - size, w: 2 * size, h: 2 * size })));
     clear(this.picture, svg);
-    this.caption.textContent = map.note;
+    clear(this.caption, map.note, folds && ["; ", made("button", { type: "button", class: "link", onclick: () => { this.whole = !this.whole; this.draw(this.page.time); } },
+      this.whole ? "fold the empty ones" : `${empty.length} stay empty`)]);
     clear(this.told, away.length > 0 && [made("b", {}, "not on the map: "), folded(away, ({ words, thing }) => made("span", { class: "away" }, words || thing.label), 4)]);
   }
 
@@ -123,7 +129,7 @@ class Plot {
       const [box, anchor] = chosen, x = anchor === "middle" ? box.x + w / 2 : anchor === "start" ? box.x : box.x + w;
       taken.push(box);
       lines.forEach((words, number) => {
-        const opens = label.opens && (lines.length === 2 ? number === 1 : number === lines.length - 1);
+        const opens = label.opens && number === lines.length - 1;
         const toggle = () => { if (this.open.has(label.spot.id)) this.open.delete(label.spot.id); else this.open.add(label.spot.id); this.key = null; this.draw(this.page.time); };
         svg.append(drawn("text", { class: `${label.kind}${opens ? " opens" : ""}`, x, y: box.y + line * number + 10, "text-anchor": anchor,
           tabindex: opens ? 0 : null, role: opens ? "button" : null, onclick: opens ? toggle : null,

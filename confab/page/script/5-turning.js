@@ -46,12 +46,7 @@ class Turning {
         made("td", {}, this.choice(`${row.label}: is`, values, fact, row.now, (value) => this.turn("facts", row.key, value, row.now))),
         made("td", {}, this.choice(`${row.label}: shall be`, [["", "–"], ...values], goal, wanted, (value) => this.turn("goals", row.key, value === "" ? null : value, row.wanted))));
     };
-    const rows = (those, few) => {
-      const left = those.slice(few);
-      const more = left.length && made("tr", {}, made("td", { colspan: 3 }, made("button", { type: "button", class: "more", onclick: () => more.replaceWith(...rows(left, MANY)) }, `${left.length} more`)));
-      return [...those.slice(0, few).map(line), ...(more ? [more] : [])];
-    };
-    clear(this.table, rows(shown, FEW));
+    clear(this.table, lined(shown, line, 3));
     if (turnable.hidden) this.table.append(made("tr", {}, made("td", { colspan: 3, class: "note" }, `${turnable.hidden} without a row; scene.with_fact turns them in Python`)));
   }
 

@@ -11,12 +11,8 @@ const asking = (page) => {
       else if (answer.text !== undefined) clear(out, made("pre", {}, answer.text));
       else {
         const line = (row) => made("tr", {}, row.map((cell) => made("td", { title: cell }, page.short(cell))));
-        const lines = (rows, few) => {
-          const left = rows.slice(few), more = left.length && made("tr", {}, made("td", { colspan: answer.columns.length || 1 }, made("button", { type: "button", class: "more", onclick: () => more.replaceWith(...lines(left, MANY)) }, `${left.length} more`)));
-          return [...rows.slice(0, few).map(line), ...(more ? [more] : [])];
-        };
         clear(out, made("p", { class: "note" }, `${answer.rows.length} row${answer.rows.length === 1 ? "" : "s"} in ${seconds} s`),
-          made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, answer.columns.map((name) => made("th", { scope: "col" }, name)))), made("tbody", {}, lines(answer.rows, MANY)))));
+          made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, answer.columns.map((name) => made("th", { scope: "col" }, name)))), made("tbody", {}, lined(answer.rows, line, answer.columns.length || 1, MANY)))));
       }
     } catch (error) { clear(out, made("p", { class: "bad", role: "alert" }, `nothing answers: ${error.message}`)); }
   };

@@ -6,6 +6,7 @@ class Page {
     this.alarm = made("div", {});
     this.film = made("div", { class: "filmed" });
     this.plot = new Plot(this);
+    this.goals = made("section", { class: "goals" });
     this.scene = made("section", { class: "scene" }, this.film, this.plot.element);
     this.lanes = new Lanes(this);
     this.changes = made("p", { class: "changes", "aria-live": "polite" });
@@ -21,7 +22,7 @@ class Page {
       made("span", { class: "tools" }, find, made("button", { type: "button", "aria-label": "wider", title: "wider (Ctrl and the wheel)", onclick: zoom(1.6) }, "+"), made("button", { type: "button", "aria-label": "narrower", onclick: zoom(1 / 1.6) }, "−"),
         made("button", { type: "button", title: "light or dark", "aria-label": "light or dark", onclick: () => this.shade() }, "◐")), this.said);
     this.legend = made("p", { class: "legend" });
-    this.timed = made("section", { class: "time" }, made("h2", {}, "Timeline"), this.bar, this.legend, this.lanes.element, this.happened);
+    this.timed = made("section", { class: "time" }, this.title = made("h2", {}), this.bar, this.legend, this.lanes.element, this.happened);
     this.planned = made("section", {}, made("h2", {}, "The plan and its reasons"), this.changes, this.tree);
     this.columns = made("div", { class: "columns" }, this.planned);
     clear(element, this.head, this.alarm, this.scene, this.timed, this.columns, this.rest);
@@ -58,7 +59,12 @@ class Page {
       folded(alarm.lines, (line) => made("p", {}, line), 8), alarm.measured && alarm.measured.length > 0 && made("dl", {}, alarm.measured.map(([name, value]) => made("div", {}, made("dt", {}, name), made("dd", {}, value))))));
     if ((data.film || {}).source !== this.source) this.filmed(data.film);
     this.scene.hidden = !data.film && !data.map;
-    this.scene.classList.toggle("single", !data.film || !data.map);
+    const beside = data.map && data.map.metric && !data.film; // such a map has room beside it
+    this.scene.classList.toggle("single", !beside && (!data.film || !data.map));
+    if (beside) this.scene.append(this.goals); else this.rest.before(this.goals);
+    this.title.textContent = data.steps.length ? "Timeline" : "Facts";
+    this.timed.classList.toggle("idle", !data.steps.length);
+    this.planned.hidden = !data.steps.length && !this.changes.childNodes.length;
     const tones = new Set(data.rows.flatMap((row) => row.bars.map((bar) => bar.tone)));
     clear(this.legend, TONES.filter(([tone]) => tones.has(tone)).map(([tone, words]) => made("span", {}, made("i", { class: `bar ${tone}` }), words)),
       data.marks.length > 0 && made("span", {}, made("i", { class: "mark" }), "interventions and changes of plan"));
@@ -83,7 +89,7 @@ class Page {
     this.video = null;
     if (!film) { clear(this.film); return; }
     if (film.kind === "image/gif") { clear(this.film, made("figure", { class: "film" }, made("img", { src: film.source, alt: "film of the run" }), made("figcaption", {}, film.caption))); return; }
-    this.video = made("video", { src: film.source, controls: true, playsinline: true, "aria-label": "film of the run" });
+    this.video = made("video", { src: film.source, poster: film.poster, controls: true, playsinline: true, "aria-label": "film of the run" });
     this.video.muted = true;
     const follow = () => {
       if (this.sought) return;
@@ -98,11 +104,12 @@ class Page {
   steps() { clear(this.tree, tree(this)); this.clock(this.time); }
 
   below() {
-    const { goals, learned, notes, again } = this.data, ended = goals.some((goal) => goal.after !== undefined);
-    clear(this.rest, goals.length > 0 && made("section", {}, made("h2", {}, "Goals"), made("div", { class: "scroll" }, made("table", {},
-      made("thead", {}, made("tr", {}, ["goal", "before", ...(ended ? ["in the end"] : [])].map((words) => made("th", { scope: "col" }, words)))),
-      made("tbody", {}, goals.map((goal) => made("tr", {}, made("td", {}, goal.label), made("td", {}, goal.before), ended && made("td", { class: goal.met ? "ok" : "bad" }, `${goal.met ? "✓" : "✗"} ${goal.after}`))))))),
-    learned && made("section", {}, made("h2", {}, "What was learned"), made("p", {}, learned.text), learned.rules.map(([title, rules]) => [made("h3", {}, title), made("ul", {}, rules.map((rule) => made("li", {}, rule)))])),
+    const { learned, notes, again } = this.data, ended = this.data.goals.some((goal) => goal.after !== undefined), acting = this.data.live && this.data.good === null;
+    const goals = [...this.data.goals].sort((a, b) => Number(a.met !== false) - Number(b.met !== false) || natural(a.label, b.label));
+    clear(this.goals, goals.length > 0 && [made("h2", {}, "Goals"), made("div", { class: "scroll" }, made("table", {},
+      made("thead", {}, made("tr", {}, ["goal", "before", ...(ended ? [acting ? "now" : "in the end"] : [])].map((words) => made("th", { scope: "col" }, words)))),
+      made("tbody", {}, lined(goals, (goal) => made("tr", {}, made("td", {}, goal.label), made("td", {}, goal.before), ended && made("td", { class: goal.met ? "ok" : acting ? "" : "bad" }, `${goal.met ? "✓" : acting ? "" : "✗"} ${goal.after}`)), 3, UNFOLDED))))]);
+    clear(this.rest, learned && made("section", {}, made("h2", {}, "What was learned"), made("p", {}, learned.text), learned.rules.map(([title, rules]) => [made("h3", {}, title), made("ul", {}, rules.map((rule) => made("li", {}, rule)))])),
     again && made("section", {}, made("h2", {}, "Again"), made("pre", {}, again)), notes.map((note) => made("p", { class: "note" }, note)));
   }
 

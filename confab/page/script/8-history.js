@@ -1,15 +1,16 @@
 /** A folder of runs: one is shown, two are compared. */
 const history = (element, data) => {
-  const chosen = new Set(data.runs.length ? [data.runs.length - 1] : []), table = made("tbody", {}), out = made("div", {});
+  const chosen = new Set(data.shown), table = made("tbody", {}), out = made("div", {});
   const names = [...new Set(data.runs.flatMap((run) => Object.keys(run.figures)))].filter((name) => name !== "verdict");
   const value = (run, name) => run.figures[name] || "";
+  const differ = names.filter((name) => data.runs.some((run) => value(run, name) !== value(data.runs[0], name))), same = names.filter((name) => !differ.includes(name) && value(data.runs[0], name));
   const rows = () => clear(table, data.runs.map((run, number) => made("tr", { class: chosen.has(number) ? "chosen" : "" },
     made("td", {}, made("label", {}, made("input", { type: "checkbox", checked: chosen.has(number), "aria-label": `show ${run.name}`, onchange: (event) => {
       if (event.target.checked) { chosen.add(number); if (chosen.size > 2) chosen.delete([...chosen][0]); } else chosen.delete(number);
       rows();
       show();
-    } }), ` ${run.name}`)), made("td", {}, run.page.title), made("td", {}, run.when), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
-    names.map((name) => made("td", {}, value(run, name))))));
+    } }), ` ${run.name}`)), made("td", {}, run.page.title), made("td", {}, run.when.slice(0, 16).replace("T", " ")), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
+    differ.map((name) => made("td", {}, value(run, name))))));
   const show = () => {
     const two = [...chosen].sort((a, b) => a - b).map((number) => data.runs[number]);
     clear(out);
@@ -31,8 +32,9 @@ const history = (element, data) => {
     }
   };
   element.classList.add("confab");
-  clear(element, made("h1", {}, data.title), made("p", { class: "note" }, "One run is shown; two are compared."), made("div", { class: "scroll" }, made("table", { class: "runs" },
-    made("thead", {}, made("tr", {}, ["run", "scene", "when", "verdict", ...names].map((words) => made("th", { scope: "col" }, words)))), table)), out);
+  clear(element, made("h1", {}, data.title), made("p", { class: "note" }, "A mark shows a run; two of them are compared."), made("div", { class: "scroll" }, made("table", { class: "runs" },
+    made("thead", {}, made("tr", {}, ["run", "scene", "when", "verdict", ...differ].map((words) => made("th", { scope: "col" }, words)))), table)),
+    same.length > 0 && made("p", { class: "note" }, `The same in all: ${same.map((name) => `${name} ${value(data.runs[0], name)}`).join(" · ")}`), out);
   rows();
   show();
 };

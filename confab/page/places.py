@@ -1,0 +1,56 @@
+"""The map of the page: areas, places and what stands there in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from confab.page.ground import Ground
+from confab.page.lanes import tone_of
+from confab.page.schema import MapData, Thing
+from confab.page.timeline import Timeline
+from confab.reasoner.symbols import Fact
+
+if TYPE_CHECKING:
+    from confab.labels import Labels
+
+
+def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
+    """Return the map of a ground, with the places of objects in time."""
+    return {
+        "areas": [{"label": labels.name(area.name), "corners": list(area.corners)} for area in ground.areas],
+        "ways": list(ground.ways),
+        "places": [{"id": name, "label": labels.name(name), "at": at} for name, at in ground.spots.items()],
+        "robots": [{"id": name, "label": labels.name(name), "at": at} for name, at in ground.robots],
+        "things": _things(ground, timeline, labels),
+        "metric": ground.metric,
+        "note": ground.note,
+    }
+
+
+def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
+    """Return the objects on the map, each with its places.
+
+    The place of an object is the value of a symbol that begins on the map and whose situation type has no rest value, since a
+    hand's position is no place of an object. Of several such symbols, the one that is longest on the map counts.
+    """
+    situations = timeline.problem.domain.situations
+    found: dict[str, tuple[float, Thing]] = {}
+    for symbol, periods in sorted(timeline.phases.items()):
+        if len(symbol.arguments) != 1 or not periods or periods[0].value not in ground.spots:
+            continue
+        if situations[symbol.situation].rest is not None:
+            continue
+        (name,) = symbol.arguments
+        long = sum(period.end - period.begin for period in periods if period.value in ground.spots)
+        if name not in found or long > found[name][0]:
+            at = [
+                (
+                    round(period.begin, 3),
+                    period.value if period.value in ground.spots else "",
+                    labels.fact(Fact(symbol, period.value)),
+                    tone_of(timeline, symbol, period.value),
+                )
+                for period in periods
+            ]
+            found[name] = long, {"id": name, "label": labels.name(name), "at": at}
+    return [thing for _, (_, thing) in sorted(found.items())]

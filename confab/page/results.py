@@ -1,0 +1,232 @@
+"""How a run ended, for the page: its verdict, figures, failure, film and goals, and the command that repeats it."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from io import BytesIO
+from pathlib import Path
+from shlex import join
+from typing import TYPE_CHECKING, Protocol
+
+from confab import ontology
+from confab.page.lanes import id_of
+from confab.page.markup import measurement, number, plain
+from confab.page.schema import Alarm, Film, GoalData, Tile
+from confab.page.timeline import Timeline
+from confab.planner.plan import Outcome, Status
+from confab.planner.plan_costs import cost_of
+from confab.reasoner.symbols import FALSE, Fact, Problem
+from confab.show import lengths
+from confab.sim.verdict import CODES
+
+if TYPE_CHECKING:
+    from confab.known import Known
+    from confab.labels import Labels
+    from confab.physics import Report
+    from confab.planner.acting.episode import Episode
+    from confab.planner.timed.plan import TimedPlan
+
+LARGEST_FILM = 40_000_000
+"""Maximum size in bytes of a film that is embedded in the page; a larger one is linked."""
+
+
+class Planned(Protocol):
+    """The result of planning, as the page needs it: `confab.planning.Result`."""
+
+    problem: Problem
+    outcome: Outcome
+    timed: TimedPlan | None
+
+    def dearer(self) -> str:
+        """Return the known bounds on a cheaper plan."""
+
+
+class Executed(Protocol):
+    """The result of executing a task, as the page needs it: `confab.execution.Execution`."""
+
+    @property
+    def episode(self) -> Episode:
+        """The episode."""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal was reached."""
+
+    def notes(self) -> dict[tuple[int, ...], str]:
+        """Return a note on each step, by its path."""
+
+    def summary(self) -> str:
+        """Return a summary of the result in one line."""
+
+
+def status_of(outcome: Outcome | None, report: Report | None, execution: Executed | None) -> tuple[bool | None, str]:
+    """Return whether it ended well, and how, in words."""
+    if execution is not None:
+        return execution.reached, execution.episode.status.value
+    if report is not None:
+        return report.verified, "verified in physics" if report.verified else "failed in physics"
+    if outcome is not None and outcome.plan is not None:
+        return True, "a plan, checked" if outcome.plan.steps else "nothing to do: all goals hold"
+    return (False, outcome.status.value) if outcome is not None else (None, "not planned yet")
+
+
+def tiles_of(
+    problem: Problem,
+    timeline: Timeline | None,
+    outcome: Outcome | None,
+    report: Report | None,
+    execution: Executed | None,
+) -> list[Tile]:
+    """Return the figures of a run."""
+    found: list[tuple[str, str]] = []
+    if timeline is not None:
+        steps = len(timeline.plan.primitives)
+        done = sum(bar.ok is not False for bar in timeline.bars)
+        found.append(("primitives", f"{steps}" if done >= steps else f"{done} of {steps}"))
+        found.append(("plan", f"{lengths(timeline.plan)} steps"))
+        if timeline.unit == "s":
+            found.append(("simulated", f"{timeline.end:.1f} s"))
+    if report is not None:
+        shown = report.shown
+        if shown.poured:
+            found.append(("poured", ", ".join(f"{share:.0%}" for share in shown.poured)))
+        if len(report.rollouts) > 1:
+            found.append(("rollouts verified", f"{report.good} of {len(report.rollouts)}"))
+        found.append(("physics", f"{shown.cpu_seconds:.1f} CPU s"))
+    if execution is not None:
+        episode = execution.episode
+        counted = (
+            ("interventions", episode.interventions),
+            ("changes of plan", episode.replans),
+            ("failures", episode.failures),
+        )
+        found += [(what, str(len(those))) for what, those in counted if those]
+    if outcome is not None:
+        expanded = sum(counts.expanded for counts in outcome.search.values())
+        found.append(("search", f"{expanded:,} expansions"))
+        found.append(
+            ("planning", f"{outcome.seconds:.1f} s" if outcome.seconds >= 1 else f"{outcome.seconds * 1000:.0f} ms")
+        )
+        if outcome.plan is not None:
+            cost = cost_of(problem, outcome.plan)
+            if cost != len(outcome.plan.primitives):
+                found.append(("cost", number(cost)))
+    return [{"name": name, "text": text} for name, text in found]
+
+
+def alarm_of(
+    timeline: Timeline, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
+) -> Alarm | None:
+    """Return the failure, or None if there was none."""
+    if execution is not None and execution.reached:
+        return None
+    reasons = [labels.sentence(reason.text) for reason in (execution.episode.reasons if execution is not None else ())]
+    if (failed := timeline.failed) is not None:
+        above = [
+            labels.step(step)
+            for step in timeline.plan.walk()
+            if step.steps and failed.step.path[: len(step.path)] == step.path
+        ]
+        meaning = CODES.get(failed.code or "", "")
+        text = labels.sentence(plain(failed.note.removeprefix(f"{failed.code}: ")))
+        where = f"after {failed.begin:.1f} {timeline.unit}" + (f", in “{' › '.join(above)}”" if above else "")
+        code = f"{failed.code}: {meaning}" if meaning else failed.code or ""
+        return {
+            "title": f"Failed: {labels.step(failed.step)}",
+            "step": id_of(failed.step.path),
+            "lines": [line for line in (where, code, text, *reasons) if line],
+            "measured": [measurement(name, value) for name, value in failed.measured.items()],
+        }
+    if report is not None and not report.verified:
+        missed = [
+            f"{labels.fact(fact)}; seen: {labels.name(report.shown.state[fact.symbol])}"
+            for fact in report.missed(report.shown)
+        ]
+        return {"title": "The goal isn't reached", "lines": missed or [report.summary()]}
+    if execution is not None:
+        return {"title": execution.episode.status.value, "lines": reasons}
+    if outcome is not None and outcome.status is not Status.SOLVED:
+        why = labels.sentence(outcome.reason.text) if outcome.reason else "no reason given"
+        return {"title": f"No plan: {outcome.status.value}", "lines": [why, *_proof(outcome, labels)]}
+    return None
+
+
+def _proof(outcome: Outcome, labels: Labels) -> list[str]:
+    from confab.why import proved
+
+    return [] if outcome.certificate is None else list(proved(outcome.certificate, labels))
+
+
+def film_of(report: Report | None) -> Film | None:
+    """Return the film of a run, if there is one, with its first still as its poster."""
+    if report is None or report.video is None or not report.video.is_file():
+        return None
+    kind = "image/gif" if report.video.suffix == ".gif" else "video/mp4"
+    source = report.video.name
+    if report.video.stat().st_size <= LARGEST_FILM:
+        source = f"data:{kind};base64,{b64encode(report.video.read_bytes()).decode()}"
+    caption = f"{report.film_speed:g} × as fast as simulated, seed {report.rollouts[0].seed}"
+    film: Film = {"source": source, "kind": kind, "speed": report.film_speed, "caption": caption}
+    if still := next(iter(sorted(report.video.with_suffix("").glob("*.png"))), None):
+        film["poster"] = f"data:image/jpeg;base64,{b64encode(_jpeg(still)).decode()}"
+    return film
+
+
+def _jpeg(still: Path) -> bytes:
+    """Return a picture as JPEG, a tenth of its size."""
+    from PIL import Image
+
+    made = BytesIO()
+    Image.open(still).convert("RGB").save(made, "jpeg", quality=80)
+    return made.getvalue()
+
+
+WHEN = re.compile(r"^(?:after|at)=\S+ ")
+
+
+def mark_of(text: str, labels: Labels) -> str:
+    """Return an intervention as it was written, or a change of plan, in words."""
+    what = WHEN.sub("", text)
+    if what == text:
+        return labels.sentence(text)
+    if what.startswith("goal "):
+        return f"it is wanted that {labels.sentence(what.removeprefix('goal '))}"
+    said = labels.sentence(what)
+    return f"it happens that {said}" if len(what.split(" ")) > 2 and said != what else said
+
+
+def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData]:
+    """Return the goals with their initial values, and their final ones if anything was planned."""
+    found: list[GoalData] = []
+    for symbol, value in sorted(timeline.problem.goal.items()):
+        goal: GoalData = {
+            "label": labels.fact(Fact(symbol, value)),
+            "before": labels.name(timeline.problem.initial.get(symbol, FALSE)),
+        }
+        if planned:
+            goal["after"], goal["met"] = labels.name(timeline.final.get(symbol, FALSE)), bool(timeline.met(symbol))
+        found.append(goal)
+    return found
+
+
+def again_of(scene: Known, problem: Problem, report: Report | None, execution: Executed | None, physical: bool) -> str:
+    """Return the command that repeats a run."""
+    path = scene.knowledge.path
+    name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
+    if execution is not None:
+        people = [part for i, _ in execution.episode.interventions for part in ("--intervene", i.text)]
+        return join(["confab", "execute", name, *(["--world", "pybullet"] if physical else []), *people])
+    wanted = problem.goal if report is None else report.goal
+    first = scene.problem.goal
+    goals = [str(Fact(symbol, value)) for symbol, value in sorted(wanted.items()) if first.get(symbol) != value]
+    seed = ["--seed", str(report.rollouts[0].seed)] if report is not None and report.rollouts[0].seed else []
+    return join(["confab", "plan" if report is None else "run", name, *(f"--goal={goal}" for goal in goals), *seed])
+
+
+def small_print_of(outcome: Outcome | None) -> list[str]:
+    """Return notes on the levels that were given up, and on the conditions that the plan violates therefore."""
+    if outcome is None:
+        return []
+    broken = [broken.text for left in outcome.left for broken in left.broken]
+    return [*outcome.given_up, *(f"the plan violates a condition of the level above: {text}" for text in broken)]
