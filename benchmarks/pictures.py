@@ -16,7 +16,7 @@ import confab
 from confab.history import history_html, new_folder, runs
 from confab.page.data import page_data
 from confab.page.frozen import write_page
-from confab.planner.acting.executive import Moment
+from confab.planner.acting.executive import Event
 from confab.reasoner.files import write_whole
 from confab.running import Job, run
 from confab.serving import serving
@@ -92,12 +92,12 @@ def live(studio: Studio) -> None:
     scene = confab.load(TABLE)
     with serving(scene, 0) as server:
 
-        def look(moment: Moment) -> None:
-            server.service.take(moment)
-            if moment.what == "begin" and moment.seconds in MOMENTS:
-                studio.take(f"live-{moment.seconds:g}", server.url)
+        def look(event: Event) -> None:
+            server.service.take(event)
+            if event.what == "begin" and event.seconds in MOMENTS:
+                studio.take(f"live-{event.seconds:g}", server.url)
 
-        scene.execute(interventions=DISTURBED, tell=look)
+        scene.execute(interventions=DISTURBED, observer=look)
 
 
 def endpoint(studio: Studio) -> None:
