@@ -1,4 +1,4 @@
-"""A browser that tests drive: Chromium over its DevTools pipe, without a driver program."""
+"""A browser that tests and pictures drive: Chromium over its DevTools pipe, without a driver program."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-import pytest
-
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)")
 FLAGS = [
     "--headless",
     "--no-sandbox",
