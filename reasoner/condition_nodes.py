@@ -55,7 +55,7 @@ STRINGS = ("sign", "change", "aggregate")
 """Properties whose values are words."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
-"""Maximum depth of nested conditions and calculations."""
+"""Maximum depth of nested conditions and calculations; the conjunctions of a disjunction do not count."""
 MOST_CONDITIONS = 10_000
 """Maximum number of conditions inside one, each counted once per occurrence."""
 DECIMALS = 30
@@ -360,7 +360,8 @@ class NodeReader:
         """Begin to read a node; raise an error if it is inside itself or too deep."""
         if iri not in self.nodes:
             raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or mend the name")
-        if iri in self.inside or len(self.inside) > DEEPEST:
+        depth = sum(not self.is_a(node, "AllOf") for node in self.inside)
+        if iri in self.inside or depth > DEEPEST or len(self.inside) > 2 * DEEPEST:
             how = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
             raise self.error(f"<{iri}>: the {what} {how}; take it out of one of them")
         self.inside.append(iri)
