@@ -1,4 +1,4 @@
-"""The SPARQL updates of a graph's behaviours, compiled into individuals (`confab.reasoner.updates.nodes`)."""
+"""The SPARQL updates of a graph's behaviours, compiled into individuals (`confab.reasoner.updates.behaviors`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import pyoxigraph as ox
 
 from confab.reasoner.names import local_name
-from confab.reasoner.updates.nodes import Writer
+from confab.reasoner.updates.behaviors import UpdateCompiler
 from confab.reasoner.updates.texts import Ask, Place, Update, Vocabulary
 from confab.reasoner.updates.words import UpdateError
 from confab.reasoner.vocabulary import CORE, PREFIXES
@@ -87,15 +87,15 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
         number = int(index.value) if index is not None and index.value.isdigit() else 0
         declared.setdefault(behavior.value, {})[name] = node.value, kind.value, number
     for rule in sorted(rules):
-        writer = Writer(rule, vocabulary, {})
+        compiler = UpdateCompiler(rule, vocabulary, {})
         try:
-            writer.write_rule(updates.pop(rule))
+            compiler.write_rule(updates.pop(rule))
         except UpdateError as error:
             place = replace(Update(rule, texts[rule], {}).place(error.at), form="rule")
             done.faults.append(Fault(place, error.what, error.remedy))
             continue
-        done.triples += writer.triples()
-        done.places |= {node: replace(place, form="rule") for node, place in writer.places.items()}
+        done.triples += compiler.nodes.triples()
+        done.places |= {node: replace(place, form="rule") for node, place in compiler.nodes.places.items()}
     for behavior in sorted({*updates, *extends}):
         _compile(behavior, updates, extends, declared, vocabulary, done)
     return done
@@ -121,15 +121,15 @@ def _compile(
         done.faults.append(Fault(Place(behavior, 1, 1), "it extends itself", "take out one :extends"))
         return
     terms = {name: ("", *known[1:]) for source in sources for name, known in declared.get(source, {}).items()}
-    writer = Writer(behavior, vocabulary, {**terms, **declared.get(behavior, {})})
+    compiler = UpdateCompiler(behavior, vocabulary, {**terms, **declared.get(behavior, {})})
     for update in (updates[source] for source in sources if source in updates):
         try:
-            writer.write(update)
+            compiler.write(update)
         except UpdateError as error:
             done.faults.append(Fault(update.place(error.at), error.what, error.remedy))
             return
-    done.triples += writer.triples()
-    done.places |= writer.places
+    done.triples += compiler.nodes.triples()
+    done.places |= compiler.nodes.places
 
 
 def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:

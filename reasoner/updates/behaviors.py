@@ -1,0 +1,199 @@
+"""A behaviour written as a SPARQL update, or a rule as a CONSTRUCT query, compiled into the individuals that say the same.
+
+==========================================  =====================================================================
+in the update                               as individuals
+==========================================  =====================================================================
+``?cup a :Cup`` in the first WHERE          a `:Parameter`, in the order of these patterns
+``?cup :at ?from``, ``?from`` being new     a `:ValueCondition` that determines the `:Variable` ``?from``
+``?from a :Slot`` behind that               the type of that variable
+``?cup :fits ?slot``                        a `:RelationCondition`
+``?shelf :COLOR (?cup :red)``               a situation type without a property of its own, or with several arguments
+``FILTER(?a != ?b)``, ``IN``, ``VALUES``    `:EqualityCondition`, several in an `:AnyOf`
+``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` stand for numbers; a FILTER of them is a `:Comparison`
+``FILTER EXISTS { ?x a :Tube … }``          a `:Witness` that looks for ``?x``
+``FILTER NOT EXISTS { … }``                 what is inside, negated
+``{ … } UNION { … }``, ``||``               an `:AnyOf`
+``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation `:when` its WHERE held
+``CONSTRUCT { ?a :p ?b } WHERE { … }``      a `:Rule` with these conditions; a variable that isn't in the head, in a `:Witness`
+``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of that rule, `:over` the variables that begin with their type
+==========================================  =====================================================================
+
+All that is asked is asked of the situation before the behaviour, also by further operations; a variable means the same in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from confab.reasoner.updates.conditions import Conditions
+from confab.reasoner.updates.nodes import Nodes
+from confab.reasoner.updates.numbers import Numbers, Sum
+from confab.reasoner.updates.scope import Group, Scope, last_of, middle_of, variables_in
+from confab.reasoner.updates.texts import Update, Vocabulary
+from confab.reasoner.updates.words import (
+    SELECT,
+    A,
+    Construction,
+    Number,
+    Operation,
+    Triple,
+    Truth,
+    UpdateError,
+    constructed,
+    parsed,
+)
+
+CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
+"""The change of an amount that becomes itself, an operator, and a term."""
+
+
+class UpdateCompiler:
+    """Compiles the updates of one behaviour, or the query of one rule.
+
+    Attributes
+    ----------
+    known : set of str
+        The variables of the first WHERE of each update so far.
+    """
+
+    def __init__(self, behavior: str, vocabulary: Vocabulary, declared: Mapping[str, tuple[str, str, int]]) -> None:
+        self.nodes = Nodes(behavior)
+        self.scope = Scope(self.nodes, vocabulary, declared)
+        self.numbers = Numbers(self.nodes, self.scope)
+        self.conditions = Conditions(self.nodes, self.scope, self.numbers)
+        self.known: set[str] = set()
+
+    def write(self, update: Update) -> None:
+        """Add an update; its first operation is the behaviour's, further ones are conditional."""
+        own, operations = parsed(update.text)
+        self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
+        for name, (node, kind, number) in self.scope.declared.items():
+            if number and name not in self.scope.terms:
+                self.scope.bind(name, kind, "Parameter", node, update.place(0))
+        first = operations[0]
+        known = self.known | {name for name, (_, _, number) in self.scope.declared.items() if number}
+        group = self.scope.group(first.where, known)
+        for name, kind in group.chosen.items():
+            self.scope.bind(name, self.scope.iri(kind), "Parameter", "", update.place(kind.at))
+        self.scope.determine(group)
+        within = self.known = known | group.names
+        self.nodes.links["precondition"] += self.conditions.all_of(group, within)
+        self.effects(first, [], within, group)
+        for operation in operations[1:]:
+            inner = self.scope.group(operation.where, within)
+            if lost := [
+                n for t in (*operation.delete, *operation.insert) for n in variables_in(t) if n in inner.chosen
+            ]:
+                raise UpdateError(
+                    f"{lost[0]} would stand for all of its class, but an effect is about one individual",
+                    "make it a parameter by giving it its type in the first WHERE",
+                    lost[0].at,
+                )
+            when = self.conditions.sought(inner, within, operation.at)
+            self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
+
+    def write_rule(self, query: Update) -> None:
+        """Add what a CONSTRUCT query says: its head is what follows, its WHERE when it does, or what is aggregated."""
+        own, rule = constructed(query.text)
+        self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
+        self.nodes.links = {}
+        head, prop = rule.head, self.scope.iri(rule.head.predicate)
+        group = self.scope.group(rule.where, set())
+        named = [word for word in variables_in(head) if word != rule.name]
+        if rule.function and {*named} != rule.grouped:
+            (lost, *_) = sorted({*named} ^ rule.grouped)
+            raise UpdateError(f"{lost} stands in the head or in GROUP BY, and not in both", SELECT, head.subject.at)
+        for name in named:
+            if name in group.chosen:
+                kind = group.chosen.pop(name)
+                self.scope.bind(name, self.scope.iri(kind), "Variable", "", query.place(kind.at))
+        self.scope.determine(group)
+        within = {*self.scope.terms, *group.names}
+        if rule.function:
+            self.total(rule, group, within)
+        else:
+            asked = self.conditions.witness(group, {*self.scope.terms}, head.subject.at) if group.chosen else None
+            self.nodes.links["condition"] = [asked] if asked else self.conditions.all_of(group, within)
+            if self.scope.vocabulary.numeric(prop):
+                raise UpdateError(f"{head.predicate} is an amount, which a rule aggregates", SELECT, head.predicate.at)
+            self.changes(head)
+            self.nodes.links |= self.conditions.situation(head, within)
+        self.nodes.links = {key: values for key, values in self.nodes.links.items() if values}
+
+    def total(self, rule: Construction, group: Group, within: set[str]) -> None:
+        """Add what an aggregate says: its amount, what it is aggregated over, and the number of each."""
+        at = rule.head.subject.at
+        if last_of(rule.head) != rule.name or not self.scope.vocabulary.numeric(self.scope.iri(rule.head.predicate)):
+            raise UpdateError(
+                f"the head of a rule that aggregates gives an amount the number {rule.name}",
+                f"end it by {rule.name}",
+                at,
+            )
+        for name, kind in group.chosen.items():
+            self.scope.bind(name, self.scope.iri(kind), "Variable", "", self.nodes.now.place(kind.at))
+        self.nodes.links["over"] = [self.scope.terms[name] for name in group.chosen]
+        self.nodes.links["condition"] = self.conditions.all_of(group, within)
+        own = self.numbers.measured(replace(rule.head, object=(*middle_of(rule.head), Number(Fraction(0)))), within)
+        self.nodes.said[self.nodes.behavior] = {**own.properties, "aggregate": [rule.function]}
+        if rule.argument is not None:
+            self.numbers.side(self.nodes.behavior, "right", self.numbers.expression(rule.argument, within, at), at)
+
+    def effects(self, operation: Operation, when: Sequence[str], known: Collection[str], *asked: Group) -> None:
+        """Add the deletions and insertions of an operation."""
+        inserted = {(one.subject, one.predicate, middle_of(one)) for one in operation.insert}
+        said = {(t.subject, t.predicate, t.object) for group in asked for t in group.parts if isinstance(t, Triple)}
+        vocabulary = self.scope.vocabulary
+        for one in operation.delete:
+            self.changes(one)
+            prop = self.scope.iri(one.predicate)
+            pair = prop in vocabulary.properties and prop not in vocabulary.functional
+            numeric = vocabulary.numeric(prop) and self.scope.numbers.get(str(last_of(one))) == one
+            if pair or last_of(one) == Truth(True):
+                self.effect(one, when, known, negated=True)
+                continue
+            where = "(… DELETE { ?x :p ?old } INSERT { ?x :p ?new } WHERE { ?x :p ?old … })"
+            if (one.subject, one.predicate, middle_of(one)) not in inserted:
+                raise UpdateError(
+                    f"{one.predicate} always has one value, and would have none",
+                    f"insert the one that it gets {where}",
+                    one.predicate.at,
+                )
+            if (one.subject, one.predicate, one.object) not in said and not numeric:
+                raise UpdateError(
+                    f"{one.predicate} is deleted with a value that WHERE doesn't say it has",
+                    f"say so there, or leave out DELETE: what is inserted takes the place of what was {where}",
+                    one.predicate.at,
+                )
+        for one in operation.insert:
+            self.changes(one)
+            self.effect(one, when, known, negated=False)
+
+    def changes(self, one: Triple) -> None:
+        """Raise `UpdateError` unless a triple is about a changing situation."""
+        prop = "" if one.predicate == A else self.scope.iri(one.predicate)
+        if prop and prop not in self.scope.vocabulary.relations:
+            return
+        what = (
+            f"{one.predicate} is a relation, which nothing changes" if prop else "what is of which class doesn't change"
+        )
+        raise UpdateError(what, "use the property of a situation type", one.predicate.at)
+
+    def effect(self, one: Triple, when: Sequence[str], known: Collection[str], negated: bool) -> None:
+        """Add the effect of a triple: inserted, or deleted if negated."""
+        if self.scope.vocabulary.numeric(self.scope.iri(one.predicate)):
+            node = self.nodes.new("effect", "AmountEffect", one.subject.at)
+            own, by = self.numbers.measured(one, known), self.numbers.expression(last_of(one), known, one.predicate.at)
+            change = CHANGES[by.sign] if isinstance(by, Sum) and by.left == own and by.sign in CHANGES else "assign"
+            self.nodes.said[node] |= {**own.properties, "change": [change]}
+            by = by.right if isinstance(by, Sum) and change != "assign" else by
+            self.numbers.side(node, "right", by, one.subject.at)
+        else:
+            node = self.nodes.new("effect", "ValueEffect", one.subject.at)
+            self.nodes.said[node] |= self.conditions.situation(one, known)
+        if negated:
+            self.nodes.negate(node)
+        if when:
+            self.nodes.said[node]["when"] = list(when)
+        self.nodes.links["postcondition"].append(node)

@@ -1,0 +1,130 @@
+"""Numbers of an update: amounts that a variable stands for, calculations, and comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+from confab.reasoner.amounts import written
+from confab.reasoner.condition_nodes import Properties, argument_properties
+from confab.reasoner.updates.nodes import Nodes
+from confab.reasoner.updates.scope import Scope, middle_of
+from confab.reasoner.updates.words import Number, Said, Triple, UpdateError, Word, term
+
+ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The amount of some individuals, or the number that a relation gives for them."""
+
+    kind: str
+    of: str
+    terms: tuple[str, ...]
+
+    @property
+    def properties(self) -> Properties:
+        """The properties that name it."""
+        return {self.kind: [self.of], **argument_properties(self.terms)}
+
+
+@dataclass(frozen=True)
+class Sum:
+    """An arithmetic operation on two numbers."""
+
+    sign: str
+    left: Side
+    right: Side
+
+
+Side: TypeAlias = "Measured | Sum | Number"
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Compiles the numbers of a behaviour or rule."""
+
+    nodes: Nodes
+    scope: Scope
+
+    def is_number(self, tree: Any) -> bool:
+        """Return whether an expression is numeric."""
+        one = unwrapped(tree)
+        if isinstance(one, Word):
+            return one in self.scope.numbers
+        return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
+
+    def expression(self, tree: Any, known: Collection[str], at: int) -> Side:
+        """Return the calculation of a number."""
+        one = unwrapped(tree)
+        if isinstance(one, Number):
+            return one
+        if isinstance(one, Word) and one in self.scope.numbers and one in known:
+            said = self.scope.numbers[one]
+            return self.measured(said, known) if isinstance(said, Triple) else self.expression(said, known, at)
+        name = getattr(one, "name", "")
+        if name == "UnaryMinus":
+            found = self.expression(one.expr, known, at)
+            return Number(-found.value) if isinstance(found, Number) else Sum("-", Number(Fraction(0)), found)
+        if name in ARITHMETIC:
+            found = self.expression(one.expr, known, at)
+            for sign, other in zip(one.op, one.other, strict=True):
+                found = Sum(str(sign), found, self.expression(other, known, at))
+            return found
+        number = _term_or_none(one)
+        if isinstance(number, Number):
+            return number
+        what = f"{one} is no number" if isinstance(one, Word) else "this is no number"
+        raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
+
+    def measured(self, one: Triple, known: Collection[str]) -> Measured:
+        """Return the amount in a triple."""
+        prop, at = self.scope.iri(one.predicate), one.predicate.at
+        terms = [self.scope.put(each, known, at) for each in (one.subject, *middle_of(one))]
+        kind = "relation" if prop in self.scope.vocabulary.measures else "situationType"
+        return Measured(kind, self.scope.vocabulary.properties.get(prop, prop), tuple(terms))
+
+    def comparison(self, left: Side, sign: str, right: Side, negated: bool, at: int) -> str:
+        """Return a comparison of two numbers."""
+        node = self.nodes.condition("Comparison", at, {"sign": [sign]}, negated)
+        self.side(node, "left", left, at)
+        self.side(node, "right", right, at)
+        return node
+
+    def side(self, node: str, name: str, side: Side, at: int) -> None:
+        """Write one side of a comparison, calculation or effect: an amount on the left and a number on the right need no node."""
+        if name == "left" and isinstance(side, Measured):
+            self.nodes.said[node] |= side.properties
+            return
+        if name == "right" and isinstance(side, Number):
+            self.nodes.said[node]["amount"] = [written(side.value)]
+            return
+        inner = self.nodes.new("amount", "Calculation", at)
+        self.nodes.said[node][name] = [inner]
+        match side:
+            case Measured():
+                self.nodes.said[inner] |= side.properties
+            case Number(value):
+                self.nodes.said[inner]["amount"] = [written(value)]
+            case Sum(sign, left, right):
+                self.nodes.said[inner]["sign"] = [sign]
+                self.side(inner, "left", left, at)
+                self.side(inner, "right", right, at)
+
+
+def _term_or_none(tree: Any) -> Said | None:
+    """Return a term, if it is one."""
+    with suppress(UpdateError):
+        return term(tree, 0)
+    return None
+
+
+def unwrapped(expression: Any) -> Any:
+    """Return an expression without redundant levels of the grammar."""
+    passing = ("ConditionalOrExpression", "ConditionalAndExpression", "RelationalExpression", "AdditiveExpression")
+    while getattr(expression, "name", "") in (*passing, "MultiplicativeExpression") and not expression.other:
+        expression = expression.expr
+    return expression
