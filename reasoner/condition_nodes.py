@@ -25,9 +25,11 @@ with all of its arguments but the number.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import ClassVar, TypeAlias, TypeVar
+
+import pyoxigraph as ox
 
 from confab.reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, exact, written
 from confab.reasoner.symbols import (
@@ -44,7 +46,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from confab.reasoner.vocabulary import ARGUMENTS, CORE, TYPE
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, TYPE, XSD
 
 T = TypeVar("T")
 Node: TypeAlias = "Mapping[str, Sequence[str]]"
@@ -53,6 +55,8 @@ Properties: TypeAlias = "dict[str, list[str]]"
 """The values of a node's properties, by the properties' names in the core."""
 STRINGS = ("sign", "change", "aggregate")
 """Properties whose values are words."""
+LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
+"""Properties with other literals, and their datatypes."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
 """Maximum depth of nested conditions and calculations; the conjunctions of a disjunction do not count."""
@@ -91,6 +95,22 @@ def class_properties(term: str, kind: str) -> Properties:
 def equality_properties(left: str, right: str) -> Properties:
     """Return the properties that name two individuals that are the same."""
     return {"about": [left], "value": [right]}
+
+
+def triples(node: ox.NamedNode | ox.BlankNode, properties: Properties) -> Iterator[ox.Triple]:
+    """Yield the triples of a node whose properties have IRIs or the text of literals; `TYPE` stands for itself."""
+    for name, values in properties.items():
+        prop = ox.NamedNode(name if name == TYPE else CORE + name)
+        for value in values:
+            yield ox.Triple(node, prop, _object(name, value))
+
+
+def _object(name: str, value: str) -> ox.NamedNode | ox.Literal:
+    if name in STRINGS:
+        return ox.Literal(value)
+    if name in LITERALS:
+        return ox.Literal(value, datatype=ox.NamedNode(XSD + LITERALS[name]))
+    return ox.NamedNode(value)
 
 
 # ------------------------------------------------------------------------------------------------------------- writing

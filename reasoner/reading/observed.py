@@ -14,13 +14,14 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from confab.reasoner.aggregates import following
+from confab.reasoner.condition_nodes import symbol_properties, triples
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.names import Names
 from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import State, Symbol
-from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, TYPE
 
 FACTS = """
 SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property"""
@@ -101,21 +102,15 @@ def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symb
 
 
 def _triples(state: State, names: Names, scene: str) -> list[ox.Triple]:
-    iri, owl, kind = observed_iri(scene), OWL, ox.NamedNode(RDF + "type")
-    triples = [
+    iri, owl, kind = observed_iri(scene), OWL, ox.NamedNode(TYPE)
+    found = [
         ox.Triple(ox.NamedNode(iri), kind, ox.NamedNode(owl + "Ontology")),
         ox.Triple(ox.NamedNode(iri), ox.NamedNode(owl + "imports"), ox.NamedNode(scene)),
     ]
     for symbol, value in sorted(state.items()):
         local = ".".join((*symbol.arguments[:1], symbol.situation, *symbol.arguments[1:])).replace(":", "-")
         fact = ox.NamedNode(f"{iri}#{local}")
-        parts = {
-            "situationType": symbol.situation,
-            **dict(zip(ARGUMENTS, symbol.arguments, strict=False)),
-            "value": value,
-        }
-        triples.append(ox.Triple(fact, kind, ox.NamedNode(owl + "NamedIndividual")))
-        triples.append(ox.Triple(fact, kind, ox.NamedNode(CORE + "SituatedObjectInstance")))
-        for name, term in parts.items():
-            triples.append(ox.Triple(fact, ox.NamedNode(CORE + name), ox.NamedNode(names.iri(term))))
-    return triples
+        arguments = [*map(names.iri, symbol.arguments)]
+        properties = symbol_properties(names.iri(symbol.situation), arguments, names.iri(value))
+        found += triples(fact, {TYPE: [INDIVIDUAL, CORE + "SituatedObjectInstance"], **properties})
+    return found

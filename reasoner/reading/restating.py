@@ -12,6 +12,7 @@ from hashlib import sha256
 import pyoxigraph as ox
 
 from confab.reasoner.amounts import bounds, written
+from confab.reasoner.condition_nodes import Properties, equality_properties, symbol_properties, triples
 from confab.reasoner.files import as_iri_part
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
@@ -84,8 +85,8 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
     """Return a copy of a graph with some refutations, stored with the scene's geometry."""
     copy, target = _copied(graph), ox.NamedNode(BASE + "reach")
-    triples = (triple for one in refutations for triple in refuted(graph, reading, one))
-    copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
+    added = (triple for one in refutations for triple in refuted(graph, reading, one))
+    copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in added)
     return copy
 
 
@@ -99,18 +100,15 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
     node = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach#refuted-{digest}")
     every = ox.NamedNode(f"{node.value}.all")
     yield ox.Triple(ox.NamedNode(behavior), ox.NamedNode(CORE + "precondition"), node)
-    yield from _individual(node, "AnyOf", str(one))
-    yield ox.Triple(node, ox.NamedNode(CORE + "negated"), ox.Literal(True))
-    yield ox.Triple(node, ox.NamedNode(CORE + "alternative"), every)
-    yield from _individual(every, "AllOf", "all of this")
+    yield from _individual(node, "AnyOf", str(one), {"negated": ["true"], "alternative": [every.value]})
+    yield from _individual(every, "AllOf", "all of this", {})
     for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
         if not argument:
             continue  # any value
         part = ox.NamedNode(f"{node.value}.argument{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
-        yield from _individual(part, "EqualityCondition", f"it is {argument}")
-        yield ox.Triple(part, ox.NamedNode(CORE + "about"), ox.NamedNode(text(term)))
-        yield ox.Triple(part, ox.NamedNode(CORE + "value"), ox.NamedNode(reading.names.iri(argument)))
+        same = equality_properties(text(term), reading.names.iri(argument))
+        yield from _individual(part, "EqualityCondition", f"it is {argument}", same)
     for number, fact in enumerate(one.facts, 1):
         part = ox.NamedNode(f"{node.value}.fact{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
@@ -136,14 +134,10 @@ def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> 
         tail = arguments[1] if value == TRUE else ox.NamedNode(iri(value))
         yield ox.Triple(arguments[0], ox.NamedNode(prop), tail)
         return
-    parts = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": ox.NamedNode(iri(symbol.situation))}
-    if number:
-        yield ox.Triple(node, ox.NamedNode(CORE + "amount"), number)
-    elif value != TRUE:
-        parts["value"] = ox.NamedNode(iri(value))
-    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "SituatedObjectInstance"))
-    for part, term in parts.items():
-        yield ox.Triple(node, ox.NamedNode(CORE + part), term)
+    stated = None if number or value == TRUE else iri(value)
+    properties = symbol_properties(iri(symbol.situation), [*map(iri, symbol.arguments)], stated)
+    amount = {"amount": [value]} if number else {}
+    yield from triples(node, {TYPE: [CORE + "SituatedObjectInstance"], **properties, **amount})
 
 
 def _counted(reading: Reading, symbol: Symbol) -> bool:
@@ -153,32 +147,26 @@ def _counted(reading: Reading, symbol: Symbol) -> bool:
 def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Triple]:
     """Yield a value condition on individuals, or a comparison of an amount."""
     iri, symbol, value = reading.names.iri, goal.symbol, goal.value
+    situation, arguments = iri(symbol.situation), [*map(iri, symbol.arguments)]
     if _counted(reading, symbol):
         [(sign, limit)] = bounds(value)
-        yield from _individual(node, "Comparison", str(goal))
-        yield ox.Triple(node, ox.NamedNode(CORE + "sign"), ox.Literal(sign))
-        yield ox.Triple(node, ox.NamedNode(CORE + "amount"), ox.Literal(written(limit), datatype=DECIMAL))
-        for part, name in (*zip(ARGUMENTS, symbol.arguments, strict=False), ("situationType", symbol.situation)):
-            yield ox.Triple(node, ox.NamedNode(CORE + part), ox.NamedNode(iri(name)))
+        compared = {"sign": [sign], "amount": [written(limit)], **symbol_properties(situation, arguments)}
+        yield from _individual(node, "Comparison", str(goal), compared)
         return
-    arguments = symbol.arguments
-    if iri(symbol.situation) in reading.schema.pairs:
-        if value == FALSE:
-            yield ox.Triple(node, ox.NamedNode(CORE + "negated"), ox.Literal(True))
-        arguments, value = arguments[:-1], arguments[-1]
-    terms = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": symbol.situation, "value": value}
-    yield from _individual(node, "ValueCondition", str(goal))
-    for part, name in terms.items():
-        yield ox.Triple(
-            node, ox.NamedNode(CORE + part), ox.NamedNode(CORE + name if name in (TRUE, FALSE) else iri(name))
-        )
+    pair = situation in reading.schema.pairs
+    wanted = CORE + value if value in (TRUE, FALSE) else iri(value)
+    if pair:
+        *arguments, wanted = arguments
+    negated = {"negated": ["true"]} if pair and value == FALSE else {}
+    properties = {**negated, **symbol_properties(situation, arguments, wanted)}
+    yield from _individual(node, "ValueCondition", str(goal), properties)
 
 
-def _individual(node: ox.NamedNode, kind: str, label: str) -> Iterator[ox.Triple]:
-    """Yield the type of a node, a class of the core, and its label."""
-    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
-    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + kind))
+def _individual(node: ox.NamedNode, kind: str, label: str, properties: Properties) -> Iterator[ox.Triple]:
+    """Yield the type of a node, a class of the core, its label and its properties."""
+    yield from triples(node, {TYPE: [INDIVIDUAL, CORE + kind]})
     yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(label, language="en"))
+    yield from triples(node, properties)
 
 
 def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import pyoxigraph as ox
 
-from confab.reasoner.condition_nodes import STRINGS, Properties
+from confab.reasoner.condition_nodes import Properties, triples
 from confab.reasoner.updates.texts import Place, Update
-from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE, XSD
+from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 
 @dataclass
@@ -61,18 +61,4 @@ class Nodes:
     def triples(self) -> Iterator[ox.Triple]:
         """Yield the triples of the behaviour and its nodes."""
         for node, properties in [(self.behavior, self.links), *self.said.items()]:
-            for name, values in properties.items():
-                prop = name if name == TYPE else CORE + name
-                for value in values:
-                    yield ox.Triple(ox.NamedNode(node), ox.NamedNode(prop), _object(name, value))
-
-
-def _object(name: str, value: str) -> ox.NamedNode | ox.Literal:
-    """Return the value of a property as a term."""
-    if name == "negated":
-        return ox.Literal(True)
-    if name == "amount":
-        return ox.Literal(value, datatype=ox.NamedNode(XSD + "decimal"))
-    if name in STRINGS:
-        return ox.Literal(value)
-    return ox.Literal(int(value)) if name == "index" else ox.NamedNode(value)
+            yield from triples(ox.NamedNode(node), properties)
