@@ -14,7 +14,6 @@ partition is tried with a small limit of work first, and then with a larger one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise, product
@@ -33,7 +32,7 @@ from confab.planner.certificate_checks import (
     wanted_in_the_end,
 )
 from confab.planner.certificates import Certificate
-from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
+from confab.planner.possibilities import Lowest, NoTimeLeftError, Range, Reading, WorkLimitError, variables
 from confab.planner.validation import Facts, Rules
 from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
@@ -82,12 +81,17 @@ def _at_once(lowest: Lowest, little: int) -> Certificate | None:
 
 
 def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
-    """Return the certificate that the allowed work finds; None if there is none or it takes more."""
+    """Return the certificate that the allowed work finds; None if there is none or it takes more.
+
+    `NoTimeLeftError` ends the whole search for a certificate.
+    """
     most = lowest.most
     try:
         lowest.most = min(most, lowest.work + little)
-        with suppress(WorkLimitError):
-            return find()
+        return find()
+    except NoTimeLeftError:
+        raise
+    except WorkLimitError:
         return None
     finally:
         lowest.most = most

@@ -43,6 +43,10 @@ class WorkLimitError(Exception):
     """A proof or a check needs more than the allowed work."""
 
 
+class NoTimeLeftError(WorkLimitError):
+    """The deadline has passed."""
+
+
 @dataclass(frozen=True)
 class Range:
     """The range of amounts of an expression; if `partial`, the expression may also have no value."""
@@ -56,7 +60,7 @@ class Range:
         return Range(min(self.low, other.low), max(self.high, other.high), self.partial or other.partial)
 
 
-LOOKS = 4_096
+LOOKS = 256
 """Number of tests between two checks of the clock."""
 ANYTHING = Range(-math.inf, math.inf, True)
 
@@ -77,7 +81,7 @@ class Knowledge(Protocol):
 class Lowest:
     """The lowest level of a problem, indexed by the symbols that its behaviours change.
 
-    `work` counts tests. `WorkLimitError` is raised when it exceeds `most`, or when the current deadline has passed.
+    `work` counts tests. `WorkLimitError` is raised when it exceeds `most`, `NoTimeLeftError` when the current deadline has passed.
     """
 
     def __init__(self, problem: Problem, most: float = math.inf) -> None:
@@ -113,7 +117,7 @@ class Lowest:
         if self.work > self.most:
             raise WorkLimitError(f"more than {self.most:.0f} tests")
         if self.work % LOOKS < work and perf_counter() > self.deadline:
-            raise WorkLimitError("more time than there is")
+            raise NoTimeLeftError("more time than there is")
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
         """Whether a symbol exists: it is stated, or it is boolean and its arguments are of the right classes."""
