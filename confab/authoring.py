@@ -200,13 +200,8 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
     if not result.solved:
         return (f"no plan: {result.json().get('reason')}",)
     return tuple(
-        "  " * (len(step["path"]) - 1) + " ".join((step["behavior"], *step["arguments"]))
-        for step in _steps(result.json()["steps"])
+        "  " * (len(step.path) - 1) + " ".join((step.behavior, *step.arguments)) for step in result.plan.walk()
     )
-
-
-def _steps(steps: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [found for step in steps for found in (step, *_steps(step.get("steps", ())))]
 
 
 # ------------------------------------------------------------------------------------------------------- memory and renames

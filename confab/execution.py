@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
+from confab.formats import EpisodeJson, SeenJson
 from confab.interchange import step_json
 from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
 from confab.planner.acting.executive import Event, RetryPolicy, act
@@ -214,7 +215,7 @@ def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
     return Intervention(InterventionKind.ADD, tuple(facts), individual=individual, kind=kind, **when)
 
 
-def episode_json(episode: Episode) -> dict[str, Any]:
+def episode_json(episode: Episode) -> EpisodeJson:
     """Return an episode as JSON data (docs/execution.md)."""
     return {
         "scene": episode.scene,
@@ -275,7 +276,7 @@ def episode_json(episode: Episode) -> dict[str, Any]:
     }
 
 
-def _situated(symbol: Symbol, value: str | None, seconds: float) -> dict[str, Any]:
+def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
     """Return from when on a symbol had a value."""
     return {
         "seconds": round(seconds, 4),
@@ -306,7 +307,7 @@ class Execution:
         """Whether all goals were reached."""
         return self.episode.status is End.REACHED
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> EpisodeJson:
         """Return the episode as JSON data (docs/execution.md)."""
         return episode_json(self.episode)
 

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from confab.formats import OutcomeJson, StepJson
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -18,24 +19,45 @@ DEEPEST = 50
 """Maximum depth of nested steps in a plan."""
 
 
-def step_json(step: Step) -> dict[str, Any]:
+def step_json(step: Step) -> StepJson:
     """Return a step with all below it as JSON data."""
-    data: dict[str, Any] = {
+    data: StepJson = {
         "path": list(step.path),
         "id": step.id,
         "level": step.level,
         "behavior": step.behavior,
         "arguments": list(step.arguments),
         "bindings": dict(step.bindings),
+        "steps": [step_json(below) for below in step.steps],
     }
     if step.rank is not None:
         data["rank"] = round(step.rank, 6)
-    return {**data, "steps": [step_json(below) for below in step.steps]}
+    return data
 
 
-def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> dict[str, Any]:
+def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:
     """Return the outcome of a planning call as JSON data; `seconds` are those before the search."""
-    data: dict[str, Any] = {"scene": scene, "status": outcome.status.value}
+    data: OutcomeJson = {
+        "scene": scene,
+        "status": outcome.status.value,
+        "search": {
+            str(level): {"generated": c.generated, "evaluated": c.evaluated, "expanded": c.expanded}
+            for level, c in outcome.search.items()
+        },
+        "fallbacks": outcome.fallbacks,
+        "given_up": list(outcome.given_up),
+        "left": [
+            {
+                "level": left.level,
+                "from": list(left.first),
+                "to": list(left.last),
+                "breaks": [{"step": list(broken.step), "text": broken.text} for broken in left.broken],
+            }
+            for left in outcome.left
+        ],
+        "cache": {"hits": outcome.hits, "misses": outcome.misses},
+        "seconds": {**{k: round(v, 6) for k, v in seconds.items()}, "search": round(outcome.seconds, 6)},
+    }
     if outcome.plan is not None:
         data["length"] = {str(level): count for level, count in outcome.plan.length.items()}
         data["steps"] = [step_json(step) for step in outcome.plan.steps]
@@ -49,23 +71,6 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
     if outcome.certificate is not None:
         data["certificate"] = certificate_json(outcome.certificate)
-    data["search"] = {
-        str(level): {"generated": c.generated, "evaluated": c.evaluated, "expanded": c.expanded}
-        for level, c in outcome.search.items()
-    }
-    data["fallbacks"] = outcome.fallbacks
-    data["given_up"] = list(outcome.given_up)
-    data["left"] = [
-        {
-            "level": left.level,
-            "from": list(left.first),
-            "to": list(left.last),
-            "breaks": [{"step": list(broken.step), "text": broken.text} for broken in left.broken],
-        }
-        for left in outcome.left
-    ]
-    data["cache"] = {"hits": outcome.hits, "misses": outcome.misses}
-    data["seconds"] = {**{k: round(v, 6) for k, v in seconds.items()}, "search": round(outcome.seconds, 6)}
     return data
 
 

@@ -24,6 +24,7 @@ from confab.table import Table
 
 if TYPE_CHECKING:
     import rdflib
+    from owlready2 import World
 
     from confab.reasoner.embodiment.values import Embodiment
     from confab.reasoner.graph.mirror import Mirror
@@ -236,7 +237,7 @@ class Known:
         return Mirror(self.knowledge)
 
     @property
-    def owl(self) -> Any:
+    def owl(self) -> World:
         """The scene as an owlready2 world; changes to it take effect in `query` and `plan`."""
         return self._mirror.world
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from confab.accepting import number
 from confab.labels import Labels, labels_of
@@ -26,6 +26,7 @@ from confab.sim.world import PrimitiveStep, World
 from confab.table import Table
 
 if TYPE_CHECKING:
+    from confab.formats import ReportJson
     from confab.known import Known
     from confab.show import PlanTree
 
@@ -79,7 +80,7 @@ class Report:
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> ReportJson:
         """Return the report as JSON data (docs/command-line.md)."""
         interval = [round(bound, 6) for bound in wilson(self.good, len(self.rollouts))]
         return {

@@ -9,10 +9,11 @@ from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, TypeAlias, TypedDict, cast
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
+from confab.formats import ResultJson
 from confab.interchange import outcome_json
 from confab.known import Known
 from confab.planner.certified import certified
@@ -518,10 +519,13 @@ class Result:
         """Whether there is a plan."""
         return self.outcome.status is Status.SOLVED
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> ResultJson:
         """Return the result as JSON data (docs/command-line.md)."""
-        data = {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
-        return data if self.timed is None else {**data, "schedule": schedule_json(self.timed)}
+        data = cast("ResultJson", outcome_json(self.scene.iri, self.outcome, self.seconds))
+        data["queries"] = self.queries
+        if self.timed is not None:
+            data["schedule"] = schedule_json(self.timed)
+        return data
 
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON and return where."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from confab.formats import ScheduledStepJson, ScheduleJson
 from confab.planner.plan import Limits, Outcome, Status
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
@@ -131,16 +132,16 @@ def _in_order(slot: Slot) -> tuple[Fraction, Fraction, tuple[int, ...]]:
     return slot.begin, slot.end, slot.step.path
 
 
-def schedule_json(timed: TimedPlan) -> dict[str, Any]:
+def schedule_json(timed: TimedPlan) -> ScheduleJson:
     """Return a plan in time as JSON data: seconds, and each step by its path (docs/command-line.md)."""
     intervals = timed.intervals
     of = {slot.step.path: slot for slot in timed.slots}
-    steps = []
+    steps: list[ScheduledStepJson] = []
     for step in timed.plan.walk():
         begin, end = intervals[step.path]
-        one: dict[str, Any] = {"path": list(step.path), "begin": float(begin), "end": float(end)}
+        one: ScheduledStepJson = {"path": list(step.path), "begin": float(begin), "end": float(end)}
         if (slot := of.get(step.path)) is not None:
-            one |= {"actors": list(slot.actors), "slack": float(slot.slack)}
+            one["actors"], one["slack"] = list(slot.actors), float(slot.slack)
         steps.append(one)
     return {
         "makespan": float(timed.makespan),

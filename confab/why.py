@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
 
+from confab.formats import AccountJson, BecauseJson, WhyNotJson
 from confab.labels import Labels
 from confab.page.markup import Markup, styled, tag
 from confab.planner.causal_links import FactChange, Kind, Need, Purpose
@@ -52,9 +53,17 @@ class Because:
     gives: tuple[str, ...]
     needs: tuple[str, ...]
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> BecauseJson:
         """Return it as JSON data."""
-        return {**asdict(self), "path": list(self.path), "gives": list(self.gives), "needs": list(self.needs)}
+        return {
+            "number": self.number,
+            "path": list(self.path),
+            "id": self.id,
+            "step": self.step,
+            "what": self.what,
+            "gives": list(self.gives),
+            "needs": list(self.needs),
+        }
 
     def __str__(self) -> str:
         """Return it in a few lines."""
@@ -109,7 +118,7 @@ class WhyNot:
     steps: tuple[str, ...] = ()
     breaks: tuple[str, ...] = ()
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> WhyNotJson:
         """Return it as JSON data."""
         from confab.interchange import step_json
 
@@ -154,7 +163,7 @@ class Account:
     plan: Plan | None = field(default=None, repr=False)
     proof: tuple[str, ...] = ()
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> AccountJson:
         """Return it as JSON data."""
         return {
             "headline": self.headline,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypedDict
 
 from confab.reasoner.symbols import Fact, Symbol
 
@@ -52,8 +52,26 @@ class Certificate:
         return "pair" if len(self.told_apart) == 2 and all(map(len, self.told_apart.values())) else "cases"
 
 
-def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """Return a certificate as JSON data; a fact is a list of situation type, arguments and value."""
+class ToldApartJson(TypedDict):
+    """A symbol as a list of situation type and arguments, with the values that are distinguished."""
+
+    symbol: list[str]
+    values: list[str]
+
+
+class CertificateJson(TypedDict):
+    """A certificate; a fact is a list of situation type, arguments and value."""
+
+    format: int
+    never: list[list[str]]
+    always: list[list[str]]
+    told_apart: list[ToldApartJson]
+    cases: int
+    unmet: list[list[str]]
+
+
+def certificate_json(certificate: Certificate) -> CertificateJson:
+    """Return a certificate as JSON data."""
     return {
         "format": FORMAT,
         "never": [_listed(fact) for fact in sorted(certificate.never)],

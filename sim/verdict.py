@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact
@@ -31,6 +31,21 @@ CODES = {
 
 REFUTED = ("no path", "goal in collision")
 """Codes of failed motion planning, which refute a step in the present state of the world."""
+
+
+class _Verdict(TypedDict):
+    ok: bool
+    code: str | None
+    message: str
+    objects: list[str]
+    measured: dict[str, float]
+
+
+_While = TypedDict("_While", {"while": list[str]}, total=False)
+
+
+class VerdictJson(_Verdict, _While):
+    """A verdict; `while` has the facts during which a motion was found to be impossible."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +78,18 @@ class Verdict:
         unnamed = not all(name in self.message for name in self.objects)
         return ", ".join([*(self.objects if unnamed else ()), *([self.message] if self.message else [])])
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> VerdictJson:
         """Return the verdict as `confab verify --json` prints it."""
-        return {
+        data: VerdictJson = {
             "ok": self.ok,
             "code": self.code,
             "message": self.message,
             "objects": list(self.objects),
             "measured": {name: round(value, 6) for name, value in self.measured.items()},
-            **({"while": [str(fact) for fact in self.facts]} if self.facts else {}),
         }
+        if self.facts:
+            data["while"] = [str(fact) for fact in self.facts]
+        return data
 
 
 class SkillError(Exception):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 from confab.planner.validation import successor
 from confab.reasoner.embodiment.values import Embodiment
@@ -13,11 +13,30 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State
 from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
 from confab.sim.staging import Perturbation
-from confab.sim.verdict import Verdict
+from confab.sim.verdict import Verdict, VerdictJson
 from confab.sim.world import PrimitiveStep, World
 
 LOOKS = 3
 """Maximum number of looks with noisy perception before a difference from the expected state counts."""
+
+
+class StepReportJson(VerdictJson):
+    """The verdict on a primitive, with its path and its ID."""
+
+    path: list[int]
+    id: int
+
+
+class RolloutJson(TypedDict):
+    """One execution of a plan in physics."""
+
+    seed: int
+    ok: bool
+    steps: list[StepReportJson]
+    poured: list[float]
+    cpu_seconds: float
+    simulated_seconds: float
+    believed: list[str]
 
 
 @dataclass(frozen=True)
@@ -28,7 +47,7 @@ class StepReport:
     verdict: Verdict
     seconds: float
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> StepReportJson:
         """Return the report as `confab verify --json` prints it."""
         return {"path": list(self.step.path), "id": self.step.id, **self.verdict.as_json()}
 
@@ -56,7 +75,7 @@ class Rollout:
         """The failed step, or None."""
         return next((report for report in self.steps if not report.verdict.ok), None)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> RolloutJson:
         """Return the rollout as `confab verify --json` prints it."""
         return {
             "seed": self.seed,
