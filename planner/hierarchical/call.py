@@ -21,7 +21,7 @@ from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 ADVISED = SearchBudget(steps=0, questions=0)
-"""SearchBudget that follows advice and searches nothing."""
+"""Budget for following advice without search."""
 
 
 @dataclass

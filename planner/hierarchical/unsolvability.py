@@ -25,7 +25,7 @@ LOOKING = 1_800_000
 AT_ONCE, PAIRS = 20_000, 500_000
 """Maximum number of tests of conditions that count as cheap; and maximum number for a certificate after searches have failed."""
 TEST = 2
-"""SearchBudget of a test, about in microseconds."""
+"""Effort of a test, about in microseconds."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """Maximum size of a join of relaxed reachability (some 200 MB), and of the changes of a level that is grounded (600 MB)."""
 
