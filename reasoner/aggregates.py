@@ -1,6 +1,6 @@
 """Derived amounts: a sum, a count, a maximum or a minimum over individuals, in terms of other conditions and effects.
 
-A sum or a count becomes an amount that is part of each state. Its first value is worked out from the initial state (`totals`);
+A sum or a count becomes an amount that is part of each state. Its first value is calculated from the initial state (`totals`);
 each behaviour gets the effects that keep it up to date (`kept`). For ``LOAD(cart)``, the sum of ``weight(item)`` over all items
 in the cart, PUT(?item, ?cart) increases LOAD(?cart) by weight(?item) and decreases LOAD of the cart that the item was in before.
 
@@ -90,7 +90,7 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
         if aggregates and many > MOST_CONDITIONS:
             raise DomainError(
                 f"{name}: the effects that keep {' and '.join(sorted(domain.aggregates))} take more than {MOST_CONDITIONS} "
-                "conditions; let fewer effects of it change what they are worked out from, or let no derived amount read another"
+                "conditions; let fewer of its effects change them, or let no derived amount depend on another"
             )
     return replace(domain, behaviors=behaviors)
 
@@ -128,7 +128,7 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
         if not ready:
             name = min(waiting)
             raise DomainError(
-                f"{name} is worked out from {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
+                f"{name} is calculated from {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
                 f"and that from {name} in turn; take one of them out of its rule"
             )
         for name in ready:
@@ -137,7 +137,7 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
 
 
 def read_by(aggregate: Aggregate) -> frozenset[str]:
-    """Return the situation types from which an aggregate is worked out."""
+    """Return the situation types from which an aggregate is calculated."""
     asked = (s for c in aggregate.conditions for inner in walk(c) for s in situations_of(inner))
     return situations_in(aggregate.amount).union(asked)
 
@@ -154,8 +154,8 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
         return aggregate
     if lost := sorted(read_by(aggregate) & circular(rules)):
         raise DomainError(
-            f"{aggregate.situation} is worked out from {lost[0]}, which follows from itself step by step; aggregate over what "
-            "behaviours change, or over a situation type that isn't defined by itself"
+            f"{aggregate.situation} is calculated from {lost[0]}, which is defined recursively; aggregate over situation types "
+            "that behaviours change, or over one whose definition isn't recursive"
         )
     numbers = count(1)
 
@@ -299,8 +299,8 @@ def extrema_replaced(domain: Domain) -> Domain:
     def _refuse(what: str, expression: Expression) -> None:
         for read in _extrema(expression, aggregates):
             raise DomainError(
-                f"{what} is worked out from {read.situation}, a {aggregates[read.situation].function}, which only conditions "
-                "and goals can name; let a variable stand for the individual that has it"
+                f"{what} is calculated from {read.situation}, a {aggregates[read.situation].function}, which only conditions "
+                "and goals can name; use a variable for the individual that has it"
             )
 
     behaviors = {}
@@ -355,7 +355,7 @@ def kept(
                 behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
             except TooManyCasesError:
                 raise DomainError(
-                    f"{behavior.name} changes what {aggregate.situation} is worked out from by too many effects at once; "
+                    f"{behavior.name} changes the facts that determine {aggregate.situation} by too many effects at once; "
                     "use fewer effects, or another behaviour for some of them"
                 ) from None
     return behavior

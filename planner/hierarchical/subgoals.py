@@ -397,15 +397,15 @@ class Subgoals:
         return found
 
     def _asked(
-        self, achiever: Achiever, condition: Condition, env: Env, whom: bool
+        self, achiever: Achiever, condition: Condition, env: Env, individuals: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
         """Return the function that tests a condition, or yields the individuals of a witness, and its arguments."""
-        key = id(condition), whom, *[name in env for name in self._about(condition)[2]]
+        key = id(condition), individuals, *[name in env for name in self._about(condition)[2]]
         known = self._tests.get(key)
         if known is None:
             names = tuple(sorted({name for name in self._about(condition)[2] if name in env} | needs(condition)))
             writer, bound = self.program.writer, set(names)
-            if whom and isinstance(condition, Witness):
+            if individuals and isinstance(condition, Witness):
                 source, tests = writer.satisfying(condition, bound, achiever.kinds, achiever.behavior)
                 term = written(condition.variable)
                 text = f"[{term} for {term} in {source} if {' and '.join(tests) or 'True'}]"

@@ -48,16 +48,16 @@ class Individuals:
     ) -> list[Triple]:
         """Read the facts about some individuals, about members of some classes, and the facts that name given individuals."""
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
-        for name, whom in (back or {}).items():
-            if not whom:
+        for name, targets in (back or {}).items():
+            if not targets:
                 continue
             if name in PLACES:
                 parts.append(
-                    f"{{ VALUES ?x {{ {values_of(whom)} }} ?s <{name}> ?x ; ?p ?o . ?s a :SituatedObjectInstance }}"
+                    f"{{ VALUES ?x {{ {values_of(targets)} }} ?s <{name}> ?x ; ?p ?o . ?s a :SituatedObjectInstance }}"
                 )
             else:
                 parts.append(
-                    f"{{ SELECT ?s (<{name}> AS ?p) ?o WHERE {{ VALUES ?o {{ {values_of(whom)} }} ?s <{name}> ?o }} }}"
+                    f"{{ SELECT ?s (<{name}> AS ?p) ?o WHERE {{ VALUES ?o {{ {values_of(targets)} }} ?s <{name}> ?o }} }}"
                 )
         for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")

@@ -288,7 +288,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
             situation, arguments = known.domain.situations[name], about if value == TRUE else (*about, value)
             properties = frozenset(p for p, (of, _) in known.properties.items() if of == name)
         case _:
-            return  # nothing is stated of what rules define: their conditions are followed
+            return  # facts of rules aren't stated: the rules' conditions are followed
     if len(arguments) != 2:
         properties = frozenset()
     nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
@@ -430,7 +430,7 @@ def _goal_situations(schema: Schema) -> set[str]:
 
 
 def _goal_individuals(schema: Schema) -> set[str]:
-    """Return what the goals and the facts about nobody name."""
+    """Return the individuals in goals and in facts without arguments."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
     named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}

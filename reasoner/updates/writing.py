@@ -194,9 +194,9 @@ class _Writer:
     def group(self, conditions: Sequence[Condition], known: dict[str, bool], labels: Sequence[str] = ()) -> list[str]:
         """Return a line for each of some conditions.
 
-        `known` are the variables that mean something already, and whether their type was said; what the conditions determine
-        is added, also for those before it: in a group the order of lines means nothing, but that a class asked of what the
-        group determines comes behind that.
+        `known` maps the variables bound so far to whether their type is written; variables that the conditions determine are
+        added, for all lines: the order of lines in a group has no meaning, except that a class condition on a determined
+        variable comes after it.
         """
         said = list(_flat(zip(conditions, [*labels, *[""] * len(conditions)], strict=False)))
         for one, _ in said:

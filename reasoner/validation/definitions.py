@@ -139,7 +139,7 @@ def defined(case: Case) -> Iterator[Fault]:
             yield names.iri(name), what, why, "nothing, if it is meant; else define it by what behaviours change"
 
 
-def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
+def conclusions_outside_class(case: Case) -> Iterator[Fault]:
     """Find rules that conclude a situation of an individual that can't have it, for example with swapped arguments."""
     if case.reading is None:
         return

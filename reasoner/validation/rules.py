@@ -30,7 +30,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "amount-out-of-reach": quantities.amounts_out_of_reach,
     "unit-mismatch": quantities.unlike_units,
     "product-of-amounts": quantities.multiplied_amounts,
-    "conclusion-outside-class": definitions.conclusions_about_nobody,
+    "conclusion-outside-class": definitions.conclusions_outside_class,
     "number-missing": quantities.numbers_missing,
     "defined": definitions.defined,
 }

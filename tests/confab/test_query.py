@@ -186,7 +186,7 @@ def test_what_follows_at_first_is_asked_for_like_what_is_stated() -> None:
 
 
 def test_what_follows_is_no_fact_of_the_scene() -> None:
-    """It is worked out anew in each state of a plan: what a query was told of the first one stays out of that."""
+    """It is calculated in each state of a plan: the result of a query about the first state has no influence."""
     packing = confab.load("packing-small")
     before = packing.plan()
     packing.query(INSIDE)
