@@ -107,7 +107,7 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
                     symbol,
                     f"{symbol} is {value}, but {name} isn't declared as an individual",
                     "an unknown name is read as a new one",
-                    "declare it, or mend the name",
+                    "declare it, or correct the name",
                 )
 
 

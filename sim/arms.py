@@ -116,7 +116,7 @@ def read_arm(
         *(f"joint '{name}'" for name in joints if name not in model.joints),
         *([] if tip in model.frames else [f"link '{tip}'"]),
     ]:
-        raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; mend the name")
+        raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; correct the name")
     chain = [model.joints[name] for name in joints]
     if len(chain) not in (6, 7):
         raise ValueError(f"arm of '{tip}' has {len(chain)} joints; an arm needs 6 or 7")

@@ -71,7 +71,7 @@ def _base(root: ET.Element) -> str:
 def _mount(root: ET.Element, hand: Hand) -> None:
     """Add a hand's gripper, its names prefixed by the hand's."""
     if all(link.get("name") != hand.flange for link in root.findall("link")):
-        raise ValueError(f"the robot's URDF has no link '{hand.flange}', the flange of '{hand.name}'; mend the name")
+        raise ValueError(f"the robot's URDF has no link '{hand.flange}', the flange of '{hand.name}'; correct the name")
     gripper = _parsed(hand.gripper)
     base = _base(gripper)
     for element in (*gripper.findall("link"), *gripper.findall("joint"), *gripper.iter("material")):

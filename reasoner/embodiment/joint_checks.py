@@ -75,7 +75,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
                     f"{touched[0].name} is {away * 100:.0f} cm or more away from the feature {feature.name} of {link.name}, "
                     "at which the fingers are to touch it",
                     "the fingers would close on nothing",
-                    f"mend the coordinates of {touched[0].name} or of the feature: both are in the frame of {link.name}",
+                    f"correct the coordinates of {touched[0].name} or of the feature: both are in the frame of {link.name}",
                 )
 
 

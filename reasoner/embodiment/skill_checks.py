@@ -73,7 +73,7 @@ def unknown_setting(embodiment: Embodiment) -> Iterator[Flaw]:
                 phase.iri,
                 f"phase {phase.name} of {use.skill} has '{camel(term)}', which is neither a number nor a setting of the skill",
                 "an expression is a sum of numbers and settings",
-                f"state e:{camel(term)} of the skill, or mend the spelling; one of your own is declared first: "
+                f"state e:{camel(term)} of the skill, or correct the spelling; one of your own is declared first: "
                 f":{camel(term)} a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting",
             )
 
@@ -102,7 +102,7 @@ def unknown_feature(embodiment: Embodiment) -> Iterator[Flaw]:
                         name,
                         f"{name} has no feature '{feature}', to which phase {phase.name} of {use.skill} brings the hand",
                         f"{use.behavior} is applicable to {name}, and the hand needs that feature",
-                        f"give {name} an e:feature whose IRI ends with .{feature}, or mend the spelling",
+                        f"give {name} an e:feature whose IRI ends with .{feature}, or correct the spelling",
                     )
 
 

@@ -453,7 +453,7 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
             found = read[catalog][iri]
             if not found.is_file():
                 missing = "is a link that leads to no file" if found.is_symlink() else "doesn't exist"
-                raise KnowledgeError(f"{catalog}: <{iri}> shall lie in {found}, which {missing}; mend the entry")
+                raise KnowledgeError(f"{catalog}: <{iri}> shall lie in {found}, which {missing}; correct the entry")
             return found
     for suffix in ontology.SUFFIXES:
         path = importer.with_name(unquote(iri.rstrip("#/").rsplit("/", 1)[-1]).replace("/", "_") + suffix)

@@ -483,7 +483,7 @@ class Definitions:
             if iri not in self.kinds:
                 raise KnowledgeError(
                     f"{local_name(iri)} stands in a definition, but is neither a value property nor a relation; "
-                    "declare it as a :Relation, or mend the name"
+                    "declare it as a :Relation, or correct the name"
                 )
             return RelationCondition(self.names.short(iri), (one, other))
         situation, functional = self.situations[iri]

@@ -113,7 +113,7 @@ class Parts(NodeReader):
         if self.terms and name not in self.names and name not in (TRUE, FALSE):  # a scene's facts have no terms
             raise KnowledgeError(
                 f"<{iri}> is named in a behaviour, but isn't declared as a parameter, a variable or an individual; declare it, "
-                "or mend the name"
+                "or correct the name"
             )
         return name
 
@@ -121,7 +121,7 @@ class Parts(NodeReader):
         """Return a parameter or variable as a term with its class."""
         if iri not in self.terms:
             raise KnowledgeError(
-                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or correct the name"
             )
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 

@@ -530,12 +530,12 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
         if len(part.arguments) != len(situation.arguments):
             raise KnowledgeError(
                 f"{behavior.name} speaks of {part.situation} with {len(part.arguments)} arguments; it has "
-                f"{len(situation.arguments)}: mend the condition or effect, or say what has that situation type"
+                f"{len(situation.arguments)}: correct the condition or effect, or say what has that situation type"
             )
         if situation.level > behavior.level:
             raise KnowledgeError(
                 f"{behavior.name} on level {behavior.level} speaks of {part.situation}, which exists from level "
-                f"{situation.level} on; mend the behaviour's :level or the situation type's :fromLevel"
+                f"{situation.level} on; correct the behaviour's :level or the situation type's :fromLevel"
             )
 
 

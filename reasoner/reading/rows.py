@@ -194,7 +194,7 @@ def ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> lis
     def key(iri: str) -> tuple[int, str]:
         if iri not in nodes:
             raise KnowledgeError(
-                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or correct the name"
             )
         index, *_ = nodes[iri].get(CORE + "index", [""])
         return (index_of(iri, index), names.short(iri))

@@ -53,7 +53,7 @@ def contradictions(case: Case) -> Iterator[Fault]:
                 names.iri(name),
                 f"{name} requires{where} that {_plain(one)} and that {_plain(other)}",
                 f"no state has both, so that {'the effect never happens' if where else consequence}",
-                "take one of the two conditions out, or mend what it names",
+                "take one of the two conditions out, or correct what it names",
             )
 
 

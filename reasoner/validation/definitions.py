@@ -155,7 +155,7 @@ def conclusions_outside_class(case: Case) -> Iterator[Fault]:
                         f"a rule concludes {name}({said}), where {parameter.name.removeprefix('?')} has to be a "
                         f"{wanted.replace('|', ' or ')}; its conditions make it a {of.replace('|', ' or ')}, and nothing is both",
                         "the rule never concludes anything",
-                        "mend the rule: the arguments of its conclusion may have changed places, or a class or property in its "
+                        "correct the rule: the arguments of its conclusion may have changed places, or a class or property in its "
                         f"conditions may be another; or say that a {of.split('|')[0]} has {name}, too",
                     )
 

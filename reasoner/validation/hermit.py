@@ -219,7 +219,7 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
                 iri,
                 f"{local_name(iri)} can have no individual",
                 "its definition contradicts the rest of the ontology",
-                "mend the definition (Protégé: Reasoner, then '?' beside Nothing)",
+                "correct the definition (Protégé: Reasoner, then '?' beside Nothing)",
             )
     for behavior in reading.problem.domain.behaviors.values():
         iris = {_iri(behavior, term.name) for term in (*behavior.parameters, *behavior.variables)}

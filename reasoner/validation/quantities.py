@@ -70,7 +70,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
             reading.names.iri(first),
             f"{first} {done[first]} ({named}){more}".replace(f"{first} increases", f"{first} adds up", first in totals),
             "a number of one unit says nothing of an amount of another",
-            "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
+            "name amounts of one unit, correct a :unit, or multiply by a number that leads from one unit to the other",
         )
 
 
@@ -195,7 +195,7 @@ def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
             names.iri(first),
             f"{first} is never applicable: {lacks}, and {about}{more}",
             "that is so at first, and no behaviour that can be done leads to another amount",
-            "mend the amount or the bounds, state another amount in the scene, or add a behaviour that leads to one that does",
+            "correct the amount or the bounds, state another amount in the scene, or add a behaviour that leads to one that does",
         )
 
 

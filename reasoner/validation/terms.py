@@ -45,7 +45,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
             subject.value if isinstance(subject, ox.NamedNode) else iri,
             f"{name} is used as {wanted}, but isn't declared as one{hint}",
             "an unknown name is read as a new one, without a warning; what was meant by it is lost",
-            f"mend the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
+            f"correct the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )
 
 
@@ -169,7 +169,7 @@ def files_and_iris(case: Case) -> Iterator[Fault]:
                     iri,
                     f"{catalog} says that <{iri}> lies in {entry}, not here",
                     "Protégé would open the other file",
-                    "mend the entry of the catalog",
+                    "correct the entry of the catalog",
                 )
 
 

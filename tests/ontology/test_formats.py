@@ -115,7 +115,7 @@ def test_a_catalog_that_names_a_link_to_itself_is_one_line(scene: Path) -> None:
     catalog, loop = scene.with_name("catalog-v001.xml"), scene.with_name("loop.ttl")
     loop.symlink_to("loop.ttl")
     catalog.write_text(catalog.read_text().replace('uri="tearoom.ttl"', 'uri="loop.ttl"'))
-    with pytest.raises(KnowledgeError, match=r"loop\.ttl, which is a link that leads to no file; mend the entry"):
+    with pytest.raises(KnowledgeError, match=r"loop\.ttl, which is a link that leads to no file; correct the entry"):
         load(scene)
     for call in (load, confab.validate, lambda file: convert(file, "sparql")):
         with pytest.raises((KnowledgeError, OSError)):

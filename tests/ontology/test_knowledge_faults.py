@@ -156,7 +156,7 @@ def test_what_a_swrl_rule_names_is_a_declared_variable_or_an_individual(tmp_path
     (said,) = theatre_with(tmp_path, "", "", rule.replace("<urn:swrl:var#porp> a swrl:Variable .", ""))
     assert (said.rule, Path(said.file).stem) == ("undeclared-term", "theatre")
     assert "porp is used as a variable or an individual of a SWRL rule, but isn't declared as one" in said.what
-    assert said.remedy == "mend the name, or declare <urn:swrl:var#porp> a swrl:Variable"
+    assert said.remedy == "correct the name, or declare <urn:swrl:var#porp> a swrl:Variable"
     assert "urn:swrl:var#porp" in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
 
 

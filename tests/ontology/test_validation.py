@@ -106,7 +106,7 @@ def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wante
     [
         ("true as a text where the individual is wanted", "task.clean", "write c:true"),
         ("a text where an individual is wanted", "plate2", "name an individual"),
-        ("an amount of at least more than at most", "WEIGHT", "mend :leastAmount or :mostAmount"),
+        ("an amount of at least more than at most", "WEIGHT", "correct :leastAmount or :mostAmount"),
     ],
 )
 def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remedy: str, tmp_path: Path) -> None:

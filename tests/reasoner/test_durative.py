@@ -25,7 +25,7 @@ CELLAR = """(define (domain cellar) (:requirements :typing :durative-actions) (:
   (:durative-action strike :parameters (?m - match) :duration (= ?duration 5)
     :condition (at start (unused ?m))
     :effect (and (at start (not (unused ?m))) (at start (light ?m)) (at end (not (light ?m)))))
-  (:durative-action mend :parameters (?f - fuse ?m - match) :duration (= ?duration 2)
+  (:durative-action correct :parameters (?f - fuse ?m - match) :duration (= ?duration 2)
     :condition (and (at start (handfree)) (over all (light ?m)))
     :effect (and (at start (not (handfree))) (at end (mended ?f)) (at end (handfree)))))"""
 FUSES = """(define (problem fuses) (:domain cellar) (:objects a b - match f g h - fuse)

@@ -146,7 +146,7 @@ def faults(folder: Path, text: str) -> list[Fault]:
 @pytest.mark.parametrize(
     ("text", "what", "remedy", "place"),
     [
-        (HEAD + "; :spto ?x }", ":spto is neither a property", "mend the name", (1, len(HEAD) + 3)),
+        (HEAD + "; :spto ?x }", ":spto is neither a property", "correct the name", (1, len(HEAD) + 3)),
         (HEAD + "}\nFILTER (?a)", "'FILTER' isn't expected here", "write DELETE", (2, 1)),
         (HEAD + ".\n ?a :fits ?slot }", "nothing says what ?a stands for", "give it a type", (2, 2)),
         (HEAD + ".\n ?tube :fits/:fits ?slot }", "a path isn't read here", "a pattern for each step", (2, 8)),
