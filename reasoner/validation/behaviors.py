@@ -52,7 +52,7 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
                 node,
                 f"nothing determines the variable {variable[1:]} of {name}",
                 "a variable gets its individual from the situation: from a value condition that isn't negated",
-                f"add a value condition whose value is {variable[1:]}, make it a parameter, or seek it with a witness",
+                f"add a value condition whose value is {variable[1:]}, make it a parameter, or bind it by a witness",
             )
 
 
@@ -138,7 +138,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         }
         for name, conditions in lacking.items()
     }
-    why = "neither the initial situation nor any behaviour gives what its precondition asks for"
+    why = "neither the initial situation nor any behaviour gives a value that its precondition requires"
     mend = "add a behaviour with that effect, state it in the scene, or drop the precondition"
     for group in _first(needs):
         first, *others = [name for name in problem.domain.behaviors if name in group]
@@ -159,7 +159,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         yield (
             names.iri(symbol.arguments[0]),
             f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
-            "neither the initial situation nor any behaviour gives what the goal asks for",
+            "neither the initial situation nor any behaviour gives that value",
             "add a behaviour with that effect, or drop the goal",
         )
 
@@ -284,7 +284,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
                 yield (
                     names.iri(several[1]),
                     f"the initial {situation} of {some} is {value}, but behaviours that give it require that no {kind} has it",
-                    "no behaviour leads to such a situation, so it is likely not meant",
+                    "no behaviour leads to such a situation, so it is probably unintended",
                     f"state another {situation} of all but one, or let the behaviours take several {kind} there",
                 )
 

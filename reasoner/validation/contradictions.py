@@ -52,8 +52,8 @@ def contradictions(case: Case) -> Iterator[Fault]:
             yield (
                 names.iri(name),
                 f"{name} requires{where} that {_plain(one)} and that {_plain(other)}",
-                f"no state has both, so that {'the effect never happens' if where else consequence}",
-                "take one of the two conditions out, or correct what it names",
+                f"no state satisfies both, so {'the effect never happens' if where else consequence}",
+                "remove one of the two conditions, or correct its terms",
             )
 
 

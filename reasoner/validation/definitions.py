@@ -73,16 +73,16 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
             yield (
                 named,
                 f"{local_name(named)} states {local_name(predicate)}, which is defined",
-                "what is defined follows from other facts, in every state; what is stated of it isn't read",
-                "state what it follows from, or drop the fact",
+                "a defined situation follows from other facts in every state; stated facts about it are ignored",
+                "state the facts from which it follows, or drop this one",
             )
         beyond = predicate if predicate in NOT_EVALUATED else other if predicate == RDF + "type" else ""
         if beyond in NOT_EVALUATED:
             yield (
                 named or "the ontology",
-                f"{NOT_EVALUATED[beyond]} ({local_name(beyond)}) are nothing that planning evaluates",
+                f"{NOT_EVALUATED[beyond]} ({local_name(beyond)}) aren't evaluated by planning",
                 "individuals are told apart by their names, and what isn't stated is false",
-                "say it in a rule or in the scene's facts, or drop it",
+                "state it as a rule or as facts of the scene, or drop it",
             )
 
 
@@ -98,21 +98,21 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
     into = into or any(nodes.get(prop, {}).get(OWL + by) for by in ("propertyChainAxiom", "equivalentProperty"))
     if situation in changed and not into:
         what += f"behaviours change {local_name(situation)}"
-        why = "only what no behaviour changes is defined by axioms; planning takes no notice of this one"
+        why = "axioms can define static facts only; planning ignores this one"
         return (
             situation,
             what,
             why,
-            "let behaviours change another property, which follows into this one, or drop the axiom",
+            "let behaviours change a subproperty of this one, or drop the axiom",
         )
     if situation not in schema.pairs:
         what += f"{name} is functional"
-        why = "what is defined is true or false for each pair; a functional value property gives one value"
+        why = "a defined situation is true or false for each pair; a functional value property gives one value"
         return situation, what, why, f"drop owl:FunctionalProperty of {name}, or drop the axiom"
     if situation in changed:
         return None  # `effect-on-definition` reports it at the effect
-    what += f"no property leads into {name}"
-    why = "planning works out what follows from what behaviours change or what is static"
+    what += f"no property implies {name}"
+    why = "planning derives consequences of situations that behaviours change and of static facts"
     mend = f"make a property that behaviours change, or a static one, rdfs:subPropertyOf {name}; or drop the axiom"
     return situation, what, why, mend
 
@@ -131,12 +131,17 @@ def defined(case: Case) -> Iterator[Fault]:
             below |= more
         if below & changed:
             what = f"{name} is derived: in every state it follows from {' and '.join(sorted(reads[name] - {name}))}"
-            why = "planning works it out anew after each step, as its definition says; no behaviour changes it"
+            why = "planning derives it in each state from its definition; no behaviour changes it"
             yield names.iri(name), what, why, "nothing"
         else:
-            what = f"{name} is static: no behaviour changes what it follows from"
+            what = f"{name} is static: no behaviour changes the facts from which it follows"
             why = "it is the same in every state"
-            yield names.iri(name), what, why, "nothing, if it is meant; else define it by what behaviours change"
+            yield (
+                names.iri(name),
+                what,
+                why,
+                "nothing, if intended; otherwise define it by situations that behaviours change",
+            )
 
 
 def conclusions_outside_class(case: Case) -> Iterator[Fault]:
@@ -191,9 +196,9 @@ def both(case: Case, one: str, other: str) -> bool:
 
 
 NOT_ENFORCED = {
-    OWL + "InverseFunctionalProperty": "leads to no two from one",
-    OWL + "AsymmetricProperty": "never leads both ways",
-    OWL + "IrreflexiveProperty": "leads from nothing to itself",
+    OWL + "InverseFunctionalProperty": "has at most one value for each individual",
+    OWL + "AsymmetricProperty": "is asymmetric",
+    OWL + "IrreflexiveProperty": "relates no individual to itself",
 }
 
 
@@ -208,7 +213,7 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
     for triple in case.triples:
         inside[triple.subject].append(triple)
     why = "behaviours change it, and their results aren't checked against this axiom"
-    mend = "say it as a precondition of the behaviours that could break it, or drop the axiom"
+    mend = "state it as a precondition of the behaviours that could violate it, or drop the axiom"
     for triple in case.triples:
         subject, predicate, value = triple.subject, triple.predicate.value, triple.object
         named = subject.value if isinstance(subject, ox.NamedNode) else ""
@@ -230,7 +235,7 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
         elif not named and other and _properties_in(subject, inside) & of:
             yield (
                 other,
-                f"an expression is said to be below {local_name(other)}, which planning doesn't conclude from",
+                f"an expression is stated to be a subclass of {local_name(other)}, from which planning draws no conclusions",
                 "the members of a class follow from its definition, and from stated types",
                 f"define {local_name(other)} by owl:equivalentClass, or conclude it by a SWRL rule",
             )

@@ -209,7 +209,7 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
             "inconsistent",
             graph.scene,
             "the ontology is inconsistent: HermiT finds no model of it",
-            "everything follows from a contradiction, so that nothing can be concluded",
+            "every statement follows from a contradiction, so no conclusion is meaningful",
             "look at disjoint classes, functional properties, domains and ranges (Protégé: Explain inconsistent ontology)",
         )
     for iri in found.empty:

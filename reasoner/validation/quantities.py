@@ -69,7 +69,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
         yield (
             reading.names.iri(first),
             f"{first} {done[first]} ({named}){more}".replace(f"{first} increases", f"{first} adds up", first in totals),
-            "a number of one unit says nothing of an amount of another",
+            "numbers of different units can't be combined",
             "name amounts of one unit, correct a :unit, or multiply by a number that leads from one unit to the other",
         )
 
@@ -106,7 +106,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
             yield (
                 names.iri(name),
                 f"{name} {does}, {'both of which' if first and sign == '*' else 'which'} behaviors change",
-                "no flat search of a whole level takes that: hard tasks are given up, and no plan is proved to be the cheapest",
+                "a level with such a calculation can't be grounded: hard tasks are given up, and no plan is proved optimal",
                 "multiply by a relation's number or a constant, which never changes, or add and subtract instead",
             )
 
@@ -135,7 +135,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
         yield (
             names.iri(who[0]),
             f"{some} {has} no {relation}, which {readers} need{'' if ' and ' in readers else 's'} of every {kind}",
-            "what isn't stated compares with nothing, so that no such behaviour can be done with it",
+            "a comparison with a missing number is false, so no such behaviour is applicable to it",
             f"state {relation} of {some}, or give it to another class than {kind}",
         )
 
@@ -194,8 +194,9 @@ def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
         yield (
             names.iri(first),
             f"{first} is never applicable: {lacks}, and {about}{more}",
-            "that is so at first, and no behaviour that can be done leads to another amount",
-            "correct the amount or the bounds, state another amount in the scene, or add a behaviour that leads to one that does",
+            "this holds in the initial state, and no applicable behaviour leads to another amount",
+            "correct the amount or the bounds, state another amount in the scene, or add a behaviour that leads to a suitable "
+            "amount",
         )
 
 

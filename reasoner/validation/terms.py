@@ -44,7 +44,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
         yield (
             subject.value if isinstance(subject, ox.NamedNode) else iri,
             f"{name} is used as {wanted}, but isn't declared as one{hint}",
-            "an unknown name is read as a new one, without a warning; what was meant by it is lost",
+            "an unknown name is read as a new one without a warning, and the intended statement is lost",
             f"correct the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )
 
@@ -160,7 +160,7 @@ def files_and_iris(case: Case) -> Iterator[Fault]:
             yield (
                 iri,
                 f"the file is called {file.name}, its ontology {wanted}",
-                "who looks for an import finds it by its name, unless a catalog says otherwise",
+                "imports are found by file name, unless a catalog maps them",
                 f"call the file {wanted}{file.suffix}, or the ontology …/{file.stem}",
             )
         for catalog in {file.with_name(ontology.CATALOG), ontology.ROOT / ontology.CATALOG}:

@@ -157,13 +157,13 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     try:
         graph = load(path, faults=faults)
     except KnowledgeError as error:
-        why = "nothing else can be checked before this is mended"
+        why = "nothing else can be checked before this is corrected"
         said = str(error).removeprefix(f"{path}: ")
         yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
         return
     places = Places(graph)
     for fault in faults:
-        why = "a behaviour whose update can't be read does nothing"
+        why = "a behaviour whose update can't be read has no effect"
         yield places.in_update("update", fault.place, fault.what, why, fault.remedy)
     done(f"checking {path.name}")
     yield from _merged(graph, places)
@@ -208,7 +208,7 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     try:
         infer(graph)
     except KnowledgeError as error:
-        why = "what holds of the one would be concluded of the other"
+        why = "facts about one would be concluded about the other"
         yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
 
 

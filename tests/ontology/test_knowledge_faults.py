@@ -72,12 +72,12 @@ CARRYING = "[ a owl:Restriction ; owl:onProperty :carries ; owl:someValuesFrom :
         (HEAVY, "planning doesn't conclude that each FullCart is of the class Heavy"),
         (
             f"{CARRYING} rdfs:subClassOf :Cart .",
-            "an expression is said to be below Cart, which planning doesn't conclude from",
+            "an expression is stated to be a subclass of Cart, from which planning draws no conclusions",
         ),
         (f":Room rdfs:subClassOf {CARRYING} .", "planning doesn't enforce the axiom about each Room in every state"),
         (
             ":carries a owl:InverseFunctionalProperty .",
-            "planning doesn't enforce that carries leads to no two from one",
+            "planning doesn't enforce that carries has at most one value for each individual",
         ),
         (":FullCart rdfs:subClassOf :Where .", ""),
     ],
@@ -117,14 +117,14 @@ def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_
     assert "LOAD" in said.what
     assert "changes NEAR, which is defined by the axiom that carries is below near" in said.what
     assert said.remedy.startswith(
-        "take the effect out; or, if behaviours are to keep NEAR up to date themselves, drop the axiom"
+        "remove the effect; or, if behaviours are to keep NEAR up to date themselves, drop the axiom"
     )
 
 
 @pytest.mark.parametrize(
     ("kind", "effect", "what", "remedy"),
     [
-        (", owl:TransitiveProperty", "", "since no property leads into near", "rdfs:subPropertyOf near"),
+        (", owl:TransitiveProperty", "", "since no property implies near", "rdfs:subPropertyOf near"),
         (", owl:TransitiveProperty", " . ?cart :near ?prop", "since behaviours change NEAR", "let behaviours change another"),
         (FUNCTIONAL, "", "since near is functional", "drop owl:FunctionalProperty of near"),
     ],
@@ -147,7 +147,7 @@ def test_each_defined_situation_type_is_told_to_be_derived_or_static(tmp_path: P
     assert {f.what for f in validate([tmp_path / "first-night.ttl"]) if f.rule == "defined"} == {
         "FULL is derived: in every state it follows from LADEN",
         "STOWED is derived: in every state it follows from LADEN",
-        "HUNG is static: no behaviour changes what it follows from",
+        "HUNG is static: no behaviour changes the facts from which it follows",
     }
 
 
