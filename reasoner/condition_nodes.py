@@ -443,7 +443,7 @@ class NodeReader:
             return self.expression(self.one(iri, "right"))
         number = self.decimal(iri, "amount")
         if number is None:
-            raise self.error(f"<{iri}> has neither :amount nor :right; state a number, or what it is worked out from")
+            raise self.error(f"<{iri}> has neither :amount nor :right; state a number or its terms")
         return number
 
     def measured(self, iri: str) -> Amount | Measure:

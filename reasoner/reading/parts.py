@@ -137,7 +137,7 @@ class Parts(NodeReader):
         """Return the situation type of a condition, an effect or a calculation."""
         situation = self.one(iri, "situationType")
         if not self.is_a(situation, "SituationType"):
-            raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
+            raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or correct the name")
         return situation
 
     def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
@@ -158,7 +158,7 @@ class Parts(NodeReader):
         """Return the relation of a condition or a calculation."""
         relation = self.one(iri, "relation")
         if not self.is_a(relation, "Relation", "ReachRelation"):
-            raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+            raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or correct the name")
         return self.names.short(relation)
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
