@@ -379,7 +379,7 @@ class NodeReader:
     def entered(self, iri: str, what: str) -> None:
         """Begin to read a node; raise an error if it is inside itself or too deep."""
         if iri not in self.nodes:
-            raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or mend the name")
+            raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or correct the name")
         depth = sum(not self.is_a(node, "AllOf") for node in self.inside)
         if iri in self.inside or depth > DEEPEST or len(self.inside) > 2 * DEEPEST:
             how = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"

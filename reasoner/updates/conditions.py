@@ -244,6 +244,6 @@ class Conditions:
         raise UpdateError(
             f"{one.predicate} is neither a property of a situation type, nor a situation type without one, nor a relation"
             f"{nearest(local_name(prop), names)}",
-            "mend the name, or declare it",
+            "correct the name, or declare it",
             at,
         )
