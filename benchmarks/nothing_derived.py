@@ -25,7 +25,7 @@ from unittest.mock import patch
 import confab
 from benchmarks.before import SEED
 from confab.reasoner.generate import write_scene
-from confab.reasoner.reading import problem
+from confab.reasoner.reading import frame, schema
 
 CASES = (("served", 50), ("handover", 50), ("served", 200), ("served", 1000))
 """Families and how many objects."""
@@ -48,11 +48,11 @@ COMPARING = (
 @contextmanager
 def without() -> Iterator[None]:
     """Do without what serves only derived situations and amounts."""
-    left, parts = PART.subn("", problem.SCHEMA)
+    left, parts = PART.subn("", schema.SCHEMA)
     assert parts == 4, f"wanted 4 parts of the query, found {parts}"
     with ExitStack() as stack:
-        stack.enter_context(patch.object(problem, "SCHEMA", left))
-        stack.enter_context(patch.object(problem, "_rules", lambda *_: {}))
+        stack.enter_context(patch.object(schema, "SCHEMA", left))
+        stack.enter_context(patch.object(frame, "_rules", lambda *_: {}))
         for name in COMPARING:
             stack.enter_context(patch.object(import_module(name), "meets", operator.eq))
         yield

@@ -19,7 +19,7 @@ from heapq import heappop, heappush
 from itertools import product
 from typing import Any
 
-from confab.reasoner.aggregates import in_order, read_by
+from confab.reasoner.aggregates.dependencies import in_order, read_by
 from confab.reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import situations_of, walk

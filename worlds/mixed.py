@@ -17,7 +17,7 @@ from itertools import product
 from random import Random
 from typing import Any
 
-from confab.reasoner.aggregates import read_by
+from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import Amount, Quantity, bounds, written
 from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import (

@@ -16,7 +16,7 @@ from confab.page.schema import PageData, ReadyQuery, Turnable, TurnableRow
 from confab.planner.plan import Limits
 from confab.planner.solve import DEFAULT_MODE, Request, solve
 from confab.planning import Result
-from confab.reasoner.aggregates import following
+from confab.reasoner.aggregates.totals import following
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.names import nearest

@@ -11,7 +11,7 @@ from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.validation import successor
-from confab.reasoner.aggregates import following
+from confab.reasoner.aggregates.totals import following
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import (
     FALSE,

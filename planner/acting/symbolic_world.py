@@ -10,7 +10,7 @@ from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.planner.validation import successor
-from confab.reasoner.aggregates import following
+from confab.reasoner.aggregates.totals import following
 from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from confab.reasoner.aggregates import with_extrema
+from confab.reasoner.aggregates.extrema import with_extrema
 from confab.reasoner.amounts import (
     DECIMAL,
     Amount,

@@ -10,7 +10,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
-from confab.reasoner.reading.problem import Frame
+from confab.reasoner.reading.frame import Frame
 from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Schema, Triple, index_of, link, stated
 from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from confab.reasoner.aggregates import following
+from confab.reasoner.aggregates.totals import following
 from confab.reasoner.condition_nodes import symbol_properties, triples
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text

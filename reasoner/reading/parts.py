@@ -8,25 +8,13 @@ from fractions import Fraction
 from typing import ClassVar
 
 from confab.reasoner.afterwards import closed
-from confab.reasoner.amounts import (
-    OPERATIONS,
-    Amount,
-    Expression,
-    Measure,
-    terms_of,
-)
+from confab.reasoner.amounts import OPERATIONS, Amount, Expression, Measure, terms_of
 from confab.reasoner.condition_nodes import Node, NodeReader
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import groups, mentions
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading.definitions import Definitions
-from confab.reasoner.reading.rows import (
-    HIGHEST_COST,
-    HIGHEST_LEVEL,
-    is_a,
-    ordered,
-    whole_number,
-)
+from confab.reasoner.reading.rows import HIGHEST_COST, HIGHEST_LEVEL, is_a, ordered, whole_number
 from confab.reasoner.symbols import (
     AGGREGATES,
     FALSE,

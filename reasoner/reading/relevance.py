@@ -26,10 +26,12 @@ from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGrap
 from confab.reasoner.language import situations_of, terms
 from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
+from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.goals import BOUNDS, with_goals
 from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
-from confab.reasoner.reading.problem import Frame, Reading, frame, read, read_schema, reading_of
+from confab.reasoner.reading.problem import Reading, read, reading_of
 from confab.reasoner.reading.rows import Member, Schema, Triple, derived_goals
+from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
-from confab.reasoner.reading.problem import Frame, Reading, frame, reading_of
+from confab.reasoner.reading.problem import Reading, reading_of
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,

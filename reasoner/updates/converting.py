@@ -17,8 +17,9 @@ import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
 from confab.reasoner.names import local_name
-from confab.reasoner.reading.problem import as_written, read_schema
+from confab.reasoner.reading.frame import as_written
 from confab.reasoner.reading.rows import Schema
+from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, Span, Witness, substituted
 from confab.reasoner.updates.compiling import compiled
 from confab.reasoner.updates.writing import Situations, update

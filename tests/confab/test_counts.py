@@ -20,9 +20,9 @@ from confab.planner.solve import Request, solve
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
 from confab.reasoner.names import local_name
-from confab.reasoner.reading.problem import SCHEMA
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.reading.rows import Member, Schema
+from confab.reasoner.reading.schema import SCHEMA
 
 
 class Looked(SimpleMemory):

@@ -9,7 +9,9 @@ import confab
 from confab import ontology
 from confab.planner.plan import Status
 from confab.planner.validation import validate
-from confab.reasoner.aggregates import compiled, unfolded, with_totals
+from confab.reasoner.aggregates.compiling import compiled
+from confab.reasoner.aggregates.dependencies import unfolded
+from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Symbol

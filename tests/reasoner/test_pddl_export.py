@@ -10,7 +10,9 @@ import pytest
 from confab.pddl_commands import import_pddl
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Status
-from confab.reasoner.aggregates import compiled, unfolded, with_totals
+from confab.reasoner.aggregates.compiling import compiled
+from confab.reasoner.aggregates.dependencies import unfolded
+from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.exporting import to_pddl

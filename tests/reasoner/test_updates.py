@@ -19,7 +19,9 @@ from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import SCENE, Answer, KnowledgeError, KnowledgeGraph, load, read_into
 from confab.reasoner.names import local_name
 from confab.reasoner.pddl.turtle import turtle
-from confab.reasoner.reading.problem import as_written, read, read_schema
+from confab.reasoner.reading.frame import as_written
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import AmountEffect, Behavior, Comparison
 from confab.reasoner.updates.compiling import Fault
 from confab.reasoner.updates.converting import compiled_again, convert, plainly, situations_of

@@ -1,0 +1,40 @@
+"""A domain without aggregates: its behaviours keep sums and counts, and no condition reads a maximum or minimum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, islice
+
+from confab.reasoner.aggregates.extrema import extrema_replaced
+from confab.reasoner.aggregates.keeping import kept
+from confab.reasoner.language import DomainError, walk
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import Domain, spread
+
+MOST_CONDITIONS = 5_000
+"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts: a second to bind for search."""
+
+
+def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
+    """Return a domain whose behaviours keep its sums and counts, name no maximum or minimum, and no class in an effect.
+
+    Raises
+    ------
+    DomainError
+        An effect or a price reads a maximum or minimum, or too many effects change one number at once.
+    """
+    domain = extrema_replaced(domain)
+    aggregates = domain.aggregates.values()
+    behaviors = {}
+    for name, behavior in domain.behaviors.items():
+        check("deriving amounts")
+        behaviors[name] = spread(kept(behavior, aggregates, domain.situations, classes), classes)
+        conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
+        many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))
+        if aggregates and many > MOST_CONDITIONS:
+            raise DomainError(
+                f"{name}: the effects that keep {' and '.join(sorted(domain.aggregates))} take more than {MOST_CONDITIONS} "
+                "conditions; let fewer of its effects change them, or let no derived amount depend on another"
+            )
+    return replace(domain, behaviors=behaviors)

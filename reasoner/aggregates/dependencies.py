@@ -1,0 +1,106 @@
+"""What an aggregate is worked out from, and where its number exists."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import count
+
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
+from confab.reasoner.derivation import circular
+from confab.reasoner.language import DomainError, situations_of, walk
+from confab.reasoner.symbols import (
+    FALSE,
+    Aggregate,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    Rule,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+
+
+def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
+    """Return aggregates in order of dependency.
+
+    Raises
+    ------
+    DomainError
+        One depends on itself. The message names it.
+    """
+    found: dict[str, Aggregate] = {}
+    waiting = dict(aggregates)
+    while waiting:
+        ready = [name for name, one in waiting.items() if not read_by(one) & waiting.keys()]
+        if not ready:
+            name = min(waiting)
+            raise DomainError(
+                f"{name} is calculated from {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
+                f"and that from {name} in turn; take one of them out of its rule"
+            )
+        for name in ready:
+            found[name] = waiting.pop(name)
+    return list(found.values())
+
+
+def read_by(aggregate: Aggregate) -> frozenset[str]:
+    """Return the situation types from which an aggregate is calculated."""
+    asked = (s for c in aggregate.conditions for inner in walk(c) for s in situations_of(inner))
+    return situations_in(aggregate.amount).union(asked)
+
+
+def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
+    """Return an aggregate whose conditions name no defined situation type, but the conditions of its rules.
+
+    Raises
+    ------
+    DomainError
+        A situation type that it names is defined by itself. The message names both.
+    """
+    if not read_by(aggregate) & rules.keys():
+        return aggregate
+    if lost := sorted(read_by(aggregate) & circular(rules)):
+        raise DomainError(
+            f"{aggregate.situation} is calculated from {lost[0]}, which is defined recursively; aggregate over situation types "
+            "that behaviours change, or over one whose definition isn't recursive"
+        )
+    numbers = count(1)
+
+    def one(condition: Condition) -> Condition:
+        match condition:
+            case ValueCondition(situation, arguments, value, negated) if situation in rules:
+                ways = tuple(way(rule, arguments) for rule in rules[situation])
+                return AnyOf(ways, negated is not (value == FALSE))
+            case Witness(_, _, inner):
+                return replace(condition, conditions=tuple(map(one, inner)))
+            case AnyOf(alternatives):
+                return replace(condition, alternatives=tuple(tuple(map(one, group)) for group in alternatives))
+            case _:
+                return condition
+
+    def way(rule: Rule, arguments: Sequence[str]) -> tuple[Condition, ...]:
+        number = next(numbers)
+        terms = dict(zip((p.name for p in rule.parameters), arguments, strict=True))
+        terms |= {v.name: f"{v.name}_rule{number}" for v in rule.variables}
+        found = tuple(one(substituted(condition, terms)) for condition in rule.conditions)
+        for variable in rule.variables:
+            found = (Witness(terms[variable.name], variable.kind, found),)
+        members = (ClassCondition(terms[p.name], p.kind) for p in rule.parameters)
+        return (*members, *found)
+
+    return unfolded(replace(aggregate, conditions=tuple(map(one, aggregate.conditions))), rules)
+
+
+def existing(aggregate: Aggregate) -> tuple[Condition, ...]:
+    """Return the condition that the number of an aggregate is defined, where it may not be."""
+    whole = aggregate.amount
+    amounts = [part for part in inside(whole) if isinstance(part, Amount | Measure)]
+    return (Comparison(whole, "=", whole),) if amounts or divides(whole) else ()
+
+
+def divides(expression: Expression) -> bool:
+    """Whether a number is divided in an expression."""
+    return any(isinstance(part, Calculation) and part.operator == "/" for part in inside(expression))

@@ -1,0 +1,261 @@
+"""The effects of a behaviour that keep a sum or a count up to date.
+
+Soundness: a tuple of individuals adds to a total as long as it satisfies the aggregate's conditions. It can begin or
+cease to satisfy them, or add another number, only if an effect changes a symbol that these conditions or the number name. So every
+such tuple is among the *candidates* of an effect and such a name: it agrees with the effect in the arguments, and in the value
+before or after. A candidate's number is added if the conditions hold afterwards and not before (`confab.reasoner.afterwards`), and
+subtracted if they hold before and not afterwards. A tuple of several candidates is counted for the first one only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+from confab.reasoner.afterwards import Afterwards, Conjunction, Formula, TooManyCasesError, both, negation
+from confab.reasoner.aggregates.dependencies import divides, existing, read_by
+from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
+from confab.reasoner.language import DomainError, is_variable, mentions, walk
+from confab.reasoner.symbols import (
+    Aggregate,
+    AmountEffect,
+    Behavior,
+    Comparison,
+    Effect,
+    Parameter,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    made_of,
+    substituted,
+)
+
+
+def kept(
+    behavior: Behavior,
+    aggregates: Iterable[Aggregate],
+    situations: Mapping[str, SituationType],
+    classes: Mapping[str, Sequence[str]],
+) -> Behavior:
+    """Return a behaviour with the effects that keep sums and counts up to date.
+
+    Parameters
+    ----------
+    behavior : Behavior
+        As it is written, with its effects on all of a class.
+    aggregates : iterable of Aggregate
+        In the order of `in_order`.
+    situations : mapping of name to SituationType
+    classes : mapping of class to individuals
+
+    Raises
+    ------
+    DomainError
+        Too many of the behaviour's effects change one number at once.
+    """
+    for aggregate in aggregates:
+        if aggregate.kept and read_by(aggregate) & behavior.changes:
+            try:
+                behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
+            except TooManyCasesError:
+                raise DomainError(
+                    f"{behavior.name} changes the facts that determine {aggregate.situation} by too many effects at once; "
+                    "use fewer effects, or another behaviour for some of them"
+                ) from None
+    return behavior
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """Tuples that may begin or cease to add to a total: those that agree with an effect on a symbol of an effect.
+
+    `effect` has its variables renamed apart; `named` are the arguments of the symbol as the aggregate has them, `value` the
+    value (None of an amount); `before` tells whether a tuple agrees with the value before the effect or with the one after it.
+    """
+
+    effect: Effect
+    named: tuple[str, ...]
+    value: str | None
+    before: bool
+
+
+class _Keeping:
+    """The effects of one behaviour on one total."""
+
+    def __init__(
+        self,
+        behavior: Behavior,
+        aggregate: Aggregate,
+        situations: Mapping[str, SituationType],
+        classes: Mapping[str, Sequence[str]],
+    ) -> None:
+        kinds = {**behavior.kinds, **{e.each.name: e.each.kind for e in behavior.every_effect if e.each is not None}}
+        self.own, self.situations = behavior, situations
+        self.after = Afterwards(behavior, situations, classes, kinds)
+        self.terms = {one.name: self.after.fresh(one.kind) for one in (*aggregate.parameters, *aggregate.variables)}
+        asked = (substituted(condition, self.terms) for condition in aggregate.conditions)
+        self.conditions = [self.after.renamed(condition) for condition in asked]
+        self.defined = [substituted(condition, self.terms) for condition in existing(aggregate)]
+        if divides(aggregate.amount):
+            self.conditions, self.defined = [*self.conditions, *self.defined], []
+        self.amount = put_in(aggregate.amount, self.terms)
+        self.arguments = tuple(self.terms[p.name] for p in aggregate.parameters)
+        self.aggregate, self.names = aggregate, {*self.terms.values()}
+        self.candidates = list(self._candidates())
+
+    def behavior(self) -> Behavior:
+        """Return the behaviour with these effects."""
+        effects = [effect for i in range(len(self.candidates)) for effect in self.effects(i)]
+        known = self.own.kinds
+        used = {
+            t for e in effects for t in (*e.arguments, *terms_of(e.amount), *(m for c in e.when for m in mentions(c)))
+        }
+        each = {e.each.name for e in effects if e.each is not None}
+        more = sorted(t for t in used - each if is_variable(t) and t not in known)
+        variables = (*self.own.variables, *(Parameter(name, self.after.kinds[name]) for name in more))
+        return replace(self.own, variables=variables, amounts=(*self.own.amounts, *effects))
+
+    def _candidates(self) -> Iterator[_Candidate]:
+        """Yield what may change the total: each effect with each symbol that the conditions or the number name."""
+        for condition in (inner for c in self.conditions for inner in walk(c)):
+            if isinstance(condition, ValueCondition):
+                for effect in (e for e in self.own.effects if e.situation == condition.situation):
+                    for before in (False, True) if condition.value in self.names else (False,):
+                        yield self._candidate(effect, condition.arguments, condition.value, before)
+            elif isinstance(condition, Comparison):
+                yield from self._of_amounts(condition.left)
+                yield from self._of_amounts(condition.right)
+        yield from self._of_amounts(self.amount)
+
+    def _of_amounts(self, expression: Expression) -> Iterator[_Candidate]:
+        for part in inside(expression):
+            if isinstance(part, Amount):
+                for effect in (e for e in self.after.amounts if e.situation == part.situation):
+                    yield self._candidate(effect, part.arguments, None, False)
+
+    def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
+        """Return a candidate; of an effect on all of a class whose individuals a witness seeks, without what names them."""
+        effect = self.after.apart(effect)
+        if effect.each is None:
+            return _Candidate(effect, named, value, before)
+        sought = named[effect.arguments.index(effect.each.name)]
+        if sought in self.names or not is_variable(sought):
+            return _Candidate(effect, named, value, before)
+        own = zip(effect.arguments, named, strict=True)
+        named = tuple(name if self.after.fixed(argument) else sought for argument, name in own)
+        if isinstance(effect, ValueEffect) and not self.after.fixed(effect.value):
+            value = None
+        return _Candidate(replace(effect, each=None, when=()), named, value, before)
+
+    def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:
+        """Return that a tuple is one of a candidate's."""
+        effect = candidate.effect
+        found: list[Formula] = []
+        if effect.each is not None:
+            at = effect.arguments.index(effect.each.name)
+            named = tuple_.get(candidate.named[at], candidate.named[at])
+            found.append(self.after.among(named, effect.each.kind))
+            effect = made_of(effect, named)
+        found += effect.when
+        for own, name in zip(effect.arguments, candidate.named, strict=True):
+            if name in self.names or not is_variable(name):
+                found.append(self.after.equal(own, tuple_.get(name, name)))
+        if isinstance(effect, ValueEffect) and candidate.value in self.names:
+            value = tuple_[candidate.value]
+            if candidate.before:
+                found.append(self.after.value(effect.situation, effect.arguments, value))
+            else:
+                found.append(self.after.equal(effect.value, value))
+        return both(found)
+
+    def effects(self, number: int) -> Iterator[AmountEffect]:
+        """Yield the effects on the total for the tuples of one candidate, without those of earlier candidates."""
+        candidate = self.candidates[number]
+        effect = candidate.effect
+        tuple_: dict[str, str] = {}
+        guard: list[Formula] = list(effect.when)
+        for own, name in zip(effect.arguments, candidate.named, strict=True):
+            if name in self.names:
+                guard.append(self._put(tuple_, name, own))
+            elif not is_variable(name):
+                guard.append(self.after.equal(own, name))
+        if isinstance(effect, ValueEffect) and candidate.value is not None and candidate.value in self.names:
+            if candidate.before:
+                old, determined = self.after.old(effect.situation, effect.arguments, self.after.kinds[candidate.value])
+                guard += [False] if determined is None else determined
+                guard.append(self._put(tuple_, candidate.value, old))
+            else:
+                guard.append(self._put(tuple_, candidate.value, effect.value))
+        for whole, each, more in self._completed(tuple_, effect.each):
+            others = [negation(self.agrees(other, whole)) for other in self.candidates[:number]]
+            yield from self._differences(whole, each, [*guard, *more, *others])
+
+    def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
+        """Substitute a term for a variable of the aggregate; return the conditions that this implies."""
+        if name in tuple_:
+            return self.after.equal(tuple_[name], term)
+        tuple_[name] = term
+        return self.after.among(term, self.after.kinds[name])
+
+    def _completed(
+        self, tuple_: Mapping[str, str], each: Parameter | None
+    ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
+        """Yield a tuple with terms for all variables: determined by a condition, members of a class, or all individuals."""
+        found, more = dict(tuple_), list[Formula]()
+        determined = True
+        while determined:
+            determined = False
+            for condition in self.conditions:
+                if (
+                    isinstance(condition, ValueCondition)
+                    and not condition.negated
+                    and condition.value in self.names - found.keys()
+                    and not self.after.changed(condition)
+                    and all(a in found for a in condition.arguments if a in self.names)
+                ):
+                    own = substituted(condition, found)
+                    assert isinstance(own, ValueCondition)
+                    term, asked = self.after.old(own.situation, own.arguments, self.after.kinds[condition.value])
+                    found[condition.value] = term
+                    more += [False] if asked is None else asked
+                    determined = True
+        left = sorted(self.names - found.keys())
+        if left and each is None:
+            kind = self.after.kinds[left[0]]
+            each = Parameter(self.after.fresh(kind), kind)
+            found[left.pop(0)] = each.name
+        for row in product(*(self.after.classes.get(self.after.kinds[name], ()) for name in left)):
+            yield {**found, **dict(zip(left, row, strict=True))}, each, more
+
+    def _differences(
+        self, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
+    ) -> Iterator[AmountEffect]:
+        """Yield the effects for the tuples that a guard admits: added, no longer added, or added with another number."""
+        conditions = [substituted(condition, tuple_) for condition in self.conditions]
+        changing = [condition for condition in conditions if self.after.changed(condition)]
+        always = [*guard, *(self.after.before(c) for c in conditions if not self.after.changed(c))]
+        always += [substituted(condition, tuple_) for condition in self.defined]
+        before, after = both(map(self.after.before, changing)), both(map(self.after.condition, changing))
+        amount, arguments = put_in(self.amount, tuple_), tuple(tuple_[name] for name in self.arguments)
+        cases = self.after.cases(amount)
+        found = [("decrease", amount, [*always, *_parts(before), negation(after)])]
+        for when, changed in cases:
+            found.append(("increase", changed, [*always, *when, *_parts(after), negation(before)]))
+            if changed != amount:
+                found.append((*_difference(changed, amount), [*always, *when, *_parts(before), *_parts(after)]))
+        for operation, by, formulas in found:
+            asked = both(formulas)
+            if asked is not None:
+                yield AmountEffect(self.aggregate.situation, arguments, operation, by, asked, each)
+
+
+def _parts(conjunction: Conjunction) -> Sequence[Formula]:
+    return (False,) if conjunction is None else conjunction
+
+
+def _difference(after: Expression, before: Expression) -> tuple[str, Expression]:
+    """Return the operation and the number that lead from an amount to another one."""
+    if isinstance(after, Calculation) and after.left == before and after.operator in ("+", "-"):
+        return ("increase" if after.operator == "+" else "decrease"), after.right
+    return "increase", Calculation("-", after, before)

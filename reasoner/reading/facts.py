@@ -1,0 +1,147 @@
+"""The facts of a scene as values: static relations, and the initial state."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping
+from itertools import product
+
+from confab.reasoner.amounts import written
+from confab.reasoner.condition_nodes import Node
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import walk
+from confab.reasoner.names import Names
+from confab.reasoner.possible import values_at_fault
+from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.goals import check_arguments
+from confab.reasoner.reading.parts import Parts
+from confab.reasoner.symbols import TRUE, Domain, RelationCondition, State, Symbol
+from confab.reasoner.vocabulary import CORE
+
+
+def facts_of(
+    rows: Iterable[tuple[str, ...]],
+    tuples: Mapping[str, Node],
+    properties: Mapping[str, tuple[str, bool]],
+    domain: Domain,
+    names: Names,
+    numbers: Collection[str],
+) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
+    """Return the static relations, and the values that the scene states of each symbol."""
+    relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # those that give a number, at the end of each row
+    stated: dict[Symbol, set[str]] = defaultdict(set)
+    for subject, predicate, value in rows:
+        number = predicate in numbers
+        pair = (names.short(subject), value if number else names.short(value))
+        if predicate not in properties:
+            (numbered if number else relations)[names.short(predicate)].add(pair)
+            continue
+        situation, boolean = properties[predicate]
+        if situation in domain.rules:
+            continue  # it follows from what is stated of others
+        if boolean:
+            stated[Symbol(situation, pair)].add(TRUE)
+        else:
+            stated[Symbol(situation, pair[:1])].add(pair[1])
+    facts = Parts(tuples, names, set(), set(), Definitions({}, {}, names))
+    of_tuples: dict[str, tuple[str, tuple[str, ...]]] = {}
+    for iri, node in tuples.items():
+        if CORE + "relation" in node:
+            individuals = (*facts.arguments(iri), *(names.short(v) for v in facts.values(iri, "value")))
+            relation, amount = names.short(facts.one(iri, "relation")), facts.decimal(iri, "amount")
+            if amount is None:
+                of_tuples[iri] = relation, individuals
+                relations[relation].add(individuals)
+            else:
+                numbered[relation].add((*individuals, written(amount)))
+        else:
+            values = facts.values(iri, "value")
+            symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
+            amount = facts.decimal(iri, "amount")
+            said = names.short(values[0]) if values else TRUE
+            stated[symbol].add(said if amount is None else written(amount))
+    for symbol in stated:
+        if symbol.situation not in domain.situations:
+            raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+        if symbol.situation in domain.aggregates:
+            raise KnowledgeError(
+                f"{symbol} is stated, but a rule defines it; drop the fact, or the rule of {symbol.situation}",
+                names.iri(symbol.arguments[0]) if symbol.arguments[0] in names else "",
+            )
+        check_arguments(symbol, domain, "a fact")
+    for relation, pairs in numbered.items():
+        _check_numbers(relation, pairs, relations.get(relation, ()))
+    asked = individuals_named(domain)
+    for relation, rows in sorted(relations.items()):
+        many = asked.get(relation) or max(map(len, rows))
+        for row in sorted(rows):
+            if len(row) != many:
+                others = "conditions" if relation in asked else "others"
+                raise KnowledgeError(
+                    f"{relation} of {', '.join(row)} names {len(row)} individuals; {others} name {many}; state what is lacking, "
+                    "or drop what is too much",
+                    next((iri for iri, said in of_tuples.items() if said == (relation, row)), ""),
+                )
+    return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
+
+
+def individuals_named(domain: Domain) -> dict[str, int]:
+    """Return how many individuals conditions name for each relation without a number; raise `KnowledgeError` if they differ."""
+    found: dict[str, int] = {}
+    rules = [rule.behavior for its in domain.rules.values() for rule in its]
+    rules += [aggregate.behavior for aggregate in domain.aggregates.values()]
+    for behavior in (*domain.behaviors.values(), *rules):
+        for one in (inner for condition in behavior.conditions for inner in walk(condition)):
+            if not isinstance(one, RelationCondition):
+                continue
+            if found.setdefault(one.relation, len(one.arguments)) != len(one.arguments):
+                fewest, most = sorted((found[one.relation], len(one.arguments)))
+                raise KnowledgeError(
+                    f"conditions of {one.relation} name {fewest} individuals here and {most} there; let all of them name as many"
+                )
+    return found
+
+
+def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
+    """Raise `KnowledgeError` if a relation gives two numbers for the same individuals, or for some none."""
+    for row in bare:
+        raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its :amount")
+    found: dict[tuple[str, ...], str] = {}
+    for *individuals, value in sorted(rows):
+        if (old := found.setdefault(tuple(individuals), value)) != value:
+            raise KnowledgeError(f"{relation} of {', '.join(individuals)} is {old} and {value}; state one number")
+
+
+def initial_state(
+    domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
+) -> dict[Symbol, str]:
+    """Return the value of each symbol: the stated one, else the default; raise `KnowledgeError` if it has none or several."""
+    initial = {}
+    for situation in domain.situations.values():
+        if situation.boolean or situation.name in domain.aggregates:
+            continue
+        for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
+            symbol = Symbol(situation.name, arguments)
+            if situation.quantity and len(arguments) > 1 and symbol not in stated and not situation.default:
+                continue  # distances, prices: only what is stated is there
+            values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
+            if len(values) != 1:
+                what = f"several values ({', '.join(values)})" if values else "no value"
+                raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
+            initial[symbol] = values[0]
+    members = {kind: frozenset(those) for kind, those in classes.items()}
+    for symbol in sorted(
+        s for s, values in stated.items() if domain.situations[s.situation].boolean and TRUE in values
+    ):
+        kinds = domain.situations[symbol.situation].arguments
+        if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
+            initial[symbol] = TRUE  # of others it isn't asked
+    return initial
+
+
+def check_values(state: State, domain: Domain, names: Names) -> None:
+    """Raise `KnowledgeError` if a symbol has a value that is declared nowhere, or an amount that it can't have."""
+    for fault in values_at_fault(state, domain, names):
+        about = next(iter(fault.symbol.arguments), "")
+        raise KnowledgeError(str(fault), names.iri(about) if about in names else "")

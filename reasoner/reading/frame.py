@@ -1,0 +1,405 @@
+"""A schema as values for some individuals: situation types, behaviours, rules and aggregates, each checked."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+from confab.reasoner.aggregates.compiling import compiled
+from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
+from confab.reasoner.amounts import Amount, Quantity, inside, written
+from confab.reasoner.derivation import circles, needed
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import DomainError, walk
+from confab.reasoner.names import Names, local_name
+from confab.reasoner.reading import swrl
+from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.facts import individuals_named
+from confab.reasoner.reading.parts import Parts
+from confab.reasoner.reading.rows import (
+    HIGHEST_LEVEL,
+    HIGHEST_NUMBER,
+    Member,
+    Schema,
+    classes_of,
+    derived_goals,
+    is_a,
+    ordered,
+)
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Aggregate,
+    AmountEffect,
+    Behavior,
+    Comparison,
+    Domain,
+    Parameter,
+    Perceived,
+    Rule,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+)
+from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
+
+WITH_CLASS = ("AbsenceCondition", "ClassCondition")
+
+
+class _Whole(Names):
+    """Names that are IRIs, but for truth values."""
+
+    def short(self, iri: str) -> str:
+        return {CORE + TRUE: TRUE, CORE + FALSE: FALSE}.get(iri, iri)
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
+    """Return behaviours as they are written: with IRIs for names, and classes that situations define left as they are named."""
+    names = _Whole(())
+    terms = set(schema.of_kind("Parameter", "Variable"))
+    parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
+    return {iri: parts.behavior(iri) for iri in behaviors}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A schema as values, for some individuals: everything of a problem but its facts and its goal.
+
+    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values;
+    `lifted` are the behaviours with effects for all of a class still in one.
+    """
+
+    schema: Schema
+    parts: Parts
+    domain: Domain
+    classes: dict[str, tuple[str, ...]]
+    parents: dict[str, tuple[str, ...]]
+    properties: dict[str, tuple[str, bool]]
+    lifted: dict[str, Behavior]
+
+    @property
+    def names(self) -> Names:
+        """Short names of the schema's terms and of the individuals."""
+        return self.parts.names
+
+
+def frame(
+    schema: Schema,
+    members: Sequence[Member],
+    namesakes: Collection[str] = (),
+    earlier: Frame | None = None,
+) -> Frame:
+    """Return the behaviours and situation types as values, and the classes of some individuals.
+
+    `namesakes` are others that end like one of these, so that their names are those of the whole scene; `earlier` is the frame
+    of fewer individuals, whose behaviours hold as long as the new ones leave the names in them alone.
+    """
+    nodes, supers = schema.nodes, schema.supers
+    instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
+    names = names_of(schema, instances, namesakes)
+    definitions = _definitions(schema, names)
+    terms = set(schema.of_kind("Parameter", "Variable"))
+    parts = Parts(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
+    classes, parents = classes_of(instances, supers, names)
+    situations, properties = _situations(parts, schema, classes)
+    if earlier is not None and earlier.names.agree(names):
+        lifted = earlier.lifted
+    else:
+        in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
+        lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
+    rules = _rules(parts, schema, {s.name: s for s in situations})
+    aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules)
+    domain = Domain(
+        situations={s.name: s for s in _on_their_levels(situations, rules, aggregates)},
+        behaviors=lifted,
+        first_ids={
+            parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
+        },
+        rules=rules,
+        aggregates=aggregates,
+    )
+    for behavior in lifted.values():
+        _check_behavior(behavior, domain)
+    following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]
+    for one in following:
+        _check_behavior(replace(one.behavior, level=domain.situations[one.situation].level), domain)
+    individuals_named(domain)
+    try:
+        domain = compiled(domain, classes)
+    except DomainError as error:
+        raise KnowledgeError(str(error)) from None
+    return Frame(schema, parts, domain, classes, parents, properties, lifted)
+
+
+def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
+    """Return short names of a schema's terms, of some individuals, and of others that may end alike."""
+    nodes = schema.nodes
+    typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
+    derived = {*derived_goals(schema)}
+    return Names(
+        {
+            *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
+            *(iri for iri in namesakes if iri not in nodes),
+            *derived,
+            *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
+            *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
+            *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
+            *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
+        }
+    )
+
+
+def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:
+    """Return the rules of each situation type that is defined: by rules, by a class, or by axioms about its value property.
+
+    Raises
+    ------
+    KnowledgeError
+        A behaviour changes one that has rules, one isn't true or false, or is defined by its own negation.
+    """
+    changed = {
+        parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
+    }
+    written: dict[str, list[str]] = defaultdict(list)
+    for iri in schema.of_kind("Rule"):
+        if not parts.values(iri, "aggregate"):
+            written[parts.one(iri, "situationType")].append(iri)
+    arguments = {iri: situations[parts.names.short(iri)].arguments for iri in schema.of_kind("SituationType")}
+    by_swrl = swrl.compiled(parts.definitions, arguments) if schema.swrl else {}
+    found: dict[str, tuple[Rule, ...]] = {}
+    for iri, kinds in arguments.items():
+        name, said = parts.names.short(iri), parts.values(iri, "holdsOf")
+        if by := [*written[iri], *said, *(["SWRL"] if iri in by_swrl else [])]:
+            if iri in changed:
+                who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
+                raise KnowledgeError(
+                    f"<{who}> changes {name}, which is defined by <{min(by)}>; take the effect out, or drop the definition",
+                    who,
+                )
+            if not situations[name].boolean:
+                mend = (
+                    "state the :aggregate of the rule"
+                    if situations[name].quantity
+                    else "make its value property not functional"
+                )
+                raise KnowledgeError(
+                    f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false, or an amount that is "
+                    f"aggregated: {mend}"
+                )
+        rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
+        if said and len(kinds) != 1:
+            raise KnowledgeError(
+                f"<{iri}> holds of what is in a class, so that it is about one individual, and {len(kinds)} are said; "
+                "say by :hasSituationType which class has it"
+            )
+        for kind in said:
+            head = (Parameter("?it", kinds[0]),)
+            rules.append(Rule(name, head, (), parts.definitions.holding("?it", kind)))
+        if iri not in changed and iri in schema.pairs:
+            for prop in parts.values(iri, "valueProperty"):
+                rules += parts.definitions.rules(prop, name, kinds, bool(rules))
+        if not rules:
+            continue
+        found[name] = tuple(rules)
+    for name, other in circles(found):
+        raise KnowledgeError(
+            f"{name} is defined by {other} not being true, which is defined by {name} in turn: which of them holds can't be told; "
+            "take one of these conditions out of its rule",
+            next((rule for iri, rules in written.items() if parts.names.short(iri) == name for rule in rules), None)
+            or parts.names.iri(name),
+        )
+    return found
+
+
+def _aggregates(
+    parts: Parts,
+    schema: Schema,
+    situations: Mapping[str, SituationType],
+    rules: Mapping[str, Sequence[Rule]],
+) -> dict[str, Aggregate]:
+    """Return the derived amounts, each behind those that it reads.
+
+    Raises
+    ------
+    KnowledgeError
+        A behaviour changes one, one has two rules, isn't an amount, or depends on itself.
+    """
+    found: dict[str, Aggregate] = {}
+    for iri in schema.of_kind("Rule"):
+        if not parts.values(iri, "aggregate"):
+            continue
+        situation = parts.one(iri, "situationType")
+        name = parts.names.short(situation)
+        if name in found:
+            raise KnowledgeError(f"<{iri}>: {name} has two rules; a derived amount has one", iri)
+        for effect in schema.of_kind("AmountEffect"):
+            if list(parts.values(effect, "situationType")) == [situation]:
+                raise KnowledgeError(
+                    f"<{effect}> changes {name}, which is defined by <{iri}>; take the effect out, or drop the rule",
+                    effect,
+                )
+        try:
+            found[name] = unfolded(parts.aggregate(iri, situations[name].arguments), rules)
+        except DomainError as error:
+            raise KnowledgeError(f"<{iri}>: {error}", iri) from None
+    try:
+        return {one.situation: one for one in in_order(found)}
+    except DomainError as error:
+        raise KnowledgeError(str(error), parts.names.iri(str(error).split()[0])) from None
+
+
+def _on_their_levels(
+    situations: Iterable[SituationType],
+    rules: Mapping[str, Sequence[Rule]],
+    aggregates: Mapping[str, Aggregate],
+) -> Iterator[SituationType]:
+    """Yield situation types; what is defined exists from the level on that has all that it is defined by."""
+    known = {s.name: s for s in situations}
+    before = None
+    reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
+    reads |= {name: {*read_by(one)} for name, one in aggregates.items()}
+    while before != known:
+        before = dict(known)
+        for name, its in reads.items():
+            read = its | {name}
+            known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))
+    yield from known.values()
+
+
+def _definitions(schema: Schema, names: Names) -> Definitions:
+    """Return what defines classes and situation types, with the kinds of what the properties in it lead from and to."""
+    properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
+    owners: dict[str, list[str]] = defaultdict(list)
+    for kind, situation in schema.owners:
+        owners[situation].append(kind)
+    for prop, (situation, _) in properties.items():
+        kinds[prop] = "|".join(map(names.short, owners[situation])), names.short(situation)
+    for iri in schema.of_kind("Relation", "ReachRelation"):
+        ends = (schema.nodes[iri].get(RDFS + end, ()) for end in ("domain", "range"))
+        one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] else "" for end in ends)
+        kinds[iri] = one, other
+    nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
+    found = Definitions(nodes, properties, names, schema.numbers, kinds)
+    concluded = {}
+    of_rules = {*found.recursive, *(swrl.heads(schema.swrl) if schema.swrl else ())}
+    ruled = {one for rule in schema.of_kind("Rule") for one in schema.nodes[rule].get(CORE + "situationType", ())}
+    for iri in schema.of_kind("SituationType") if of_rules or ruled else ():
+        for kind in schema.nodes[iri].get(CORE + "holdsOf", ()):
+            if kind in of_rules or iri in ruled:
+                concluded[kind] = iri, owners[iri][0] if len(owners[iri]) == 1 else ""
+    return replace(found, concluded=concluded)
+
+
+def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
+    """Return the situation type of each value property, and whether it is functional."""
+    return {
+        prop: (iri, iri not in schema.pairs)
+        for iri in schema.of_kind("SituationType")
+        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
+    }
+
+
+def _check_behavior(behavior: Behavior, domain: Domain) -> None:
+    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a part of it has more or fewer arguments than it can."""
+    names = [term.name for term in (*behavior.parameters, *behavior.variables)]
+    if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
+        raise KnowledgeError(
+            f"{behavior.name} has several terms called {', '.join(twice)}; give each a name of its own"
+        )
+    conditions = [inner for condition in behavior.conditions for inner in walk(condition)]
+    compared = [side for c in conditions if isinstance(c, Comparison) for side in (c.left, c.right)]
+    amounts = (*compared, *(effect.amount for effect in behavior.amounts))
+    parts = (
+        *conditions,
+        *behavior.effects,
+        *behavior.amounts,
+        *(part for amount in amounts for part in inside(amount)),
+    )
+    for part in parts:
+        if not isinstance(part, ValueCondition | ValueEffect | AmountEffect | Amount):
+            continue
+        situation = domain.situations[part.situation]
+        if len(part.arguments) != len(situation.arguments):
+            raise KnowledgeError(
+                f"{behavior.name} speaks of {part.situation} with {len(part.arguments)} arguments; it has "
+                f"{len(situation.arguments)}: correct the condition or effect, or say what has that situation type"
+            )
+        if situation.level > behavior.level:
+            raise KnowledgeError(
+                f"{behavior.name} on level {behavior.level} speaks of {part.situation}, which exists from level "
+                f"{situation.level} on; correct the behaviour's :level or the situation type's :fromLevel"
+            )
+
+
+def _situations(
+    schema: Parts, read: Schema, classes: dict[str, tuple[str, ...]]
+) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
+    """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
+    found, properties = [], {}
+    for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
+        name = schema.names.short(iri)
+        owning = [schema.names.short(kind) for kind, situation in read.owners if situation == iri]
+        parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
+        arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
+        value_property = schema.values(iri, "valueProperty")
+        # A value property says so even where no individual that was read is one of its values.
+        boolean = not value_property and set(classes.get(name, ())) <= {TRUE, FALSE}
+        if iri in schema.pairs:
+            arguments, boolean = (*arguments, name), True
+        for iri_of_property in value_property:
+            properties[iri_of_property] = (name, iri in schema.pairs)
+        if quantity := _quantity(schema, iri, iri in read.whole):
+            boolean = False
+        rest = schema.values(iri, "restValue")
+        default = schema.values(iri, "defaultValue") or rest
+        found.append(
+            SituationType(
+                name=name,
+                arguments=arguments,
+                range="Truth" if boolean else name,
+                level=schema.number(iri, "fromLevel", 0, HIGHEST_LEVEL, 1),
+                rest=schema.term(rest[0]) if rest else None,
+                default=schema.term(default[0]) if default else (FALSE if boolean else None),
+                boolean=boolean,
+                quantity=quantity,
+                perceived=_perceived(schema, iri, iri in read.exclusive),
+            )
+        )
+        if quantity and (amount := schema.decimal(iri, "defaultAmount")) is not None:
+            found[-1] = replace(found[-1], default=written(amount))
+    return found, properties
+
+
+def _perceived(schema: Parts, iri: str, exclusive: bool) -> Perceived | None:
+    """Return how a situation type is perceived; None if nothing perceives it."""
+    node = schema.nodes[iri]
+    if not (perceivers := node.get(EMBODIMENT + "perceiver")):
+        return None
+    special = (
+        (local_name(prop), schema.names.short(value))
+        for prop, values in sorted(node.items())
+        if prop.startswith(EMBODIMENT + "value")
+        for value in values
+    )
+    return Perceived(local_name(perceivers[0]), exclusive, tuple(special))
+
+
+def _quantity(schema: Parts, iri: str, whole: bool) -> Quantity | None:
+    if not is_a(schema.nodes[iri], "Amount"):
+        return None
+    unit = schema.one(iri, "unit") if schema.values(iri, "unit") else ""
+    least, most = schema.decimal(iri, "leastAmount"), schema.decimal(iri, "mostAmount")
+    return Quantity(unit, whole or schema.flag(iri, "wholeNumbers"), least, most)
+
+
+def _union(kinds: Sequence[str], classes: dict[str, tuple[str, ...]]) -> str:
+    """Return the class of all individuals of several classes, made if there is more than one."""
+    name = "|".join(kinds)
+    if name not in classes:
+        classes[name] = tuple(dict.fromkeys(member for kind in kinds for member in classes.get(kind, ())))
+    return name

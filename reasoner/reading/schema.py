@@ -1,0 +1,93 @@
+"""What doesn't depend on the number of individuals, read in one query: behaviours, situation types, classes, definitions."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.limits import check
+from confab.reasoner.reading import swrl
+from confab.reasoner.reading.definitions import AXIOMS, EXPRESSIONS
+from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nodes_of, superclasses, whole_number
+from confab.reasoner.vocabulary import CORE, EMBODIMENT
+
+TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
+"""What is said as text, which a store elsewhere doesn't write out."""
+KINDS = (
+    "SituationType",
+    "Behavior",
+    "Term",
+    "Condition",
+    "Effect",
+    "Level",
+    "Span",
+    "Task",
+    "Relation",
+    "Calculation",
+    "Rule",
+    "Window",
+)  # of the schema's nodes
+SCHEMA = f"""
+SELECT DISTINCT ?part ?node ?property ?value WHERE {{
+  {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
+    ?node a/rdfs:subClassOf* ?kind ; ?property ?value . BIND("node" AS ?part) }}
+  UNION {{ ?node rdfs:subClassOf ?value . FILTER(isIRI(?node) && isIRI(?value))
+    FILTER NOT EXISTS {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }} ?node rdfs:subClassOf* ?kind }}
+    BIND("class" AS ?part) BIND(rdfs:subClassOf AS ?property) }}
+  UNION {{ ?node :hasSituationType ?value . BIND("owner" AS ?part) BIND(:hasSituationType AS ?property) }}
+  UNION {{ ?node :valueProperty ?property . FILTER NOT EXISTS {{ ?property a owl:FunctionalProperty }}
+    BIND("pair" AS ?part) BIND(?property AS ?value) }}
+  UNION {{ ?node :valueProperty/rdfs:range ?value . FILTER(?value IN (xsd:integer, xsd:decimal))
+    BIND("range" AS ?part) BIND(rdfs:range AS ?property) }}
+  UNION {{ ?node <{EMBODIMENT}perceiver>/<{EMBODIMENT}exclusive> ?value .
+    BIND("exclusive" AS ?part) BIND(<{EMBODIMENT}exclusive> AS ?property) }}
+  UNION {{ ?node :fromLevel ?value . BIND("level" AS ?part) BIND(:fromLevel AS ?property) }}
+  UNION {{ ?node a :SituatedObjectInstance ; ?property ?value .
+    FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
+  UNION {{ {{ SELECT ?node WHERE {{ ?node a :SituatedObjectInstance ; :about ?object }} LIMIT 1 }}
+    BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
+  UNION {{ ?node a owl:Ontology . BIND("ontology" AS ?part) BIND(rdf:type AS ?property) BIND(owl:Ontology AS ?value) }}
+  UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
+  UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
+  UNION {{ {swrl.RULES} BIND("swrl" AS ?part) }}
+}}"""
+"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own.
+
+No query of this module orders its rows: a store takes longer to order them than to find them, and what is made of them is
+ordered where that counts (`nodes_of`, `classes_of`, `initial_state`).
+"""
+
+
+def read_schema(graph: KnowledgeGraph) -> Schema:
+    """Read what doesn't depend on how many individuals there are, in one query."""
+    parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+    for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
+        if not count % 4096:
+            check("reading the scene")
+        parts[text(part)].append(core_triple(row))
+    written = [triple for triple in parts["node"] if graph.remote and triple[1] in TEXTS]
+    if written:  # a store elsewhere has the text alone
+        from confab.reasoner.updates.compiling import compiled
+
+        found = compiled(lambda query: graph.select(query, SCENE), {}, graph.prefixes)
+        if found.faults:
+            raise KnowledgeError(str(found.faults[0]))
+        parts["node"] += [core_triple(triple) for triple in found.triples]  # type: ignore[arg-type]
+    return Schema(
+        nodes=nodes_of(parts["node"]),
+        supers=superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
+        owners=sorted((kind, situation) for kind, _, situation in parts["owner"]),
+        pairs=frozenset(situation for situation, _, _ in parts["pair"])
+        - {situation for situation, _, kind in parts["node"] if kind == CORE + "Amount"},
+        whole=frozenset(situation for situation, _, kind in parts["range"] if kind.endswith("integer")),
+        from_levels={
+            value: whole_number(level, f"<{value}>: :fromLevel", 0, HIGHEST_LEVEL) for value, _, level in parts["level"]
+        },
+        facts=nodes_of(parts["fact"]),
+        tuples=bool(parts["tuples"]),
+        expressions=nodes_of(parts["expression"]),
+        axioms=nodes_of(parts["axiom"]),
+        swrl=nodes_of(parts["swrl"]),
+        ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
+        exclusive=frozenset(situation for situation, _, value in parts["exclusive"] if value in ("true", "1")),
+    )
