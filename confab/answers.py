@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from confab import ontology
+from confab.plan_options import NO_ENGINE
 from confab.planner.solve import Mode
-from confab.planning import NO_ENGINE, Result
+from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.scene import Scene, load

@@ -9,16 +9,17 @@ from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeAlias, TypedDict, cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
 from confab.known import Known
+from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
-from confab.planner.solve import DEFAULT_MODE, MODES, Mode, Request, solve
+from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, within
@@ -32,7 +33,6 @@ from confab.reasoner.symbols import Problem
 from confab.timing import (
     Minimise,
     asks_for_times,
-    checked_minimise,
     concurrent,
     lanes,
     may_overlap_by_need,
@@ -56,28 +56,10 @@ if TYPE_CHECKING:
     from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
 
-NO_ENGINE = "none"
-"""The name of an engine that means: no engine."""
 OURS = 0.6
 """Share of a time limit for our own search if an installed engine is tried afterwards."""
 OURS_WORK = 10_000_000
 """The same without a time limit, in work (states times operators), and as much for the last resort: about twenty seconds."""
-OPTIMAL_SECONDS = 10.0
-"""Default time limit of the search for an optimal plan."""
-
-
-class Options(TypedDict, total=False):
-    """Options of `plan` besides goals."""
-
-    memory: Memory | Links | str | Path | None
-    mode: Mode
-    time_limit: float | Deadline | None
-    optimal: bool
-    observed: str | Path | None
-    engine: str | None
-    level: int | None
-    leave_levels: bool
-    minimise: Minimise | None
 
 
 def plan(
@@ -134,53 +116,27 @@ def plan(
     LimitError
         The time limit passed before the search began; if it passes later, the outcome says so.
     """
-    checked_minimise(minimise)
-    if minimise in ("cost", "steps"):
-        optimal = True
-    if level is not None and engine in (None, NO_ENGINE):
-        raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
-    if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
-        raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
-    if engine not in (None, NO_ENGINE) and not leave_levels:
-        raise KnowledgeError("an engine plans one level alone, so it may leave the others; leave out --levels strict")
-    if optimal and mode not in (DEFAULT_MODE, "optimal"):
-        raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {mode}; leave one out")
-    optimal = optimal or mode == "optimal"
-    if optimal and (memory is not None or not leave_levels):
-        what = (
-            "uses no memory" if memory is not None else "compares plans of the lowest level, so it may leave the others"
-        )
-        raise KnowledgeError(f"the optimal search {what}; leave one option out")
-    if not isinstance(time_limit, Deadline):
-        number("time_limit", time_limit, "seconds as a number, e.g. 5")
+    options = PlanOptions(memory, mode, time_limit, optimal, observed, engine, level, leave_levels, minimise)
+    return plan_by(scene, [*several(goals), *several(goal)], options)
+
+
+def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
+    """Plan in a scene, as `plan` does, by options that were checked."""
     scene.settle()
-    if mode not in MODES:
-        raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
-    if optimal and time_limit is None:
-        time_limit = OPTIMAL_SECONDS
     scene.knowledge.require_whole()
-    with within(time_limit) as deadline, paused_collection():
+    with within(options.limit) as deadline, paused_collection():
+        memory = options.memory
         if isinstance(memory, str | Path):
             from confab.memory import Memory
 
             memory = Memory.load(memory, scene)
-        how = "optimal" if optimal else mode
-        wanted = [*several(goals), *several(goal)]
-        return _plan(scene, wanted, memory, how, deadline, observed, engine, level, leave_levels, minimise)
+        return _plan(scene, goals, memory, options, deadline)
 
 
 def _plan(
-    scene: Known,
-    goals: list[str],
-    memory: Memory | Links | None,
-    mode: str,
-    deadline: Deadline,
-    observed: str | Path | None,
-    engine: str | None,
-    level: int | None,
-    leave_levels: bool,
-    minimise: Minimise | None,
+    scene: Known, goals: list[str], memory: Memory | Links | None, options: PlanOptions, deadline: Deadline
 ) -> Result:
+    mode, observed, engine = options.strategy, options.observed, options.engine
     begin, asked = perf_counter(), scene.knowledge.round_trips
     links = memory if isinstance(memory, Links) else memory.links if memory is not None and mode == "paper" else None
     advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
@@ -210,17 +166,17 @@ def _plan(
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
-        if engine not in (None, NO_ENGINE):
+        if options.by_engine:
             from confab.engines import plan_by_engine
 
-            return certified(problem, plan_by_engine(problem, engine, level, deadline.left))
-        others, seconds = leave_levels and engine != NO_ENGINE, deadline.left
+            return certified(problem, plan_by_engine(problem, engine, options.level, deadline.left))
+        others, seconds = options.leave_levels and engine != NO_ENGINE, deadline.left
         if others and seconds is not None:
             from confab.engines import some_installed
 
             seconds *= OURS if some_installed(problem) else 1.0
-        alike = with_unit_costs(problem) if minimise == "steps" else problem
-        request = Request(alike, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels)
+        alike = with_unit_costs(problem) if options.minimise == "steps" else problem
+        request = Request(alike, mode, Limits(seconds=seconds), advisor, links, grounds, options.leave_levels)
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
         outcome = solve(replace(request, limits=Limits(work=OURS_WORK)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
@@ -246,7 +202,7 @@ def _plan(
     if faulty:
         doable = without(problem, [behavior for behavior, _ in faulty])
         outcome = search(doable)
-        if outcome.status is not Status.SOLVED and (leave_levels or not _solved_below(doable, deadline)):
+        if outcome.status is not Status.SOLVED and (options.leave_levels or not _solved_below(doable, deadline)):
             behavior, why = faulty[0]
             raise KnowledgeError(why, seen.names.iri(behavior.name))
     else:
@@ -264,7 +220,7 @@ def _plan(
             problem, outcome = anew, search(anew)
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, deadline)
-    elif asks_for_times(problem, minimise):
+    elif asks_for_times(problem, options.minimise):
         outcome, timed = scheduled(problem, outcome, deadline)
     queries = scene.knowledge.round_trips - asked
     part = None if problem is not seen.problem or seen.whole else seen

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import unified_planning.model
     from PIL.Image import Image
 
-    from confab import execution, physics
+    from confab import execution, physics, plan_options
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
@@ -233,7 +233,7 @@ class Scene(Known):
 
         return export_pddl(self.problem, level, Path(folder))
 
-    def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[planning.Options]) -> Account:
+    def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[plan_options.Options]) -> Account:
         """Plan, and return why each step is there; without a plan, why there is none. Takes the parameters of `plan`.
 
         Raises

@@ -20,10 +20,11 @@ from time import process_time
 from types import FrameType
 from typing import Any, TypeVar
 
+from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
 from confab.planner.plan import Outcome, Plan, Status
 from confab.planner.validation import validate
-from confab.planning import NO_ENGINE, plan
+from confab.planning import plan
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError

@@ -98,12 +98,13 @@ def plan(
     as_json: bool,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
+    from confab.plan_options import PlanOptions, leaves_levels
+    from confab.planning import plan_by
     from confab.show import summary
 
     if out is not None:
         json_file(out)
-    if levels not in ("free", "strict"):
-        raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
+    free = leaves_levels(levels)
     with limited(time_limit) as deadline:
         loaded = load_scene(scene, iri)
         if diff is not None:
@@ -114,19 +115,9 @@ def plan(
             raise Exit(YES)
         remembered = memory_for(memory, no_memory, loaded)
         limit = None if time_limit is None else deadline
+        options = PlanOptions(remembered, mode, limit, optimal, observed, engine, level, free, minimise)
         with progress("planning"):
-            result = loaded.plan(
-                goal or (),
-                remembered,
-                mode,
-                limit,
-                optimal,
-                observed,
-                engine,
-                level,
-                leave_levels=levels == "free",
-                minimise=minimise,
-            )
+            result = plan_by(loaded, list(goal), options)
     if report is not None:
         remark(f"the page is {result.report(report)}")
     if out is not None:

@@ -1,5 +1,7 @@
 """Planning from what was seen, and planning with a proved bound."""
 
+from dataclasses import fields
+from inspect import signature
 from pathlib import Path
 from typing import cast, get_args
 
@@ -8,6 +10,8 @@ import pytest
 import confab
 from confab import cli
 from confab.authoring import new_domain
+from confab.commands.planning import plan
+from confab.plan_options import Options, PlanOptions
 from confab.planner.plan import Outcome, Plan, Status
 from confab.planner.solve import MODES, Mode
 from confab.reasoner.generate import write_scene
@@ -44,6 +48,16 @@ def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> Non
         scene.plan(mode="optimal", leave_levels=False)
     with pytest.raises(confab.KnowledgeError, match="uses no memory"):
         scene.plan(mode="optimal", memory=Links())
+
+
+def test_python_the_command_line_and_agents_have_the_same_options_of_a_planning_call() -> None:
+    options = [field.name for field in fields(PlanOptions)]
+    assert [*Options.__annotations__] == options
+    assert [
+        name for name in signature(confab.Scene.plan).parameters if name not in ("scene", "goals", "goal")
+    ] == options
+    written = {parameter.name for parameter in plan.params} | {"leave_levels"}
+    assert {*options} <= written
 
 
 def test_the_mode_and_the_option_of_the_optimal_search_are_one(scene: confab.Scene) -> None:

@@ -1,0 +1,107 @@
+"""Options of a planning call: one value, with one check, for Python, the command line, agents and the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict
+
+from confab.accepting import number
+from confab.planner.solve import DEFAULT_MODE, MODES, Mode
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline
+from confab.timing import Minimise, checked_minimise
+
+if TYPE_CHECKING:
+    from confab.memory import Memory
+    from confab.reasoner.memory.links import Links
+
+NO_ENGINE = "none"
+"""The name of an engine that means: no engine."""
+OPTIMAL_SECONDS = 10.0
+"""Default time limit of the search for an optimal plan."""
+
+
+class Options(TypedDict, total=False):
+    """The fields of `PlanOptions` as keywords."""
+
+    memory: Memory | Links | str | Path | None
+    mode: Mode
+    time_limit: float | Deadline | None
+    optimal: bool
+    observed: str | Path | None
+    engine: str | None
+    level: int | None
+    leave_levels: bool
+    minimise: Minimise | None
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """Options of a planning call; `confab.planning.plan` describes them.
+
+    Raises
+    ------
+    KnowledgeError
+        The mode is unknown, a number isn't one, or options exclude each other.
+    """
+
+    memory: Memory | Links | str | Path | None = None
+    mode: Mode = DEFAULT_MODE
+    time_limit: float | Deadline | None = None
+    optimal: bool = False
+    observed: str | Path | None = None
+    engine: str | None = None
+    level: int | None = None
+    leave_levels: bool = True
+    minimise: Minimise | None = None
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        checked_minimise(self.minimise)
+        if self.level is not None and not self.by_engine:
+            raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
+        if self.by_engine and (self.mode == "paper" or self.asks_for_least):
+            raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
+        if self.by_engine and not self.leave_levels:
+            raise KnowledgeError(
+                "an engine plans one level alone, so it may leave the others; leave out --levels strict"
+            )
+        if self.asks_for_least and self.mode not in (DEFAULT_MODE, "optimal"):
+            raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {self.mode}; leave one out")
+        if self.strategy == "optimal" and self.memory is not None:
+            raise KnowledgeError("the optimal search uses no memory; leave one option out")
+        if self.strategy == "optimal" and not self.leave_levels:
+            what = "compares plans of the lowest level, so it may leave the others"
+            raise KnowledgeError(f"the optimal search {what}; leave one option out")
+        if not isinstance(self.time_limit, Deadline):
+            number("time_limit", self.time_limit, "seconds as a number, e.g. 5")
+        if self.mode not in MODES:
+            raise KnowledgeError(f"unknown mode '{self.mode}'; wanted one of {', '.join(MODES)}")
+
+    @property
+    def by_engine(self) -> bool:
+        """Whether an engine that the caller names plans."""
+        return self.engine not in (None, NO_ENGINE)
+
+    @property
+    def asks_for_least(self) -> bool:
+        """Whether another option than the mode asks for the optimal search."""
+        return self.optimal or self.minimise in ("cost", "steps")
+
+    @property
+    def strategy(self) -> str:
+        """The mode of planning that follows from all options."""
+        return "optimal" if self.asks_for_least else self.mode
+
+    @property
+    def limit(self) -> float | Deadline | None:
+        """The time limit, by default that of the optimal search."""
+        return OPTIMAL_SECONDS if self.time_limit is None and self.strategy == "optimal" else self.time_limit
+
+
+def leaves_levels(levels: str) -> bool:
+    """Return whether levels may be left, as ``--levels`` says it."""
+    if levels not in ("free", "strict"):
+        raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
+    return levels == "free"
