@@ -61,7 +61,7 @@ def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Pat
 
 def teach(domain: Path, training: list[Path], target: Path) -> str:
     """Learn from problems as long as there is time, write the memory, and print its size."""
-    from confab.planner.experience.leading import rules_in
+    from confab.planner.experience.following import rules_in
     from confab.planner.experience.lessons import teach as learn
     from confab.reasoner.memory.experience import Experience
     from confab.reasoner.memory.experience_file import save

@@ -24,7 +24,7 @@ from time import process_time
 import confab
 from confab import ontology
 from confab.planner.experience.advice import Memory, plan
-from confab.planner.experience.leading import rules_in
+from confab.planner.experience.following import rules_in
 from confab.planner.experience.lessons import live, teach
 from confab.planner.hierarchical import planner as fast
 from confab.planner.plan import Limits, Outcome

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 from confab.lifted import Sayings
 from confab.page.markup import styled, tag
 from confab.planner.experience.advice import Memory as Advisor
-from confab.planner.experience.chaining import Candidate
 from confab.planner.experience.evidence import View
-from confab.planner.experience.leading import Guide
+from confab.planner.experience.following import Candidate, Guide
 from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally

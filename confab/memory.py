@@ -16,12 +16,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.accepting import AnyPlan, plan_of
-from confab.planner.paper.learning import LearningError
 from confab.planner.paper.learning import learn as learn_plan
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import alone, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Method, Order, Rule, Tally
+from confab.reasoner.memory.experience import (
+    ITSELF,
+    Experience,
+    Fact,
+    GoalKind,
+    LearningError,
+    Method,
+    Order,
+    Rule,
+    Tally,
+)
 from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
@@ -324,7 +333,7 @@ class Memory:
     def also(self) -> list[str]:
         """Return the learned orders and methods as sentences with their counts."""
         from confab.planner.experience.evidence import DECAY
-        from confab.planner.experience.leading import usable
+        from confab.planner.experience.following import usable
 
         say, totals = self.sayings(), self.experience.totals()
         orders = [

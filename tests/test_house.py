@@ -21,7 +21,7 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "paper": set[str](),
     "grounded": set[str](),
     "hierarchical": {"grounded"},
-    "experience": {"hierarchical", "paper"},
+    "experience": {"hierarchical"},
     "acting": {"hierarchical"},
     "timed": {"grounded"},
 }

@@ -7,7 +7,7 @@ strict     rules don't lead; their record is kept all the same, wherever an epis
 =========  ====================================================================================================
 
 Rules act inside of goals in series and of refinements, on every level, before either is searched
-(`confab.planner.experience.leading`).
+(`confab.planner.experience.following`).
 That there is no plan is for search to prove. Where rules don't lead, planning is as without memory: memory that isn't trusted, has
 reached no such goals yet, or knows none of them.
 """
@@ -18,9 +18,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
-from confab.planner.experience.chaining import Candidate
 from confab.planner.experience.evidence import Judge, View, fillers
-from confab.planner.experience.leading import Guide, rules_in, usable
+from confab.planner.experience.following import Candidate, Guide, rules_in, usable
 from confab.planner.experience.matching import Bind
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled

@@ -14,19 +14,28 @@ from contextlib import suppress
 from dataclasses import replace
 
 from confab.planner.experience.advice import Memory
-from confab.planner.experience.chaining import Candidate
 from confab.planner.experience.evidence import View, fillers
-from confab.planner.experience.leading import by_rules, rules_in
+from confab.planner.experience.following import Candidate, by_rules, rules_in
 from confab.planner.experience.regression import Course
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.methods import Methods, Roles
 from confab.planner.hierarchical.workspace import Keep
-from confab.planner.paper.learning import LearningError
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.transitions import Cell, Change, arguments_of
 from confab.reasoner.limits import LimitError, check
-from confab.reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
+from confab.reasoner.memory.experience import (
+    ITSELF,
+    Experience,
+    Fact,
+    GoalKind,
+    Ground,
+    LearningError,
+    Lesson,
+    Method,
+    Rule,
+    Tally,
+)
 from confab.reasoner.symbols import Problem, Symbol
 
 SINGLE, OTHERS = 6, 2
@@ -165,7 +174,7 @@ def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
         by_rules(guide)
     check("learning")  # without time for its rules nothing is shown
     for cell in open_:
-        kinds = {rule.goals for rule in guide.by_goal.get((call.program.levels[0], cell[0]), ())}
+        kinds = {rule.goals for rule in guide.rules.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
             (kind, ITSELF, CHOSEN if call.met(cell) else FAILED) for kind in kinds if about(kind, cell, problem)
         ]

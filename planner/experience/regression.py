@@ -18,13 +18,12 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 from confab.planner.hierarchical.operators import named
-from confab.planner.paper.learning import LearningError
 from confab.planner.validation import Facts, Rules
 from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import terms, walk
 from confab.reasoner.limits import check
-from confab.reasoner.memory.experience import Ground, Order, Rule
+from confab.reasoner.memory.experience import Ground, LearningError, Order, Rule
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,

@@ -16,10 +16,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.call import ADVISED, Call, settle
+from confab.planner.hierarchical.call import Call, settle
 from confab.planner.hierarchical.operators import Achiever
 from confab.planner.hierarchical.relevance import waits_for
 from confab.planner.hierarchical.search_budget import (
+    BY_RULES,
     FEW_STEPS,
     MOST_OPERATORS,
     ONE_STEP,
@@ -123,7 +124,7 @@ class Agenda:
         call, first = self.call, self.call.program.levels[0]
         unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
         promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
-        if not unmet and promised == 1 and call.achieve(first, cell, ADVISED):
+        if not unmet and promised == 1 and call.achieve(first, cell, BY_RULES):
             return True
         if not unmet and promised < 2 and call.achieve(first, cell, ONE_STEP):
             return True
@@ -167,7 +168,7 @@ class Agenda:
         call = self.call
         if not self.solvable:
             self._check_cheaply()
-        if call.advice is not None and self.singly(call.program.levels[0], ADVISED):
+        if call.advice is not None and self.singly(call.program.levels[0], BY_RULES):
             return True
         for level in call.program.levels:
             *small, large = scopes(call.program.size(level))
@@ -198,7 +199,7 @@ class Agenda:
                 return True
             if not self.allowed(level, cell) or (cell in call.unseen and not last):
                 continue
-            if budgets == (ADVISED,) or (level, *budgets) in call.failed.get(cell, ()):
+            if budgets == (BY_RULES,) or (level, *budgets) in call.failed.get(cell, ()):
                 continue
             if call.achieve(level, cell, *budgets):
                 return True
@@ -215,11 +216,11 @@ class Agenda:
 
     def advised(self, cell: Cell) -> bool:
         """Achieve a goal by advice that hasn't been tried yet; return whether that succeeded."""
-        call, attempt = self.call, (self.call.program.levels[0], ADVISED)
+        call, attempt = self.call, (self.call.program.levels[0], BY_RULES)
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
         call.failed.setdefault(cell, set()).add(attempt)
-        return call.achieve(attempt[0], cell, ADVISED)
+        return call.achieve(attempt[0], cell, BY_RULES)
 
     def settles(self) -> bool:
         """Return whether a symbol isn't at rest and steps of lower levels haven't been tried to bring it to rest."""

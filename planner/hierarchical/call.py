@@ -20,9 +20,6 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
-ADVISED = SearchBudget(steps=0, questions=0)
-"""Budget for following advice without search."""
-
 
 @dataclass
 class Compiled:
@@ -117,10 +114,7 @@ class Call:
         if inside:
             above = self.space.refining(first)
             keep = lambda cell, value: kept.get(cell) or above(cell, value)  # noqa: E731
-        if budgets == (ADVISED,):
-            steps: Sequence[RefinedStep] | None = self.advice.follow(level, targets, keep) if self.advice else None
-        else:
-            steps = self.refiner.achieve(level, targets, keep, budgets)
+        steps = self.refiner.achieve(level, targets, keep, budgets)
         if steps is None:
             return False
         if inside and last is not None:

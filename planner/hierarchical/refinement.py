@@ -1,6 +1,6 @@
 """The recursion: steps of one level achieve targets; each step is refined by achieving its effects on the level below.
 
-achieve   targets by steps of a level: replayed methods, then a few relevant steps, then scopes; steps found are applied
+achieve   targets by steps of a level: replayed methods, learned rules, a few relevant steps, scopes; steps found are applied
 do        a step: on the lowest level, make its changes; on another level, achieve its effects as targets of the level below,
                     with all symbols that its own level sees unchanged, and all touched symbols at rest in the end
                     (docs/levels.md)
@@ -18,7 +18,7 @@ from confab.planner.hierarchical.chains import Chain
 from confab.planner.hierarchical.methods import Methods, Roles
 from confab.planner.hierarchical.nogoods import Nogoods
 from confab.planner.hierarchical.scope import Scope
-from confab.planner.hierarchical.search_budget import REFINING, SMALL, SearchBudget, scopes
+from confab.planner.hierarchical.search_budget import BY_RULES, REFINING, SMALL, SearchBudget, scopes
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.transitions import Cell, Change, Changes
 from confab.reasoner.amounts import meets
@@ -53,7 +53,7 @@ class Task(NamedTuple):
 
 
 class Advice(Protocol):
-    """Policy that proposes steps before they are searched."""
+    """Learned rules, the first of the budgets."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Apply steps that achieve the targets and keep the rest; on failure return None and leave the table unchanged."""
@@ -99,7 +99,8 @@ class Refiner:
             self.space.apply(changes)
             return RefinedStep(level, name, arguments, bindings, ())
         below = self.levels[self.levels.index(level) + 1]
-        budgets = (REFINING, SMALL) if self.hasty else (REFINING, *scopes(self.space.program.size(below)))
+        larger = (SMALL,) if self.hasty else scopes(self.space.program.size(below))
+        budgets = (BY_RULES, REFINING, *larger)
         targets = self.targets(changes)
         self.at = (name, arguments) if level == self.levels[0] else self.at
         steps = None
@@ -147,8 +148,8 @@ class Refiner:
                     self.replay(step)
                 return self.found[here]
             self.misses += 1
-        found = self.advice.follow(level, targets, keep) if task is not None and self.advice is not None else None
-        for budget in budgets if found is None else ():
+        found = None
+        for budget in budgets:
             found = self.searched(level, targets, keep, budget)
             if found is not None:
                 break
@@ -164,6 +165,8 @@ class Refiner:
 
         If steps leave a touched symbol with a wrong value, the search is repeated with that symbol as an additional target.
         """
+        if budget.rules:
+            return self.advice.follow(level, targets, keep) if self.advice is not None else None
         if budget.steps == 0 and self.nogoods.apply(level, targets, keep, budget):
             return None
         table, mark, wanted = self.table, len(self.table.trail), dict(targets)

@@ -1,4 +1,4 @@
-"""Search budgets: a few relevant steps first, then scopes, each of which costs about as much as all searches before it."""
+"""Search budgets: learned rules, a few relevant steps, then scopes, each about as expensive as all searches before it."""
 
 from __future__ import annotations
 
@@ -24,14 +24,19 @@ class SearchBudget:
         Number of additional individuals of each symmetry class in the scope.
     work : int
         Maximum work of one search, in states times operators.
+    rules : bool
+        Whether learned rules are followed instead.
     """
 
     steps: int = 0
     questions: int | None = None
     spares: int = 1
     work: int = 200_000
+    rules: bool = False
 
 
+BY_RULES = SearchBudget(rules=True)
+"""Learned rules, if there are any; they limit their own work."""
 ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), SearchBudget(steps=4)
 """One step; maximum number of relevant steps towards goals, and in refinements: CPU time against that of scopes."""
 SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)

@@ -8,12 +8,9 @@ from confab.planner.paper.cogency import PAPER, PaperConstants, situation
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step
 from confab.reasoner.limits import check
+from confab.reasoner.memory.experience import LearningError
 from confab.reasoner.memory.links import Conclusion, Links
 from confab.reasoner.symbols import GroundBehavior, Problem, State
-
-
-class LearningError(ValueError):
-    """The plan isn't applicable in the scene's situation, so nothing can be learned from it."""
 
 
 def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:

@@ -32,6 +32,10 @@ Fact: TypeAlias = "tuple[str, str]"
 ITSELF: Fact = ("", "")
 
 
+class LearningError(ValueError):
+    """The plan isn't applicable in the scene's situation, so nothing can be learned from it."""
+
+
 def _named(kind: str, said: object) -> str:
     import hashlib  # imported on use: planning without memory needs no names
 

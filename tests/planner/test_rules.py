@@ -13,7 +13,7 @@ import pytest
 import confab
 from confab.planner.experience.advice import Memory, plan
 from confab.planner.experience.evidence import View
-from confab.planner.experience.leading import FREE, Guide, rules_in
+from confab.planner.experience.following import FREE, Guide, rules_in
 from confab.planner.experience.lessons import compared, live, teach
 from confab.planner.experience.regression import Course
 from confab.planner.grounded.task import Task
@@ -23,7 +23,6 @@ from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.workspace import EXPANSION
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
-from confab.planner.transitions import Cell
 from confab.planner.validation import validate
 from confab.reasoner.amounts import LESS, MORE
 from confab.reasoner.language import terms
@@ -191,9 +190,9 @@ def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> No
     kinds = {rule.goals for rule in memory.rules}
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
     call = Call(within, compiled(within), None, 1000)
-    followed = Memory(poor).guide(call, "guarded").by_goal
+    followed = Memory(poor).guide(call, "guarded").rules
     assert {level for level, _ in followed} == {2, 3}  # the record is of goals of a task, not of refinements
-    assert Memory(poor).guide(call, "leading").by_goal == memory.guide(call, "guarded").by_goal != {}
+    assert Memory(poor).guide(call, "leading").rules == memory.guide(call, "guarded").rules != {}
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
@@ -344,10 +343,10 @@ def test_where_a_level_is_left_rules_still_act_on_the_level_of_their_behaviours_
     experience = Experience("robot")
     teach(experience, within)
     guide = Guide(Call(within, compiled(within), None, 1000), rules_in(experience))
-    assert {level for level, _ in guide.by_goal} > {1}
+    assert {level for level, _ in guide.rules} > {1}
     assert all(
         within.domain.behaviors[rule.does[0]].level == level
-        for (level, _), rules in guide.by_goal.items()
+        for (level, _), rules in guide.rules.items()
         for rule in rules
     )
     alone, led = fast.plan(within), plan(within, Memory(experience))
@@ -396,27 +395,6 @@ def test_where_anything_would_do_rules_take_what_nobody_has_and_no_goal_wants() 
         assert alone.plan is not None
         assert led.plan is not None
         assert len(led.plan.steps) <= len(alone.plan.steps)
-
-
-def test_a_farther_way_is_looked_for_when_the_nearer_ones_are_none() -> None:
-    within = confab.load("packing-large").problem
-    experience = Experience("robot")
-    teach(experience, confab.load("packing-small").problem)
-    call = Call(within, compiled(within), None, 1000)
-    chains, goals = Memory(experience).guide(call).chains, list(Memory(experience).guide(call).open().items())
-    asked, within_ = [0], chains.within
-
-    def counted(level: int, goal: tuple[Cell, str], most: int, everybody: bool) -> bool:
-        asked[0] += 1
-        return within_(level, goal, most, everybody)
-
-    chains.within = counted  # type: ignore[method-assign]
-    ways = [chains.nearest(1, goal) for goal in goals]
-    found = [next(its, None) for its in ways]
-    once = asked[0]
-    assert all(found)
-    assert all(far >= first[0] for first, its in zip(found, ways, strict=True) if first for far, _ in its)
-    assert asked[0] > 1.5 * once
 
 
 def test_who_only_follows_rules_does_not_load_how_they_are_learned() -> None:
@@ -584,7 +562,7 @@ def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: P
     guide = Guide(Call(small, compiled(small), None, 1000), rules_in(experience))
     (goal,) = guide.open().items()
     # To press a cheese needs it in a mould, which is needed for salting it, too, and was found one rule nearer.
-    assert guide.chains.far(guide.first, goal) == 6
+    assert guide.far(guide.first, goal) == 6
 
 
 LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing place room - object lorry crate - thing)
@@ -674,4 +652,4 @@ def test_who_is_somewhere_else_does_not_stand_for_all_of_his_kind(tmp_path: Path
     islands = lorries(tmp_path, 12, 48, 48, 4)
     guide = Guide(Call(islands, compiled(islands), None, 1000), rules_in(experience))
     # On each island there is one lorry, and no other gets there.
-    assert all(guide.chains.far(guide.first, goal) < inf for goal in guide.open().items())
+    assert all(guide.far(guide.first, goal) < inf for goal in guide.open().items())
