@@ -22,9 +22,10 @@ from confab.execution import execute
 from confab.gantt import save_gantt
 from confab.labels import labels_of
 from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
-from confab.planner.acting.executive import RetryPolicy, act
+from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.repair import difference, repair_or_replan, replan
+from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, disturbed, with_individual
 from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import compiled

@@ -17,7 +17,7 @@ from benchmarks.browser import Browser
 from confab.history import history_html, new_folder, runs
 from confab.page.data import page_data
 from confab.page.frozen import write_page
-from confab.planner.acting.executive import Event
+from confab.planner.acting.episode import Event
 from confab.reasoner.files import write_whole
 from confab.running import Job, run
 from confab.serving import serving

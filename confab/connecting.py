@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from confab.planner.acting.executive import RetryPolicy
+from confab.planner.acting.retries import RetryPolicy
 from confab.reasoner.embodiment.interfaces import Interface, read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import Problem

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
 from confab.interchange import step_json
-from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
-from confab.planner.acting.executive import Event, RetryPolicy, act
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
+from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
+from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, Step, renumbered

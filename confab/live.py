@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from confab.planner.acting.executive import Event
+from confab.planner.acting.episode import Event
 
 if TYPE_CHECKING:
     from rich.console import Group

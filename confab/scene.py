@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
-    from confab.planner.acting.executive import Event
+    from confab.planner.acting.episode import Event
     from confab.planner.acting.world import World
     from confab.reasoner.graph.query_process import QueryLimits
     from confab.why import Account

@@ -54,7 +54,7 @@ from confab.table import Table
 
 if TYPE_CHECKING:
     from confab.known import Known
-    from confab.planner.acting.executive import Event
+    from confab.planner.acting.episode import Event
 
 log = logging.getLogger(__name__)
 transport_log = log.getChild("transport")

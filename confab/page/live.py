@@ -12,7 +12,7 @@ from confab.page.data import page_labels, timeline_data
 from confab.page.results import goals_of
 from confab.page.schema import PageData, Row
 from confab.page.timeline import Bar, Period, Timeline
-from confab.planner.acting.executive import Event
+from confab.planner.acting.episode import Event
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem, Symbol
 

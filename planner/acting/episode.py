@@ -9,7 +9,7 @@ from enum import Enum
 from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, State, Symbol
+from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 
 class InterventionKind(Enum):
@@ -194,3 +194,22 @@ class Episode:
     course: tuple[Seen, ...] = ()
     refuted: tuple[Refutation, ...] = ()
     discovered: tuple[tuple[Discovery, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event for observers of the execution.
+
+    `seconds` is the time on the world's clock, `belief` the task as the executive believes it to be, with the present situation as
+    its initial state.
+    """
+
+    what: str  # plan, begin, end, intervention, discovery, repair, replan, over
+    plan: Plan
+    done: frozenset[tuple[int, ...]]
+    step: Step | None = None
+    expected: tuple[Fact, ...] = ()
+    surprises: tuple[Surprise, ...] = ()
+    text: str = ""
+    seconds: float = 0.0
+    belief: Problem | None = None

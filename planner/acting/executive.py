@@ -14,16 +14,17 @@ Rule 4: every loop ends: primitives and failures are counted, planning has limit
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
+from confab.planner.acting.agenda import Agenda, Postponed, ReplanRequest
 from confab.planner.acting.belief import Belief
 from confab.planner.acting.episode import (
     End,
     Episode,
+    Event,
     ExecutedPrimitive,
     Failure,
     Intervention,
@@ -34,9 +35,10 @@ from confab.planner.acting.episode import (
 from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_by
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
+from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
 from confab.planner.acting.step_trees import all_steps, first_chain, tree_of, without_first
+from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Report, Verdict, World, WorldError
-from confab.planner.hierarchical.planner import compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.validation import open_goals, successor
@@ -45,48 +47,13 @@ from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 
-@dataclass(frozen=True)
-class RetryPolicy:
-    """Limits of an episode: attempts per primitive, total failures, primitives begun per primitive planned, and planning limits.
-
-    `rounds` is the number of times that failed steps are tried once no alternative is left, since the situation may have changed
-    and a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
-    each planning call; the whole episode ends by the current deadline (`confab.reasoner.limits.within`).
-    """
-
-    attempts: int = 2
-    failures: int = 16
-    rounds: int = 3
-    primitives: int = 20
-    planning: Limits = Limits(seconds=20.0)  # noqa: RUF009 - frozen
-
-
-@dataclass(frozen=True)
-class Event:
-    """An event for observers of the execution.
-
-    `seconds` is the time on the world's clock, `belief` the task as the executive believes it to be, with the present situation as
-    its initial state.
-    """
-
-    what: str  # plan, begin, end, intervention, discovery, repair, replan, over
-    plan: Plan
-    done: frozenset[tuple[int, ...]]
-    step: Step | None = None
-    expected: tuple[Fact, ...] = ()
-    surprises: tuple[Surprise, ...] = ()
-    text: str = ""
-    seconds: float = 0.0
-    belief: Problem | None = None
-
-
 def act(
     problem: Problem,
     world: World,
     plan: Plan | None = None,
     interventions: Sequence[Intervention] = (),
     planner: Planner | None = None,
-    retry_policy: RetryPolicy = RetryPolicy(),
+    retry_policy: RetryPolicy = DEFAULT,
     observer: Callable[[Event], None] | None = None,
     repairs: bool = True,
     caution: Caution | None = None,
@@ -119,16 +86,16 @@ def act(
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
-    run = _Run(Belief(problem), Guarded(world), list(interventions), planner, retry_policy, observer, repairs)
+    run = _Run(Belief(problem), Guarded(world), list(interventions), planner, Retries(retry_policy), observer, repairs)
     try:
         run.look(run.belief.state)
         run.start(plan)
         while run.going:
             check("acting")
             run.intervene()
-            if run.puzzled:
+            if run.request.why:
                 run.reconsider()
-            elif not run.agenda:
+            elif not run.agenda.steps:
                 run.finish()
             elif (expected := run.expected()) is None:
                 run.request_replan("the next primitive's precondition doesn't hold")
@@ -153,24 +120,15 @@ class _Run:
     world: Guarded
     waiting: list[Intervention]
     planner: Planner | None
-    retry_policy: RetryPolicy
+    retries: Retries
     observer: Callable[[Event], None] | None
     repairs: bool
-    agenda: tuple[Step, ...] = ()
     going: bool = True
-    puzzled: str = ""
-    begun: dict[tuple[int, ...], State] = field(default_factory=dict)
-    attempts: Counter[tuple[str, tuple[str, ...]]] = field(default_factory=Counter)
-    aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
-    put_off: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
-    rounds: int = 1
-    room_wanted: bool = False
-    pondered: Counter[object] = field(default_factory=Counter)
-    sound: bool = True
-    missed: dict[Symbol, str | None] = field(default_factory=dict)
+    goals: Postponed = field(default_factory=Postponed)
+    request: ReplanRequest = field(default_factory=ReplanRequest)
 
     def __post_init__(self) -> None:
-        self.record, self.planned_for = Record(self.belief.state), self.belief.problem
+        self.record, self.agenda = Record(self.belief.state), Agenda(self.belief.problem)
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -180,19 +138,19 @@ class _Run:
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
-        begun, outcome, limits = plan, None, self.retry_policy.planning
+        begun, outcome, limits = plan, None, self.retries.policy.planning
         if begun is None:
-            self.puzzled = ""
+            self.request.why = ""
             self.set_aside_the_vanished()
             begin = perf_counter()
             steps, outcome = replan(self.belief.problem, self.planner, self.belief.using, limits)
             record.seconds["planning"] += perf_counter() - begin
             begun = Plan(renumbered(steps or ()))
-        self.agenda, record.planned, self.planned_for = begun.steps, begun, self.belief.problem
-        self.most = self.retry_policy.primitives * max(len(begun.primitives), 20)
+        self.agenda.steps, record.planned, self.agenda.planned_for = begun.steps, begun, self.belief.problem
+        self.retries.most = self.retries.policy.primitives * max(len(begun.primitives), 20)
         if outcome is not None and outcome.plan is None:
             self.on_no_plan(outcome, limits)
-        self.say("plan", text="; ".join(reason.text for _, reason in self.aside.values()))
+        self.say("plan", text="; ".join(reason.text for _, reason in self.goals.aside.values()))
 
     def finish(self) -> None:
         """End the episode, check the agenda again, or take up a goal that was put off: no step is left."""
@@ -200,11 +158,11 @@ class _Run:
         if missing := open_goals(self.belief.problem):
             self.request_replan(f"{missing[0]} doesn't hold yet")
             return
-        if self.put_off and self.try_anew("the rest is done"):
+        if self.goals.put_off and self.try_anew("the rest is done"):
             return
-        if self.put_off:
+        if self.goals.put_off:
             record.status = End.GAVE_UP
-        for _, reason in (*self.aside.values(), *self.put_off.values()):
+        for reason in self.goals.reasons():
             record.reason(reason)
         self.going = False
         if record.reasons and record.status is End.REACHED:
@@ -230,7 +188,7 @@ class _Run:
             return
         done, events = self.record.done, self.record.events
         surprises = events[-1].surprises if events and what == "end" else ()
-        whole = Plan(tree_of({**done, **{p.path: p for p in all_steps(self.agenda)}}))
+        whole = Plan(tree_of({**done, **{p.path: p for p in all_steps(self.agenda.steps)}}))
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
@@ -242,7 +200,7 @@ class _Run:
 
     def expected(self) -> dict[Symbol, str] | None:
         """Return the expected situation after the next primitive; None if its precondition doesn't hold."""
-        step, problem = first_chain(self.agenda)[-1], self.belief.problem
+        step, problem = first_chain(self.agenda.steps)[-1], self.belief.problem
         return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
@@ -250,10 +208,10 @@ class _Run:
 
         Returns the primitive with its ancestors, the situation before, and the verdict.
         """
-        chain, record = first_chain(self.agenda), self.record
+        chain, record = first_chain(self.agenda.steps), self.record
         step, before = chain[-1], self.belief.problem.initial
         for above in chain[:-1]:
-            self.begun.setdefault(above.path, before)
+            self.agenda.begun.setdefault(above.path, before)
         changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
         self.say("begin", step, changes)
         begin = self.world.seconds
@@ -272,12 +230,12 @@ class _Run:
         )
         if done:
             record.done.update((above.path, above) for above in chain)
-            self.agenda = without_first(self.agenda)
+            self.agenda.steps = without_first(self.agenda.steps)
         if surprises:
             self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
         self.say("end", step, changes)
-        if len(record.events) >= self.most:
-            self.give_up(Reason(f"stopped at the limit of {self.most} primitives"))
+        if len(record.events) >= self.retries.most:
+            self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
@@ -313,7 +271,7 @@ class _Run:
         if not self.waiting:
             return
         done = self.record.done
-        gone = set(done) - {step.path for step in all_steps(self.agenda[:1])}
+        gone = set(done) - {step.path for step in all_steps(self.agenda.steps[:1])}
         first = self.belief.problem.domain.levels[0]
         finished = {done[path].id for path in gone if done[path].level == first}
         due = [i for i in self.waiting if (i.after in finished if isinstance(i.after, int) else i.after in gone)]
@@ -341,10 +299,10 @@ class _Run:
         goal = self.belief.goal
         if intervention.change is InterventionKind.GOAL:
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
-            self.forget(fact.symbol for fact in intervention.facts)
+            self.goals.forget(fact.symbol for fact in intervention.facts)
         elif intervention.change is InterventionKind.DROP_GOAL and intervention.symbol is not None:
             goal.pop(intervention.symbol, None)
-            self.forget([intervention.symbol])
+            self.goals.forget([intervention.symbol])
         elif intervention.change is InterventionKind.ADD:
             self.belief.add(intervention.individual, (intervention.kind,))
         if goal != self.belief.problem.goal:
@@ -352,79 +310,64 @@ class _Run:
             self.request_replan("something else is wanted")
         self.say("intervention", text=intervention.text)
 
-    def forget(self, symbols: Iterable[Symbol]) -> None:
-        """Drop goals that were set aside or put off."""
-        for symbol in symbols:
-            self.aside.pop(symbol, None)
-            self.put_off.pop(symbol, None)
-
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
         """Request another check of the agenda."""
-        if why not in self.puzzled:
-            self.puzzled = f"{self.puzzled}; {why}" if self.puzzled else why
+        self.request.add(why)
         for surprise in surprises:
-            self.missed.setdefault(surprise.symbol, surprise.expected)
+            self.request.missed.setdefault(surprise.symbol, surprise.expected)
         changes = {s.symbol: s.observed for s in surprises}
-        for step in first_chain(self.agenda)[:-1]:
-            if step.path in self.begun:
-                as_if = {s: v for s, v in {**self.begun[step.path], **changes}.items() if v is not None}
-                self.sound = self.sound and self.belief.could_begin(step.behavior, step.arguments, as_if)
+        for step in first_chain(self.agenda.steps)[:-1]:
+            if step.path in self.agenda.begun:
+                as_if = {s: v for s, v in {**self.agenda.begun[step.path], **changes}.items() if v is not None}
+                self.agenda.sound = self.agenda.sound and self.belief.could_begin(step.behavior, step.arguments, as_if)
 
     # --------------------------------------------------------------------------------------------------- repairing
 
     def reconsider(self) -> None:
         """Repair the agenda, or replan; set aside unreachable goals."""
-        why, self.puzzled, belief, record = self.puzzled, "", self.belief, self.record
-        if self.missed:
-            self.want_again(self.aside)
+        why, self.request.why, belief, record = self.request.why, "", self.belief, self.record
+        if self.request.missed:
+            self.want_again(self.goals.aside)
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
-        doubts = len(belief.withdrawn), len(belief.refuted), self.rounds
+        doubts = len(belief.withdrawn), len(belief.refuted), self.retries.rounds
         standing = (*counted, *doubts, record.status, *belief.problem.goal)
-        self.pondered[standing] += 1
-        if self.pondered[standing] > self.retry_policy.rounds:
-            text = f"planned {self.retry_policy.rounds} times in the same situation, and no step could be done: {why}"
+        self.retries.pondered[standing] += 1
+        if self.retries.pondered[standing] > self.retries.policy.rounds:
+            text = f"planned {self.retries.policy.rounds} times in the same situation, and no step could be done: {why}"
             self.give_up(Reason(text))
             return
         begin = perf_counter()
-        limits, old = self.retry_policy.planning, self.agenda
+        limits, old = self.retries.policy.planning, self.agenda.steps
         end = limits.end()
         if self.repairs:
-            expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
-            planned = replace(self.planned_for, initial=expected)
-            repaired = repair_or_replan(belief.problem, old, planned, self.planner, belief.using, self.sound, limits)
+            expected = {s: v for s, v in {**belief.state, **self.request.missed}.items() if v is not None}
+            planned = replace(self.agenda.planned_for, initial=expected)
+            repaired = repair_or_replan(
+                belief.problem, old, planned, self.planner, belief.using, self.agenda.sound, limits
+            )
             kind, steps, cost, outcome = repaired.kind, repaired.steps, repaired.cost, repaired.outcome
         else:
             steps, outcome = replan(belief.problem, self.planner, belief.using, limits)
             kind, cost = "replan", float(len(Plan(steps or ()).primitives))
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
-        self.planned_for, self.sound, self.missed = belief.problem, True, {}
+        self.agenda.planned_for, self.agenda.sound, self.request.missed = belief.problem, True, {}
         if steps is None:
             self.on_no_plan(outcome, limits.until(end))
             return
-        self.agenda = self.numbered(steps)
+        self.agenda.steps = self.agenda.numbered(steps, record.done)
         dropped, added = difference(old, steps)
         if dropped or added:
             last = record.events[-1].step.path if record.events else ()
-            record.replans.append(Replan(last, kind, why, self.agenda, cost, dropped, added, seconds))
+            record.replans.append(Replan(last, kind, why, self.agenda.steps, cost, dropped, added, seconds))
             self.say(kind, text=why)
-
-    def numbered(self, steps: Sequence[Step]) -> tuple[Step, ...]:
-        """Return steps with their paths in the tree of executed steps; a step in progress keeps its path."""
-        done = self.record.done
-        following = 1 + max((path[0] for path in done), default=-1)
-        if steps and self.agenda and self.agenda[0].path[:1] in {path[:1] for path in done}:
-            now, new = self.agenda[0], steps[0]
-            if [str(s) for s in now.walk()] == [str(s) for s in new.walk()]:
-                return (now, *renumbered(steps[1:], following))
-        return renumbered(steps, following)
 
     def set_aside(self, impossible: Mapping[Symbol, Reason]) -> None:
         """Drop an impossible goal, and record the reason."""
         if impossible:
             goal = self.belief.goal
-            self.aside |= {symbol: (goal[symbol], reason) for symbol, reason in impossible.items()}
+            self.goals.aside |= {symbol: (goal[symbol], reason) for symbol, reason in impossible.items()}
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
@@ -452,10 +395,14 @@ class _Run:
             alone = replace(belief.problem, goal={fact.symbol: fact.value})
             steps, single = replan(alone, None, belief.using, limits.until(end))
             if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
-                hopeless[fact.symbol] = self.blocked(fact, limits.until(end)) or self.told(fact, single.reason)
+                hopeless[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(
+                    belief, self.record, fact, single.reason
+                )
         if hopeless and belief.doubted:
             goal = belief.goal
-            self.put_off |= {symbol: (goal[symbol], self.blamed(symbol, goal[symbol])) for symbol in hopeless}
+            self.goals.put_off |= {
+                symbol: (goal[symbol], blamed(self.record, symbol, goal[symbol])) for symbol in hopeless
+            }
             belief.want({s: v for s, v in goal.items() if s not in hopeless})
             self.request_replan("what can't be reached is put off")
         elif hopeless:
@@ -466,9 +413,9 @@ class _Run:
 
     def make_room(self) -> bool:
         """Request, once, spots besides the scene's places from the world; return whether it has any."""
-        if self.room_wanted:
+        if self.retries.room_wanted:
             return False
-        self.room_wanted = True
+        self.retries.room_wanted = True
         spots = self.world.free_spots()
         for spot in spots:
             self.belief.meet(spot)
@@ -477,49 +424,18 @@ class _Run:
             self.request_replan(f"no place is free; {', '.join(spot.individual for spot in spots)} would be")
         return bool(spots)
 
-    def blocked(self, fact: Fact, limits: Limits) -> Reason | None:
-        """Return the reason if a goal is blocked by immovable objects only; None otherwise."""
-        if not self.belief.obstacles:
-            return None
-        free = self.belief.without_obstacles({fact.symbol: fact.value})
-        steps, _ = replan(free, None, compiled(free), limits)
-        if steps is None:
-            return None
-        things = self.belief.obstacles
-        where = {name: [v for s, v in self.belief.state.items() if s.arguments[0] == name] for name in things}
-        told = "; ".join(f"{name} at {', '.join(where[name])} ({found.fixed})" for name, found in things.items())
-        return Reason(f"{fact} is blocked by {told}", (*fact.symbol.arguments, fact.value, *things))
-
-    def told(self, fact: Fact, reason: Reason) -> Reason:
-        """Return the reason why a goal is unreachable, with the discoveries about its objects."""
-        there = {v for s, v in self.belief.state.items() if s.arguments[0] in fact.symbol.arguments}
-        found = [one.text for one, _ in self.record.discovered if one.individual in there and one.text]
-        return replace(reason, text="; ".join((*found, reason.text))) if found else reason
-
-    def blamed(self, symbol: Symbol, value: str) -> Reason:
-        """Return the reason for giving up a goal: the last failure that concerns it, or the last one of all."""
-        concerned = {*symbol.arguments, value}
-        failures = self.record.failures
-        near = [f for f in failures if concerned & {*f.objects, *f.step.arguments, *f.step.bindings.values()}]
-        text, objects = f"{symbol} = {value} is given up", tuple[str, ...]()
-        for failure in (near or failures)[-1:]:
-            told = ", ".join(failure.objects) if failure.message in ("", failure.code) else failure.message
-            text, objects = f"{text}: {failure.step} failed, {failure.code}: {told}", failure.objects
-        return Reason(text, (*symbol.arguments, value, *objects))
-
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
         """Drop all goals, so that only rest values remain; stop at once if that was done already."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
-        for _, earlier in (*self.aside.values(), *self.put_off.values()):
+        for earlier in self.goals.reasons():
             self.record.reason(earlier)
         self.record.reason(reason)
         self.belief.want({})
-        self.aside.clear()
-        self.put_off.clear()
-        self.most = len(self.record.events) + self.retry_policy.primitives
-        self.puzzled = reason.text
+        self.goals.clear()
+        self.retries.most = len(self.record.events) + self.retries.policy.primitives
+        self.request.why = reason.text
 
     # ---------------------------------------------------------------------------------------------------- failures
 
@@ -531,8 +447,8 @@ class _Run:
             return
         record.failures.append(Failure(step, code, verdict.objects, verdict.message, before))
         if step.path not in record.done:
-            self.attempts[step.behavior, step.arguments] += 1
-        if len(record.failures) >= self.retry_policy.failures:
+            self.retries.attempts[step.behavior, step.arguments] += 1
+        if len(record.failures) >= self.retries.policy.failures:
             text = f"stopped after {len(record.failures)} failures, the last of {step}: {verdict.message or code}"
             self.give_up(Reason(text, verdict.objects))
             return
@@ -541,9 +457,9 @@ class _Run:
         if refuted and not belief.refuted.keys() >= {*refuted}:
             record.refuted |= dict.fromkeys(refuted)
             self.rethink(f"{refuted[-1]}", refutations=refuted)
-        elif self.attempts[step.behavior, step.arguments] >= self.retry_policy.attempts:
+        elif self.retries.attempts[step.behavior, step.arguments] >= self.retries.policy.attempts:
             relied_on = relied_on_by(belief.problem, chain)
-            why = f"{step} failed {self.retry_policy.attempts} times ({code})"
+            why = f"{step} failed {self.retries.policy.attempts} times ({code})"
             never = () if relied_on else (Refutation(step.behavior, step.arguments, (), code),)
             self.rethink(why, relied_on, never)
 
@@ -555,18 +471,16 @@ class _Run:
     ) -> None:
         """Doubt static facts or the applicability of behaviours, and plan the step in progress again."""
         self.belief.doubt(facts, refutations)
-        self.sound = False
+        self.agenda.sound = False
         self.request_replan(why)
 
     def try_anew(self, why: str) -> bool:
         """Drop all doubts and take up goals that were put off, if a round is left; return whether one was."""
-        if self.rounds >= self.retry_policy.rounds:
+        if not self.retries.another_round():
             return False
-        self.rounds += 1
-        self.attempts.clear()
         self.belief.trust_again()
-        self.want_again(self.put_off)
-        self.sound = False
+        self.want_again(self.goals.put_off)
+        self.agenda.sound = False
         self.request_replan(f"tried anew: {why}")
         return True
 

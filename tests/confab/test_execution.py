@@ -13,8 +13,7 @@ import confab
 from confab import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from confab.planner.acting.episode import Intervention, InterventionKind
-from confab.planner.acting.executive import Event
+from confab.planner.acting.episode import Event, Intervention, InterventionKind
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.memory.episodes import assert_episode

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
-from confab.planner.acting.executive import Event, RetryPolicy, act
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
+from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
+from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import plan

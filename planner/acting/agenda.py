@@ -1,0 +1,83 @@
+"""What remains to be done: the steps, the goals that are postponed, and why the steps are to be checked again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from confab.planner.plan import Reason, Step, renumbered
+from confab.reasoner.symbols import Problem, State, Symbol
+
+
+@dataclass
+class Agenda:
+    """The steps that are still to be done; the first may be partly done.
+
+    Attributes
+    ----------
+    planned_for : Problem
+        The task that they were planned for.
+    steps : tuple of Step
+    begun : mapping of path to State
+        The situation before each step in progress.
+    sound : bool
+        Whether the steps in progress could also begin if what was observed since then had held before.
+    """
+
+    planned_for: Problem
+    steps: tuple[Step, ...] = ()
+    begun: dict[tuple[int, ...], State] = field(default_factory=dict)
+    sound: bool = True
+
+    def numbered(self, steps: Sequence[Step], done: Mapping[tuple[int, ...], Step]) -> tuple[Step, ...]:
+        """Return steps with their paths in the tree of executed steps; a step in progress keeps its path."""
+        following = 1 + max((path[0] for path in done), default=-1)
+        if steps and self.steps and self.steps[0].path[:1] in {path[:1] for path in done}:
+            now, new = self.steps[0], steps[0]
+            if [str(s) for s in now.walk()] == [str(s) for s in new.walk()]:
+                return (now, *renumbered(steps[1:], following))
+        return renumbered(steps, following)
+
+
+@dataclass
+class ReplanRequest:
+    """A request to check the agenda: the reason, empty if there is none, and the expected values that were not observed."""
+
+    why: str = ""
+    missed: dict[Symbol, str | None] = field(default_factory=dict)
+
+    def add(self, why: str) -> None:
+        """Add a reason."""
+        if why not in self.why:
+            self.why = f"{self.why}; {why}" if self.why else why
+
+
+@dataclass
+class Postponed:
+    """Goals that are not pursued for now, each with its value and the reason.
+
+    Attributes
+    ----------
+    aside : mapping of Symbol to (value, Reason)
+        Goals that are impossible in the present situation.
+    put_off : mapping of Symbol to (value, Reason)
+        Goals that are unreachable while doubts hold.
+    """
+
+    aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
+    put_off: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
+
+    def reasons(self) -> Iterator[Reason]:
+        """Yield the reasons."""
+        yield from (reason for _, reason in (*self.aside.values(), *self.put_off.values()))
+
+    def forget(self, symbols: Iterable[Symbol]) -> None:
+        """Drop goals that were set aside or put off."""
+        for symbol in symbols:
+            self.aside.pop(symbol, None)
+            self.put_off.pop(symbol, None)
+
+    def clear(self) -> None:
+        """Drop all of them."""
+        self.aside.clear()
+        self.put_off.clear()

@@ -1,0 +1,62 @@
+"""How often an episode tries again: the limits, and what was tried."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from confab.planner.plan import Limits
+
+
+@dataclass(frozen=True)
+class RetryPolicy:
+    """Limits of an episode: attempts per primitive, total failures, primitives begun per primitive planned, and planning limits.
+
+    `rounds` is the number of times that failed steps are tried once no alternative is left, since the situation may have changed
+    and a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
+    each planning call; the whole episode ends by the current deadline (`confab.reasoner.limits.within`).
+    """
+
+    attempts: int = 2
+    failures: int = 16
+    rounds: int = 3
+    primitives: int = 20
+    planning: Limits = Limits(seconds=20.0)  # noqa: RUF009 - frozen
+
+
+DEFAULT = RetryPolicy()
+
+
+@dataclass
+class Retries:
+    """The attempts so far.
+
+    Attributes
+    ----------
+    policy : RetryPolicy
+    attempts : mapping of behaviour and arguments to int
+        The number of failures of each primitive since doubts were dropped.
+    rounds : int
+        The number of times that failed steps were tried, the first included.
+    pondered : mapping of situation to int
+        The number of checks of the agenda in each situation.
+    room_wanted : bool
+        Whether the world was asked for free spots.
+    most : int
+        Maximum number of primitives of the episode.
+    """
+
+    policy: RetryPolicy
+    attempts: Counter[tuple[str, tuple[str, ...]]] = field(default_factory=Counter)
+    rounds: int = 1
+    pondered: Counter[object] = field(default_factory=Counter)
+    room_wanted: bool = False
+    most: int = 0
+
+    def another_round(self) -> bool:
+        """Begin another round, if one is left; return whether one was."""
+        if self.rounds >= self.policy.rounds:
+            return False
+        self.rounds += 1
+        self.attempts.clear()
+        return True
