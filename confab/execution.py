@@ -339,7 +339,7 @@ class Execution:
             )
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
-        return text + (f"; never came: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
+        return text + (f"; didn't take place: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives: an edge from each to those that depend on it."""

@@ -120,7 +120,11 @@ def summary(outcome: Outcome) -> str:
         return f"solved: nothing to do, since all goals hold ({outcome.seconds * 1000:.0f} ms)"
     bound = _proved(outcome.plan, outcome.cost, outcome.bound)
     counts = outcome.plan.length
-    on = " per level" if not counts or min(counts) == 1 else f" on levels {' / '.join(map(str, counts))}"
+    on = (
+        " per level"
+        if not counts or min(counts) == 1
+        else f" on level{'s' * (len(counts) > 1)} {' / '.join(map(str, counts))}"
+    )
     effort = f"{expanded} expansions in all"
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"

@@ -317,11 +317,11 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
     ----------
     certificate : Certificate
     labels : Labels
-        What people call the facts that the certificate names.
+        The labels of the facts that the certificate names.
     """
     amounts = {name for name, kind in labels.domain.situations.items() if kind.quantity is not None}
     kept = [Fact(symbol, value) for symbol, value in sorted(certificate.always.items())]
-    lines = ["An independent checker has verified this of every state that can be reached:"]
+    lines = ["An independent checker has verified this for every reachable state:"]
     lines += _listed("never: ", [labels.fact(fact) for fact in sorted(certificate.never)])
     lines += _listed("always: ", [labels.fact(fact) for fact in kept if fact.symbol.situation not in amounts])
     bounded = [f"{labels.about(fact.symbol)} is {fact.value}" for fact in kept if fact.symbol.situation in amounts]
@@ -330,7 +330,8 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
         about = [labels.about(symbol) for symbol in sorted(certificate.told_apart)]
         more = f" and {len(about) - MOST_TOLD} more" * (len(about) > MOST_TOLD)
         cases = f"{certificate.cases} combination{'s' * (certificate.cases != 1)}"
-        lines.append(f"of the values of {'; '.join(about[:MOST_TOLD])}{more}, {cases} can be reached")
+        named = ", ".join(f"“{one}”" for one in about[:MOST_TOLD])
+        lines.append(f"of the values of {named}{more}, {cases} {'is' if certificate.cases == 1 else 'are'} reachable")
     goals = " and ".join(labels.fact(fact) for fact in certificate.unmet[:MOST_TOLD])
     never = "these never hold together" if len(certificate.unmet) > 1 else "this never holds"
     return (*lines, f"The goal requires that {goals}; {never}.")
@@ -454,7 +455,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
         return WhyNot(
             asked,
-            f"“{what}” can't be done. In the place of {place}, where the fewest of its preconditions fail, it requires that",
+            f"“{what}” isn't applicable. In place of {place}, where the fewest preconditions fail, it would require that",
             lacks,
         )
     if found.plan is not None:

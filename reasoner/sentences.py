@@ -98,6 +98,13 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         return last.replace(mark, whole)
     if which == "some" and all(_is_subject(mark, clause) for clause in clauses):
         return f"{whole} {' and '.join(clause.removeprefix(f'{mark} ') for clause in clauses)}"
+    inner = [c for c in clauses if c.startswith("some ") and c.endswith(f" {mark}") and c.count(mark) == 1]
+    if which == "no" and len(inner) == 1 < len(clauses) and words is not str:
+        rest = [_relative(mark, clause) for clause in clauses if clause != inner[0]]
+        if None not in rest:  # "no item is at a place that is full"
+            return (
+                f"no {inner[0].removeprefix('some ').removesuffix(mark)}{an(kind)} {' and '.join(filter(None, rest))}"
+            )
     relative = [_relative(mark, clause) for clause in before]
     if _is_subject(mark, last) and None not in relative:
         return " ".join(

@@ -385,7 +385,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         else:
             graph.store.load(input=timed, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
         if any(sign in content for sign in TRIPLE_TERMS) and graph.query(HAS_TRIPLE_TERM, [name]):
-            raise KnowledgeError(f"{file}: speaks of triples (RDF 1.2), which OWL doesn't know; take them out")
+            raise KnowledgeError(f"{file}: contains triple terms (RDF 1.2), which OWL doesn't have; remove them")
         read_prefixes(graph, file)
 
 

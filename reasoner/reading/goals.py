@@ -82,7 +82,9 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if situation.boolean and len(rest) == len(situation.arguments) - 1:
         rest.append(TRUE)
     if len(rest) != len(situation.arguments):
-        raise KnowledgeError(f"'{fact}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
+        many = len(situation.arguments)
+        after = "one word" if many == 1 else f"{many} words"
+        raise KnowledgeError(f"'{fact}': {name} needs {after} after it, a value last; got {len(rest) or 'none'}")
     if situation.quantity is not None:
         if not BOUNDS.fullmatch(rest[-1]):
             raise KnowledgeError(

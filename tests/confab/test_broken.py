@@ -320,7 +320,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ("-scene", "c:index 1", 'c:index "one"', ":index is 'one'; wanted a whole number"),
         ("-scene", "c:situationType d:PLACE ; ", "", "wanted one :situationType, found 0"),
         ("-scene", "d:isAt :table", "d:isAt :tabel", "tabel isn't declared as an individual; declare it"),
-        ("-scene", "d:isAt :table", "d:isAt <<( :a :b :c )>>", "speaks of triples"),
+        ("-scene", "d:isAt :table", "d:isAt <<( :a :b :c )>>", "contains triple terms"),
         ("", "c:level 1", "c:level 1.5", ":level is '1.5'; wanted a whole number from 1"),
         ("", "c:level 1", "c:level 0", ":level is '0'"),
         ("", "c:level 1", "c:level -1", ":level is '-1'"),

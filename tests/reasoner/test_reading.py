@@ -64,7 +64,7 @@ def test_a_goal_replaces_that_of_its_symbol(serving: Reading) -> None:
         ("cup2 LOCATION location99", "unknown individual 'location99'.*did you mean 'location"),
         ("cup2 LOCATION beverage1", "beverage1 is no value of LOCATION"),
         ("left_hand LOCATION location1", "left_hand has no LOCATION"),
-        ("cup2 LOCATION", "takes 1 words behind it, got 0"),
+        ("cup2 LOCATION", "needs one word after it, a value last; got none"),
         ("cup2", "is no fact"),
     ],
 )
