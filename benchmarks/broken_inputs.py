@@ -316,7 +316,7 @@ def mutated_json(draw: random.Random, data: Any) -> Any:
 
 # ----------------------------------------------------------------------------------------------------------------- doors
 
-Call = list[str]
+Arguments = list[str]
 """The words of a command line."""
 
 
@@ -331,18 +331,25 @@ def _broken(draw: random.Random, folder: Path) -> str:
     return str(folder / "scene.ttl")
 
 
-def plan(draw: random.Random, folder: Path) -> Call:
+def plan(draw: random.Random, folder: Path) -> Arguments:
     """Plan in a scene whose structure is broken."""
-    modes: tuple[Call, ...] = (["--mode", "paper"], ["--optimal"], ["--memory", str(folder / "memory.ttl")], [], [], [])
+    modes: tuple[Arguments, ...] = (
+        ["--mode", "paper"],
+        ["--optimal"],
+        ["--memory", str(folder / "memory.ttl")],
+        [],
+        [],
+        [],
+    )
     return ["plan", _broken(draw, folder), "--time-limit", "5", "--json", *draw.choice(modes)]
 
 
-def validate(draw: random.Random, folder: Path) -> Call:
+def validate(draw: random.Random, folder: Path) -> Arguments:
     """Validate it."""
     return ["validate", _broken(draw, folder)]
 
 
-def look(draw: random.Random, folder: Path) -> Call:
+def look(draw: random.Random, folder: Path) -> Arguments:
     """Ask for affordances; draw, export, explain or learn."""
     scene, memory = _broken(draw, folder), str(folder / "memory.ttl")
     return draw.choice(
@@ -368,7 +375,7 @@ def look(draw: random.Random, folder: Path) -> Call:
     )
 
 
-def files(draw: random.Random, folder: Path) -> Call:
+def files(draw: random.Random, folder: Path) -> Arguments:
     """Plan in a scene whose bytes are broken, in each of the formats; or with a broken catalog."""
     scene = folder / "scene.ttl"
     catalog = folder / "catalog-v001.xml"
@@ -423,7 +430,7 @@ TOKENS = [
 ]
 
 
-def sparql(draw: random.Random, folder: Path) -> Call:
+def sparql(draw: random.Random, folder: Path) -> Arguments:
     """Ask a broken query."""
     text = draw.choice(QUERIES)
     text = mutated_words(draw, text, TOKENS) if draw.random() < 0.95 else "SELECT * WHERE " + "{" * 2000 + "}" * 2000
@@ -435,7 +442,7 @@ def sparql(draw: random.Random, folder: Path) -> Call:
     return ["query", str(folder / "scene.ttl"), text, "--time-limit", "3", "--rows", "1000", *more]
 
 
-def pddl(draw: random.Random, folder: Path) -> Call:
+def pddl(draw: random.Random, folder: Path) -> Arguments:
     """Import broken PDDL."""
     which = draw.choice(("domain", "problem"))
     for name in ("domain", "problem"):
@@ -461,7 +468,7 @@ def pddl(draw: random.Random, folder: Path) -> Call:
     return ["import", str(folder / "domain.pddl"), str(folder / "problem.pddl"), "-o", str(folder / "out.ttl")]
 
 
-def plans(draw: random.Random, folder: Path) -> Call:
+def plans(draw: random.Random, folder: Path) -> Arguments:
     """Begin with a broken plan, or learn from it."""
     file, scene = folder / "plan.json", str(folder / "scene.ttl")
     if draw.random() < 0.8:
@@ -476,7 +483,7 @@ def plans(draw: random.Random, folder: Path) -> Call:
     return ["learn", scene, "--plan", str(file), "--memory", str(folder / "memory.ttl")]
 
 
-def memory(draw: random.Random, folder: Path) -> Call:
+def memory(draw: random.Random, folder: Path) -> Arguments:
     """Use a broken memory, or a good one with a broken one."""
     good, broken, scene = folder / "memory.ttl", folder / "broken.ttl", str(folder / "scene.ttl")
     shutil.copy(good, broken)
@@ -532,7 +539,7 @@ FACTS = (
 )
 
 
-def interventions(draw: random.Random, folder: Path) -> Call:
+def interventions(draw: random.Random, folder: Path) -> Arguments:
     """Give a broken intervention."""
     call = ["execute", str(folder / "scene.ttl"), "--json"]
     for _ in range(draw.choice((1, 2, 4))):
@@ -542,7 +549,7 @@ def interventions(draw: random.Random, folder: Path) -> Call:
     return _without_zeros(call)
 
 
-def options(draw: random.Random, folder: Path) -> Call:
+def options(draw: random.Random, folder: Path) -> Arguments:
     """Ask in words that mean nothing."""
     scene, out = str(folder / "scene.ttl"), str(folder / "out")
     calls = (
@@ -613,7 +620,7 @@ def options(draw: random.Random, folder: Path) -> Call:
     return _without_zeros(list(draw.choice(calls)))
 
 
-def observed(draw: random.Random, folder: Path) -> Call:
+def observed(draw: random.Random, folder: Path) -> Arguments:
     """Start from observed facts in a broken file."""
     draw.choice((mutated_triples, mutated_triples, mutated_bytes))(draw, folder / "observed.ttl")
     return [
@@ -627,7 +634,7 @@ def observed(draw: random.Random, folder: Path) -> Call:
     ]
 
 
-def bodies(draw: random.Random, folder: Path) -> Call:
+def bodies(draw: random.Random, folder: Path) -> Arguments:
     """Validate broken measures of bodies, robots, shapes and skills."""
     from confab.authoring import new_domain
 
@@ -637,7 +644,7 @@ def bodies(draw: random.Random, folder: Path) -> Call:
     return ["validate", str(scene)]
 
 
-def catalogs(draw: random.Random, folder: Path) -> Call:
+def catalogs(draw: random.Random, folder: Path) -> Arguments:
     """Find imports by a broken catalog."""
     catalog = folder / "catalog-v001.xml"
     if not catalog.is_file():
@@ -666,7 +673,7 @@ def catalogs(draw: random.Random, folder: Path) -> Call:
     return [draw.choice(("plan", "validate")), str(folder / "scene.ttl")]
 
 
-def urdf(draw: random.Random, folder: Path) -> Call:
+def urdf(draw: random.Random, folder: Path) -> Arguments:
     """Compute the reach of a robot with a broken URDF file."""
     from confab.authoring import new_domain
 
@@ -704,12 +711,12 @@ def urdf(draw: random.Random, folder: Path) -> Call:
     return ["plan", str(bodies / "pouring-scene.ttl"), "--time-limit", "20"]
 
 
-def _without_zeros(call: Call) -> Call:
+def _without_zeros(call: Arguments) -> Arguments:
     """No process can be given a zero byte."""
     return [word.replace("\0", "0") for word in call]
 
 
-DOORS: dict[str, tuple[Callable[[random.Random, Path], Call], int]] = {
+DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
     door.__name__: (door, share)
     for door, share in (
         (plan, 185),

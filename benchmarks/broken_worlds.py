@@ -14,7 +14,7 @@ from benchmarks.broken_inputs import (
     HERE,
     MUTATIONS,
     TYPE,
-    Call,
+    Arguments,
     Triples,
     mutated_bytes,
     mutated_triples,
@@ -185,8 +185,8 @@ def numeric(draw: random.Random, triples: Triples) -> None:
 # ----------------------------------------------------------------------------------------------------------------- doors
 
 
-def _planned(draw: random.Random, folder: Path) -> Call:
-    modes: tuple[Call, ...] = (["--mode", "paper"], ["--optimal"], ["--mode", "strict"], [], [], [])
+def _planned(draw: random.Random, folder: Path) -> Arguments:
+    modes: tuple[Arguments, ...] = (["--mode", "paper"], ["--optimal"], ["--mode", "strict"], [], [], [])
     chosen = draw.choice(modes)
     if draw.random() < 0.15:
         return draw.choice(
@@ -195,21 +195,21 @@ def _planned(draw: random.Random, folder: Path) -> Call:
     return ["plan", str(folder / "scene.ttl"), "--time-limit", "5", "--json", *chosen]
 
 
-def defined(draw: random.Random, folder: Path) -> Call:
+def defined(draw: random.Random, folder: Path) -> Arguments:
     """Plan where what follows from other situations is defined in a broken way."""
     more = (defining, *draw.choices(MUTATIONS, k=2))
     mutated_triples(draw, folder / draw.choice(("domain.ttl", "domain.ttl", "scene.ttl")), more)
     return _planned(draw, folder)
 
 
-def amounts(draw: random.Random, folder: Path) -> Call:
+def amounts(draw: random.Random, folder: Path) -> Arguments:
     """Plan where amounts, their bounds and calculations are broken."""
     more = (numeric, numeric, *draw.choices(MUTATIONS, k=2))
     mutated_triples(draw, folder / draw.choice(("domain.ttl", "scene.ttl")), more)
     return _planned(draw, folder)
 
 
-def updates(draw: random.Random, folder: Path) -> Call:
+def updates(draw: random.Random, folder: Path) -> Arguments:
     """Plan with behaviours whose SPARQL updates are broken."""
     file = folder / "domain.ttl"
     text = file.read_text()
@@ -236,7 +236,7 @@ def updates(draw: random.Random, folder: Path) -> Call:
     return _planned(draw, folder)
 
 
-def numbers(draw: random.Random, folder: Path) -> Call:
+def numbers(draw: random.Random, folder: Path) -> Arguments:
     """Plan in broken PDDL with derived predicates and numbers, or import it, if it can't be."""
     from confab.pddl_commands import import_pddl
 
@@ -250,7 +250,7 @@ def numbers(draw: random.Random, folder: Path) -> Call:
         import_pddl(files[0], files[1], folder / "imported.ttl")
     except Exception:  # whatever it is, the command is to say it
         return ["import", *map(str, files), "-o", str(folder / "out.ttl")]
-    mode: tuple[Call, ...] = (["--optimal"], ["--mode", "paper"], [], [])
+    mode: tuple[Arguments, ...] = (["--optimal"], ["--mode", "paper"], [], [])
     return ["plan", str(folder / "imported.ttl"), "--time-limit", "5", "--json", *draw.choice(mode)]
 
 
@@ -290,7 +290,7 @@ def _regrouped(draw: random.Random, text: str) -> str:
     return text
 
 
-def edited(draw: random.Random, folder: Path) -> Call:
+def edited(draw: random.Random, folder: Path) -> Arguments:
     """Plan with edited rules: other conditions, roles, steps, counts."""
     file, scene = folder / "memory.ttl", str(folder / "scene.ttl")
     text = file.read_text()
@@ -308,7 +308,7 @@ def edited(draw: random.Random, folder: Path) -> Call:
                 text = text[: spot.start(2)] + new + text[spot.end(2) :]
     file.write_text(text)
     modes = ("guarded", "leading", "strict")
-    calls: tuple[Call, ...] = (
+    calls: tuple[Arguments, ...] = (
         ["plan", scene, "--memory", str(file), "--json", "--time-limit", "5", "--mode", draw.choice(modes)],
         ["execute", scene, "--memory", str(file), "--learn"],
         ["memory", "show", str(file), "--most", "3"],
@@ -318,7 +318,7 @@ def edited(draw: random.Random, folder: Path) -> Call:
     return draw.choice((calls[0], calls[0], *calls))
 
 
-def meshes(draw: random.Random, folder: Path) -> Call:
+def meshes(draw: random.Random, folder: Path) -> Arguments:
     """Compute the reach of a robot whose hand has a broken mesh."""
     from benchmarks.broken_inputs import urdf
 
@@ -341,7 +341,7 @@ def meshes(draw: random.Random, folder: Path) -> Call:
     return call
 
 
-DOORS: dict[str, tuple[Callable[[random.Random, Path], Call], int]] = {
+DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
     door.__name__: (door, share)
     for door, share in ((defined, 40), (amounts, 40), (updates, 40), (numbers, 60), (edited, 30), (meshes, 3))
 }

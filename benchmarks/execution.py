@@ -432,14 +432,14 @@ def both_hands() -> None:
     """Print makespan with both hands against serial, and draw the Gantt strip."""
     from confab.sim.together import perform_together
     from confab.sim.verify import expectations, verify
-    from confab.sim.world import World
+    from confab.sim.world import PhysicsWorld
 
     scene = confab.load("beverage-serving")
     plan = Trial.of(scene.problem).plan
     steps = plan.primitives
     promised = expectations(scene.problem, steps)
     serial = verify(scene.embodiment, scene.problem.initial, steps, promised)
-    with World(scene.embodiment, scene.problem.initial) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         performed = perform_together(world, scene.problem, steps)
         seconds, seen = world.seconds, world.observe()
     same = all(promised[-1].get(symbol) == value for symbol, value in seen.items())

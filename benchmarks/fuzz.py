@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 from benchmarks import broken_inputs, broken_worlds
-from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Call
+from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Arguments
 from benchmarks.broken_worlds import WORLDS
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import Problem
@@ -194,7 +194,7 @@ def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _run(call: Call, case: Path, out: Path, err: Path, results: list[Result]) -> tuple[int, str]:
+def _run(call: Arguments, case: Path, out: Path, err: Path, results: list[Result]) -> tuple[int, str]:
     """Run a command and check its answer; return the exit code and the fault."""
     from confab.cli import main
 
@@ -221,7 +221,9 @@ def _run(call: Call, case: Path, out: Path, err: Path, results: list[Result]) ->
     return code, ""
 
 
-def _judged(call: Call, code: int, said: str, printed: str, before: dict[str, bytes], after: dict[str, bytes]) -> str:
+def _judged(
+    call: Arguments, code: int, said: str, printed: str, before: dict[str, bytes], after: dict[str, bytes]
+) -> str:
     """Return the fault of a command's ending."""
     if code not in (0, 1, 2, 3):
         return f"exit {code}: {said}"
@@ -248,7 +250,7 @@ def _contents(case: Path) -> dict[str, bytes]:
     return {str(file.relative_to(case)): file.read_bytes() for file in sorted(case.rglob("*")) if file.is_file()}
 
 
-def _check_files(call: Call, case: Path) -> None:
+def _check_files(call: Arguments, case: Path) -> None:
     """Raise an exception if a file that was written can't be read."""
     from confab.memory import Memory
 

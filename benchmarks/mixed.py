@@ -25,7 +25,7 @@ from typing import Any
 
 from worlds.features import features
 from worlds.judging import Complaint, Judge, Judged
-from worlds.mixed import World, drawn, mixed
+from worlds.mixed import RandomWorld, drawn, mixed
 from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
@@ -70,7 +70,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     return found
 
 
-def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
+def note(found: dict[str, Any], seed: int, world: RandomWorld, its: Judged) -> None:
     """Add the result of a world."""
     for kind, ones in (("wrong", its.complaints), ("remarks", its.remarks)):
         for said in dict.fromkeys(map(signature, ones)):
@@ -89,11 +89,11 @@ def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
         found["seconds"][mode] += seconds
 
 
-def write(world: World, one: Complaint, into: Path, folder: Path) -> Path:
+def write(world: RandomWorld, one: Complaint, into: Path, folder: Path) -> Path:
     """Make a world small in which something is wrong, and write its scene."""
     said = signature(one)
 
-    def still(smaller: World) -> bool:
+    def still(smaller: RandomWorld) -> bool:
         try:
             complaints = Judge(smaller, folder, only=one.mode).judged().complaints
         except Exception:  # it is none that can be judged any more

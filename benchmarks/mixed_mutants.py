@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.mutants import ROOT, Instead, faults, meaning
 from worlds.interpreter import Interpreter, TooManyStatesError
-from worlds.mixed import World, drawn
+from worlds.mixed import RandomWorld, drawn
 
 PARTS: dict[str, tuple[tuple[str, ...], str]] = {
     "recognition": (("reasoner/reading/relevance.py",), "guarded"),
@@ -33,7 +33,7 @@ PARTS: dict[str, tuple[tuple[str, ...], str]] = {
 }
 """The modules of each part, and the mode in which worlds are judged."""
 FIRST, WORLDS, SECONDS = 8_000_000, 150, 60
-Drawn = tuple[World, Interpreter]
+Drawn = tuple[RandomWorld, Interpreter]
 
 
 def kills(many: int, into: Path) -> None:

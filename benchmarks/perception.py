@@ -24,7 +24,7 @@ from confab.sim.faults import displaced, lying
 from confab.sim.skills import perform
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import SkillError
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 NOISE = (0.0, 0.002, 0.005, 0.01, 0.02)
 """Standard deviations of perceived positions in metres."""
@@ -50,7 +50,7 @@ class Tally:
     wrong: Counter[tuple[str, float]] = field(default_factory=Counter)
     missed: Counter[tuple[str, float]] = field(default_factory=Counter)
 
-    def add(self, world: World, truth: Truth) -> None:
+    def add(self, world: PhysicsWorld, truth: Truth) -> None:
         """Look at everything, at every level of noise."""
         for noise in NOISE:
             world.noise = noise
@@ -78,7 +78,7 @@ def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally:
     rng = np.random.default_rng(seed)
     truth = _drawn(embodiment, symbols, rng)
     initial = {symbol: value for symbol, value in truth.items() if value is not None}
-    with World(embodiment, initial, seed, Perturbation()) as world:
+    with PhysicsWorld(embodiment, initial, seed, Perturbation()) as world:
         _disturb(world, truth, rng)
         tally.add(world, truth)
         uses = {use.skill: use for use in embodiment.skills.values()}
@@ -114,7 +114,7 @@ def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Gen
     return truth
 
 
-def _disturb(world: World, truth: Truth, rng: np.random.Generator) -> None:
+def _disturb(world: PhysicsWorld, truth: Truth, rng: np.random.Generator) -> None:
     """Shift one empty object of five off every place, and lay another of five on its side: both are at no place."""
     uses = world.embodiment.perceivers
     for symbol in [s for s in truth if uses[s.situation].perceiver == "perceive_place"]:
@@ -134,7 +134,7 @@ def _disturb(world: World, truth: Truth, rng: np.random.Generator) -> None:
     world.run(60)
 
 
-def _free(world: World, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+def _free(world: PhysicsWorld, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
     """Tell whether an object has room at a spot (2,), off every place and not off the table."""
     gaps = [np.hypot(*(world.truth(other)[1][:2] - spot)) for other in world.bodies if other != name]
     away = world.nearest_place(np.array([*spot, 0.0]))[1]
@@ -143,7 +143,7 @@ def _free(world: World, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np
     return inside and away > 0.065 and min(gaps) > 2.2 * outer_radius(world.bodies[name].shape)
 
 
-def _taken(world: World, truth: Truth, rng: np.random.Generator, reach: SkillUse) -> tuple[str, str]:
+def _taken(world: PhysicsWorld, truth: Truth, rng: np.random.Generator, reach: SkillUse) -> tuple[str, str]:
     """Let some hand reach for some object that stands at a place; return both, or empty names if none can."""
     uses = world.embodiment.perceivers
     standing = [

@@ -33,7 +33,7 @@ from benchmarks.perception import perception
 from confab.sim.rollouts import Trial, rollouts, wilson
 from confab.sim.staging import Perturbation
 from confab.sim.verify import Rollout, expectations
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 WORKERS = 2
 """Processes that share perturbed rollouts."""
@@ -149,7 +149,7 @@ def _timed(name: str, one: Trial, seeds: Sequence[int], alone: list[Rollout], wo
     print(f"{name}{killed}: {rate:.1f} per minute, the same seed by seed: {done == alone}", flush=True)
 
 
-def die_once(mark: Path, world: World) -> None:
+def die_once(mark: Path, world: PhysicsWorld) -> None:
     """Kill the process that builds the first world."""
     del world
     try:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.show import PlanTree
     from confab.sim.live import LiveWorld
-    from confab.sim.world import World as Physics
+    from confab.sim.world import PhysicsWorld
 
 WORLDS = ("symbolic", "pybullet")
 
@@ -392,7 +392,7 @@ class Execution:
 class Options(TypedDict, total=False):
     """What else `execute` takes."""
 
-    prepare: Callable[[Physics], None] | None
+    prepare: Callable[[PhysicsWorld], None] | None
     retry_policy: RetryPolicy
     caution: Caution | None
     perturb: bool
@@ -474,7 +474,7 @@ def execute(
     planner: Planner | None = None,
     seed: int = 0,
     observer: Callable[[Event], None] | None = None,
-    prepare: Callable[[Physics], None] | None = None,
+    prepare: Callable[[PhysicsWorld], None] | None = None,
     retry_policy: RetryPolicy = RetryPolicy(),  # noqa: B008 - frozen
     caution: Caution | None = None,
     perturb: bool = False,
@@ -541,12 +541,12 @@ def execute(
     from confab.physics import require_skills
     from confab.sim.live import LiveWorld
     from confab.sim.staging import Perturbation
-    from confab.sim.world import World as Physics
+    from confab.sim.world import PhysicsWorld
 
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     require_skills(scene, [behavior.name for behavior in lowest])
     varied = Perturbation() if perturb else None
-    with possible(), Physics(scene.embodiment, problem.initial, seed, varied, noise=noise) as physics:
+    with possible(), PhysicsWorld(scene.embodiment, problem.initial, seed, varied, noise=noise) as physics:
         if prepare is not None:
             prepare(physics)
         live = LiveWorld(physics, problem.classes, problem, _reach_of(scene))

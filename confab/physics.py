@@ -22,7 +22,7 @@ from confab.sim.rollouts import Done, Trial, wilson
 from confab.sim.rollouts import rollouts as roll_out
 from confab.sim.staging import Perturbation
 from confab.sim.verify import Rollout, expectations
-from confab.sim.world import PrimitiveStep, World
+from confab.sim.world import PhysicsWorld, PrimitiveStep
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ class Options(TypedDict, total=False):
     perturb: bool
     noise: float
     video: str | Path | None
-    prepare: Callable[[World], None] | None
+    prepare: Callable[[PhysicsWorld], None] | None
     progress: Callable[[int, PrimitiveStep], None] | None
     workers: int | str
     done: Done | None
@@ -193,7 +193,7 @@ def verify(
     perturb: bool = False,
     noise: float = 0.0,
     video: str | Path | None = None,
-    prepare: Callable[[World], None] | None = None,
+    prepare: Callable[[PhysicsWorld], None] | None = None,
     progress: Callable[[int, PrimitiveStep], None] | None = None,
     workers: int | str = 1,
     done: Done | None = None,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from confab.known import Known
     from confab.sim.urdf import Array
-    from confab.sim.world import World
+    from confab.sim.world import PhysicsWorld
 
 KINDS = (".png", ".svg", ".pdf")
 MOST_ROWS, DEEPEST = 500, 100
@@ -212,7 +212,7 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
     )
 
 
-def _top(world: World, name: str) -> Array:
+def _top(world: PhysicsWorld, name: str) -> Array:
     """Return the middle of a body's top."""
     from confab.sim.bodies import outline
 
@@ -228,14 +228,14 @@ def _table(scene: Known, path: Path) -> Path:
 
     from confab.reaching import with_reach
     from confab.sim.picture import hide_vessels, picture, view_of
-    from confab.sim.world import World
+    from confab.sim.world import PhysicsWorld
 
     if not scene.embodiment.places:
         raise KnowledgeError(f"{scene.iri} has no places with coordinates, so there is no table to show")
     scene = with_reach(scene)
     reached = scene.problem.relations.get(local_name(reach_relation(scene.knowledge)), frozenset())
     try:
-        world = World(scene.embodiment, scene.problem.initial)
+        world = PhysicsWorld(scene.embodiment, scene.problem.initial)
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
     with world:

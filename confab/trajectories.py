@@ -17,7 +17,7 @@ from confab.sim.together import perform_together
 from confab.sim.trajectory import Recorder, exported
 from confab.sim.verdict import Verdict
 from confab.sim.verify import expectations, verify
-from confab.sim.world import PrimitiveStep, World
+from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -63,7 +63,7 @@ def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_
     try:
         expected = expectations(scene.problem, steps)
         if both_hands:
-            with World(embodiment, initial, seed, watch=recorder) as world:
+            with PhysicsWorld(embodiment, initial, seed, watch=recorder) as world:
                 done = perform_together(world, scene.problem, steps)
             verdicts = list(zip((slot.step for slot in done.slots), done.verdicts, strict=True))
             slots = [(one.step, one.begin, one.end) for one in done.slots]

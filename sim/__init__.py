@@ -3,7 +3,7 @@
 ====================================================== ==============================================================
 `confab.sim.verify.verify(embodiment, initial, …)`     executes a plan's primitives in a new world; returns a `Rollout`
 `confab.sim.verify.expectations(problem, steps)`       the states that the rollout is compared with
-`confab.sim.world.World(embodiment, initial, seed=0)`  the world itself, `observe()` and `execute(step)`, for closed loops
+`confab.sim.world.PhysicsWorld(embodiment, initial, seed=0)`  the world itself, `observe()` and `execute(step)`, for closed loops
 `confab.sim.reach.reach(embodiment)`                   the places within reach of each hand, by geometry alone
 `confab.sim.film.Film(path, steps, titles)`            records a rollout as a film
 `confab.sim.verdict.CODES`                             the failure codes of a primitive

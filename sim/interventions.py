@@ -15,7 +15,7 @@ from confab.sim.engine import Thing
 from confab.sim.linkage import wide
 from confab.sim.staging import pour_in
 from confab.sim.urdf import Array
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 """The orientation of an upright object, as a quaternion."""
@@ -24,12 +24,12 @@ FALLING = 1.3
 """Tilt in radians of an object that has been knocked and falls over."""
 
 
-def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+def move(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Put an object with its contents at a place."""
     put(world, symbol.arguments[0], world.place(value), UPRIGHT)
 
 
-def put(world: World, name: str, base: Array, orientation: Sequence[float]) -> None:
+def put(world: PhysicsWorld, name: str, base: Array, orientation: Sequence[float]) -> None:
     """Put an object with its contents at a position and an orientation (a quaternion); a hand that holds it opens."""
     for hand in world.hands:
         if world.held(hand) == name:
@@ -44,14 +44,14 @@ def put(world: World, name: str, base: Array, orientation: Sequence[float]) -> N
         _set(world, bead.body, base + rotation @ local)
 
 
-def push(world: World, name: str, by: Sequence[float]) -> None:
+def push(world: PhysicsWorld, name: str, by: Sequence[float]) -> None:
     """Push a standing object with its contents by metres along x and y; one that a hand holds stays where it is."""
     if name in world.bodies and not any(world.held(hand) == name for hand in world.hands):
         orientation = pybullet.getBasePositionAndOrientation(world.bodies[name].body, physicsClientId=world.client)[1]
         put(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)
 
 
-def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
+def knock(world: PhysicsWorld, name: str, numbers: Sequence[float] = ()) -> None:
     """Knock an object over, with its contents, away from its neighbours."""
     if name not in world.bodies:
         return
@@ -65,7 +65,7 @@ def knock(world: World, name: str, numbers: Sequence[float] = ()) -> None:
     put(world, name, base + np.array([0.0, 0.0, radius * np.sin(FALLING)]), orientation)
 
 
-def put_box(world: World, name: str, place: str, size: Sequence[float]) -> None:
+def put_box(world: PhysicsWorld, name: str, place: str, size: Sequence[float]) -> None:
     """Put a box that no fact mentions at a place; `size` is its width, depth and height in metres."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", 0.2, size[2] / 2, numbers=numbers, color=(0.8, 0.6, 0.4, 1.0))
@@ -73,7 +73,7 @@ def put_box(world: World, name: str, place: str, size: Sequence[float]) -> None:
     world.names[body], world.bodies[name] = name, Thing(body, shape)
 
 
-def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+def fill(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Empty a vessel, and fill it with the value unless that is `empty`."""
     for bead in world.inside(symbol.arguments[0]):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
@@ -82,7 +82,7 @@ def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
         pour_in(world, symbol.arguments[0], value, world.perturb)
 
 
-def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+def push_joint(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Open or shut a link with the bodies that it carries; a hand that holds the link opens."""
     name = symbol.arguments[0]
     mechanic = world.links[name]
@@ -100,7 +100,7 @@ def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> N
         _set(world, thing.body, base + np.array([0.0, 0.0, center_height(thing.shape)]))
 
 
-def take_away(world: World, name: str, numbers: Sequence[float] = ()) -> None:
+def take_away(world: PhysicsWorld, name: str, numbers: Sequence[float] = ()) -> None:
     """Remove an object and its contents from the world, if it is still there."""
     if name not in world.bodies:
         return
@@ -115,20 +115,20 @@ def take_away(world: World, name: str, numbers: Sequence[float] = ()) -> None:
     pybullet.removeBody(thing.body, physicsClientId=world.client)
 
 
-def _set(world: World, body: int, position: Array, orientation: Sequence[float] = UPRIGHT) -> None:
+def _set(world: PhysicsWorld, body: int, position: Array, orientation: Sequence[float] = UPRIGHT) -> None:
     pybullet.resetBasePositionAndOrientation(body, position.tolist(), orientation, physicsClientId=world.client)
     pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], physicsClientId=world.client)
     pybullet.changeDynamics(body, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=world.client)
 
 
-HANDLED: Mapping[InterventionKind, Callable[[World, str, Sequence[float]], None]] = {
+HANDLED: Mapping[InterventionKind, Callable[[PhysicsWorld, str, Sequence[float]], None]] = {
     InterventionKind.REMOVE: take_away,
     InterventionKind.KNOCK: knock,
     InterventionKind.PUSH: push,
 }
 """By kind of intervention: the function that does it to an object."""
 
-DISTURBERS: Mapping[str, Callable[[World, PerceiverUse, Symbol, str], None]] = {
+DISTURBERS: Mapping[str, Callable[[PhysicsWorld, PerceiverUse, Symbol, str], None]] = {
     "perceive_place": move,
     "perceive_content": fill,
     "perceive_joint": push_joint,

@@ -28,7 +28,7 @@ from confab.sim.lookout import Lookout
 from confab.sim.perception import tilt_of
 from confab.sim.skills import perform
 from confab.sim.verdict import SkillError, Verdict
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 STOPPED = 0.02
 """Lag in radians of a joint behind its command from which on its arm counts as stopped."""
@@ -41,11 +41,11 @@ PAUSE = 60
 
 
 class LiveWorld:
-    """A `World` with interventions.
+    """A `PhysicsWorld` with interventions.
 
     Parameters
     ----------
-    world : World
+    world : PhysicsWorld
     classes : mapping of class to individuals
         An object that an intervention adds gets the shape of an object of its class.
     problem : Problem, optional
@@ -55,7 +55,11 @@ class LiveWorld:
     """
 
     def __init__(
-        self, world: World, classes: Mapping[str, Sequence[str]], problem: Problem | None = None, reaching: str = ""
+        self,
+        world: PhysicsWorld,
+        classes: Mapping[str, Sequence[str]],
+        problem: Problem | None = None,
+        reaching: str = "",
     ) -> None:
         self.world, self.classes = world, classes
         self.lookout = None if problem is None else Lookout(world, problem, reaching)

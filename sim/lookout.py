@@ -24,7 +24,7 @@ from confab.sim.perception import tilt_of
 from confab.sim.reach import reach
 from confab.sim.urdf import Array
 from confab.sim.whereabouts import LEVEL
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 REST = 0.05
 """Speed in metres per second below which an object is at rest."""
@@ -49,7 +49,7 @@ HEIGHTS = (0.06, 0.12, 0.18)
 class Lookout:
     """Discovers things and spots in a world. `problem` has them, too; `reaching` is the relation of reach facts, or empty."""
 
-    world: World
+    world: PhysicsWorld
     problem: Problem
     reaching: str = ""
     news: list[Discovery] = field(default_factory=list)

@@ -25,7 +25,7 @@ from confab.reasoner.workers import CPU_SECONDS, end, limit_cpu, start
 from confab.sim.engine import Engine
 from confab.sim.staging import Perturbation
 from confab.sim.verify import Rollout, verify
-from confab.sim.world import PrimitiveStep, World
+from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 TRIES = 3
 """Number of processes that die at the same rollout before it is given up."""
@@ -47,7 +47,7 @@ class Trial:
     perturb: Perturbation | None = None
     beads: bool = True
     noise: float = 0.0
-    prepare: Callable[[World], None] | None = None
+    prepare: Callable[[PhysicsWorld], None] | None = None
 
     def run(
         self,

@@ -18,7 +18,7 @@ from confab.planner.acting.schedule import Slot, partial_order, ready, urgency_o
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem
 from confab.sim.verdict import Verdict
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""
@@ -47,7 +47,7 @@ class Performance:
 class _Job:
     """A primitive that runs in a thread of its own."""
 
-    def __init__(self, world: World, step: Step, position: int, worker: str) -> None:
+    def __init__(self, world: PhysicsWorld, step: Step, position: int, worker: str) -> None:
         self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
         self.moved_by_others: set[str] = set()
         self.verdict: Verdict | None = None
@@ -56,7 +56,7 @@ class _Job:
         self.thread = Thread(target=self._work, args=(world,), daemon=True)
         self.thread.start()
 
-    def _work(self, world: World) -> None:
+    def _work(self, world: PhysicsWorld) -> None:
         self.go.acquire()
         try:
             self.verdict = world.execute(self.step)
@@ -78,13 +78,13 @@ class _Job:
 
 
 def perform_together(
-    world: World, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
+    world: PhysicsWorld, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
 ) -> Performance:
     """Execute primitives with all hands at once, each as soon as its predecessors are done and there is room.
 
     Parameters
     ----------
-    world : World
+    world : PhysicsWorld
     problem : Problem
         Its initial state is the world's.
     primitives : sequence of Step
@@ -147,7 +147,7 @@ def perform_together(
     )
 
 
-def arms_touch(world: World) -> bool:
+def arms_touch(world: PhysicsWorld) -> bool:
     """Return whether two hands of the world, including their arms, touch each other."""
     owner: dict[tuple[int, int], str] = {}
     for name, hand in world.hands.items():
@@ -160,14 +160,16 @@ def arms_touch(world: World) -> bool:
     return False
 
 
-def _moved_bodies(world: World, step: Step) -> set[str]:
+def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
     """Return the bodies that a primitive may move: those that it names, and the loads of its hands."""
     named = {*step.arguments, *step.bindings.values()}
     held = {world.held(hand) for hand in named & world.hands.keys()}
     return {name for name in named | held if name is not None and name in world.bodies}
 
 
-def _workplace(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
+def _workplace(
+    world: PhysicsWorld, step: Step
+) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
     """Return a function that returns a primitive's present place of work (2,): its last body or place, else its hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)

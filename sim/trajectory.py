@@ -22,7 +22,7 @@ from confab.sim.engine import LAG, RATE, Engine
 from confab.sim.robot import CLOSING, Manipulator
 from confab.sim.staging import Perturbation
 from confab.sim.urdf import Array
-from confab.sim.world import PrimitiveStep, World
+from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 EXACT = 3e-4
 """Maximum deviation in radians of the exported path, linear between its points, from the commanded one."""
@@ -211,8 +211,8 @@ def replay(
     perturb: Perturbation | None = None,
     beads: bool = True,
 ) -> Replay:
-    """Execute exported trajectories in a new world by joint servos alone; parameters as of `World`."""
-    with World(embodiment, initial, seed, perturb, beads) as world:
+    """Execute exported trajectories in a new world by joint servos alone; parameters as of `PhysicsWorld`."""
+    with PhysicsWorld(embodiment, initial, seed, perturb, beads) as world:
         paths = {name: _path(primitives, name) for name in world.hands}
         fingers = {name: sorted(_gripper(primitives, name)) for name in world.hands}
         end = max((float(primitive["end"]) for primitive in primitives), default=0.0) + AFTER

@@ -14,7 +14,7 @@ from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import Verdict, VerdictJson
-from confab.sim.world import PrimitiveStep, World
+from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
 """Maximum number of looks with noisy perception before a difference from the expected state counts."""
@@ -119,7 +119,7 @@ def verify(
     perturb: Perturbation | None = None,
     beads: bool = True,
     noise: float = 0.0,
-    prepare: Callable[[World], None] | None = None,
+    prepare: Callable[[PhysicsWorld], None] | None = None,
     watch: Callable[[Engine], None] | None = None,
     progress: Callable[[int, PrimitiveStep], None] | None = None,
     gui: bool = False,
@@ -135,7 +135,7 @@ def verify(
     expected : sequence of State
         The state after each of them, as `expectations` computes it; symbols without a perceiver are not compared.
     seed, perturb, beads, noise
-        As in `World`.
+        As in `PhysicsWorld`.
     prepare : callable, optional
         Called with the world before the first step, for example a planted fault (`confab.sim.faults`).
     watch : callable, optional
@@ -152,7 +152,7 @@ def verify(
     """
     begin = time.process_time()
     reports: list[StepReport] = []
-    with World(embodiment, initial, seed, perturb, beads, noise, watch, gui) as world:
+    with PhysicsWorld(embodiment, initial, seed, perturb, beads, noise, watch, gui) as world:
         if prepare is not None:
             prepare(world)
         for number, (step, state) in enumerate(zip(steps, expected, strict=True)):
@@ -173,7 +173,7 @@ def verify(
         return Rollout(seed, ok, tuple(reports), poured, cpu, world.seconds, seen, world.clock, hidden)
 
 
-def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
+def compare(world: PhysicsWorld, expected: State, verdict: Verdict) -> Verdict:
     """Return the verdict if the perceived facts are as expected, else a failure that names the first different fact.
 
     With noisy perception a difference is looked at again, and the mean of all looks counts.
@@ -186,7 +186,7 @@ def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
     return found
 
 
-def _compared(world: World, expected: State, verdict: Verdict) -> Verdict:
+def _compared(world: PhysicsWorld, expected: State, verdict: Verdict) -> Verdict:
     seen = world.observe()
     for symbol in world.symbols:
         got = seen.get(symbol)

@@ -45,7 +45,7 @@ class PrimitiveStep(Protocol):
         """Individuals of the determined variables."""
 
 
-class World(Engine):
+class PhysicsWorld(Engine):
     """A physics world with the objects of a scene. Close it after use, or use it in a ``with`` statement.
 
     Parameters
@@ -93,7 +93,7 @@ class World(Engine):
             self.remember(name, np.eye(3), self.place(place))
         self.watch = watch
 
-    def __enter__(self) -> World:
+    def __enter__(self) -> PhysicsWorld:
         return self
 
     def __exit__(

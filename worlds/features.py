@@ -24,7 +24,7 @@ from confab.reasoner.symbols import (
     Witness,
 )
 from worlds.interpreter import Interpreter, TooManyStatesError
-from worlds.mixed import World
+from worlds.mixed import RandomWorld
 from worlds.phrases import ANYONE, EACH
 from worlds.shrinking import without_individual
 
@@ -57,8 +57,8 @@ def _effects(problem: Problem, change: Callable[[Effect], Effect | None]) -> Pro
     return _behaviors(problem, changed)
 
 
-def _without_conditions(drop: Callable[[World, Condition], bool]) -> Callable[[World], Problem]:
-    def changed(world: World) -> Problem:
+def _without_conditions(drop: Callable[[RandomWorld, Condition], bool]) -> Callable[[RandomWorld], Problem]:
+    def changed(world: RandomWorld) -> Problem:
         def dropped(one: Condition) -> bool:
             return drop(world, one)
 
@@ -76,33 +76,33 @@ def _without_conditions(drop: Callable[[World, Condition], bool]) -> Callable[[W
     return changed
 
 
-def _without_effects(drop: Callable[[Effect], bool]) -> Callable[[World], Problem]:
+def _without_effects(drop: Callable[[Effect], bool]) -> Callable[[RandomWorld], Problem]:
     return lambda world: _effects(world.problem, lambda effect: None if drop(effect) else effect)
 
 
-def _without_goals(drop: Callable[[World, str, str], bool]) -> Callable[[World], Problem]:
-    def changed(world: World) -> Problem:
+def _without_goals(drop: Callable[[RandomWorld, str, str], bool]) -> Callable[[RandomWorld], Problem]:
+    def changed(world: RandomWorld) -> Problem:
         goal = {s: v for s, v in world.problem.goal.items() if not drop(world, s.situation, v)}
         return replace(world.problem, goal=goal)
 
     return changed
 
 
-def _without_rules(drop: Callable[[World, str], bool]) -> Callable[[World], Problem]:
-    def changed(world: World) -> Problem:
+def _without_rules(drop: Callable[[RandomWorld, str], bool]) -> Callable[[RandomWorld], Problem]:
+    def changed(world: RandomWorld) -> Problem:
         rules = {name: () if drop(world, name) else its for name, its in world.problem.domain.rules.items()}
         return replace(world.problem, domain=replace(world.problem.domain, rules=rules))
 
     return changed
 
 
-def _negative(world: World, name: str) -> bool:
+def _negative(world: RandomWorld, name: str) -> bool:
     """Return whether a situation type has a rule with a single, negated condition."""
     rules = world.problem.domain.rules[name]
     return name not in world.axioms and any(len(r.conditions) == 1 and r.conditions[0].negated for r in rules)
 
 
-def _unbounded(world: World) -> Problem:
+def _unbounded(world: RandomWorld) -> Problem:
     situations = {
         name: one if one.quantity is None else replace(one, quantity=replace(one.quantity, least=None, most=None))
         for name, one in world.problem.domain.situations.items()
@@ -110,12 +110,12 @@ def _unbounded(world: World) -> Problem:
     return replace(world.problem, domain=replace(world.problem.domain, situations=situations))
 
 
-def _restless(world: World) -> Problem:
+def _restless(world: RandomWorld) -> Problem:
     situations = {name: replace(one, rest=None) for name, one in world.problem.domain.situations.items()}
     return replace(world.problem, domain=replace(world.problem.domain, situations=situations))
 
 
-def _different(world: World) -> Problem:
+def _different(world: RandomWorld) -> Problem:
     """Return a problem in which no behaviour takes the same individual twice."""
 
     def changed(one: Behavior) -> Behavior:
@@ -125,7 +125,7 @@ def _different(world: World) -> Problem:
     return _behaviors(world.problem, changed)
 
 
-def _named_only(world: World) -> Problem:
+def _named_only(world: RandomWorld) -> Problem:
     """Return a problem without unused individuals."""
     for one in (*world.problem.classes["A"], *world.problem.classes["B"]):
         world = without_individual(world, one) or world
@@ -140,7 +140,7 @@ def _by_name(one: Condition) -> bool:
     return isinstance(one, ValueCondition) and any(not term.startswith("?") for term in one.arguments)
 
 
-FEATURES: Mapping[str, Callable[[World], Problem]] = {
+FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
     "effects on all of a class": _without_effects(lambda effect: effect.each is not None),
     "effects under conditions": lambda world: _effects(world.problem, lambda e: replace(e, when=())),
     "effects on individuals by name": _without_effects(
@@ -185,7 +185,7 @@ FEATURES: Mapping[str, Callable[[World], Problem]] = {
 """For each feature, a world without it."""
 
 
-def features(world: World, least: float | None) -> Iterator[tuple[str, bool]]:
+def features(world: RandomWorld, least: float | None) -> Iterator[tuple[str, bool]]:
     """Yield the features of a world, and whether the least cost differs without each."""
     for name, without in FEATURES.items():
         other = without(world)

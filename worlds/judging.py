@@ -32,7 +32,7 @@ from confab.reasoner.symbols import Problem, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
 from worlds.interpreter import Interpreter, State, TooManyStatesError
-from worlds.mixed import World
+from worlds.mixed import RandomWorld
 from worlds.scenes import scene
 from worlds.walking import cost, faults
 
@@ -98,7 +98,7 @@ class Judge:
 
     def __init__(
         self,
-        world: World,
+        world: RandomWorld,
         folder: Path,
         every: bool = False,
         only: str = "",

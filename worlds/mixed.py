@@ -63,7 +63,7 @@ UPDATES = 0.15
 
 
 @dataclass(frozen=True)
-class World:
+class RandomWorld:
     """A problem as a value, and how its scene is written.
 
     `pairs` are the situation types whose property takes several values, `owners` the classes that have a situation type. `axioms`
@@ -80,12 +80,12 @@ class World:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(seed: int, aggregated: float = AGGREGATED) -> World:
+def mixed(seed: int, aggregated: float = AGGREGATED) -> RandomWorld:
     """Return a random world; the same for the same seed and share of worlds with derived amounts."""
     return drawn(seed, aggregated)[0]
 
 
-def drawn(seed: int, aggregated: float = AGGREGATED) -> tuple[World, Interpreter]:
+def drawn(seed: int, aggregated: float = AGGREGATED) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of it; with `aggregated` 0 it has no derived amounts."""
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
@@ -106,7 +106,7 @@ def drawn(seed: int, aggregated: float = AGGREGATED) -> tuple[World, Interpreter
             return _with_derived_goal(replace(world, problem=meant.problem), meant)
 
 
-def _with_derived_goal(world: World, meant: Interpreter) -> tuple[World, Interpreter]:
+def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWorld, Interpreter]:
     """Return a world whose goal is, in some, that one of two facts holds or that some individual has a value."""
     rng, problem = Random(f"alternatives {world.seed}"), world.problem
     domain = problem.domain
@@ -243,7 +243,7 @@ class _Draft(Vocabulary):
     def chance(self, p: float) -> bool:
         return self.rng.random() < p
 
-    def world(self) -> World:
+    def world(self) -> RandomWorld:
         self.individuals()
         for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
             self.situation(number)
@@ -266,7 +266,7 @@ class _Draft(Vocabulary):
         if aggregates:
             problem = self.bounded(problem)
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
-        return World(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
+        return RandomWorld(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
 
     def individuals(self) -> None:
         rng, number = self.rng, 0

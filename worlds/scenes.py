@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import ARGUMENTS
-from worlds.mixed import World
+from worlds.mixed import RandomWorld
 from worlds.phrases import ANYONE, EACH
 
 HEADER = """\
@@ -41,7 +41,7 @@ HEADER = """\
 """
 
 
-def scene(world: World) -> str:
+def scene(world: RandomWorld) -> str:
     """Return a world as Turtle."""
     return HEADER + "\n".join(_Scene(world).lines()) + "\n"
 
@@ -58,7 +58,7 @@ def _decimal(number: Fraction) -> str:
 class _Scene:
     """Writes one world."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: RandomWorld) -> None:
         self.world, self.problem = world, world.problem
         self.situations = world.problem.domain.situations
         self.nodes: list[str] = []

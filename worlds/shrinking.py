@@ -21,10 +21,10 @@ from confab.reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from worlds.mixed import World
+from worlds.mixed import RandomWorld
 
 
-def shrunk(world: World, still: Callable[[World], bool], seconds: float = 60.0) -> World:
+def shrunk(world: RandomWorld, still: Callable[[RandomWorld], bool], seconds: float = 60.0) -> RandomWorld:
     """Return a world of which no part can be left out without `still` becoming false, or the best one within CPU seconds."""
     end = process_time() + seconds
     again = True
@@ -39,7 +39,7 @@ def shrunk(world: World, still: Callable[[World], bool], seconds: float = 60.0) 
     return world
 
 
-def smaller_worlds(world: World) -> Iterator[World]:
+def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
     """Yield worlds without one part, largest parts first."""
     problem = world.problem
     domain = problem.domain
@@ -158,7 +158,7 @@ def _smaller_rules(rules: tuple[Rule, ...]) -> Iterator[tuple[Rule, ...]]:
                 yield (*rules[:i], replace(rule, conditions=conditions), *rules[i + 1 :])
 
 
-def _without_situation(world: World, name: str) -> World:
+def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
     problem = world.problem
     domain = Domain(
         {n: s for n, s in problem.domain.situations.items() if n != name}, problem.domain.behaviors,
@@ -179,7 +179,7 @@ def _without_situation(world: World, name: str) -> World:
     )  # fmt: skip
 
 
-def without_individual(world: World, individual: str) -> World | None:
+def without_individual(world: RandomWorld, individual: str) -> RandomWorld | None:
     """Return a world without an individual that is neither named nor a value."""
     problem = world.problem
     if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
@@ -195,7 +195,7 @@ def without_individual(world: World, individual: str) -> World | None:
     return replace(world, problem=smaller)
 
 
-def _mentioned(name: str, world: World) -> bool:
+def _mentioned(name: str, world: RandomWorld) -> bool:
     """Return whether a situation type is used."""
     problem = world.problem
     domain = problem.domain

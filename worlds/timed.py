@@ -51,7 +51,7 @@ class Action:
 
 
 @dataclass(frozen=True)
-class World:
+class TimedWorld:
     """Actions, the facts that hold at first, and those that are wanted."""
 
     facts: int
@@ -65,7 +65,7 @@ Running = tuple[int, int]
 State = tuple[frozenset[int], frozenset[Running]]
 
 
-def timed_world(seed: int) -> World:
+def timed_world(seed: int) -> TimedWorld:
     """Return a random world; the same for the same seed."""
     rng = Random(seed)
     while True:
@@ -74,7 +74,7 @@ def timed_world(seed: int) -> World:
             return world
 
 
-def _drawn(rng: Random) -> World:
+def _drawn(rng: Random) -> TimedWorld:
     facts = rng.randint(3, 5)
 
     def literals(most: int, spans: tuple[str, ...]) -> tuple[tuple[str, Literal], ...]:
@@ -100,10 +100,10 @@ def _drawn(rng: Random) -> World:
         actions.append(Action(rng.randint(1, 4), actor, tuple(asks), tuple(makes)))
     initial = frozenset(fact for fact in range(facts) if rng.random() < 0.3)
     goal = tuple((fact, rng.random() < 0.8) for fact in rng.sample(range(facts), rng.randint(1, 2)))
-    return World(facts, tuple(actions), initial, goal)
+    return TimedWorld(facts, tuple(actions), initial, goal)
 
 
-def least_makespan(world: World) -> int | None:
+def least_makespan(world: TimedWorld) -> int | None:
     """Return the least makespan of any plan; None if there is no plan.
 
     Raises
@@ -132,7 +132,7 @@ def least_makespan(world: World) -> int | None:
     return None
 
 
-def _next(world: World, state: State) -> Iterator[tuple[int, State]]:
+def _next(world: TimedWorld, state: State) -> Iterator[tuple[int, State]]:
     """Yield each state that may follow, with the seconds until then: an action begins, or a second passes."""
     facts, running = state
     for number in range(len(world.actions)):
@@ -146,7 +146,7 @@ def _next(world: World, state: State) -> Iterator[tuple[int, State]]:
                 yield 1, passed
 
 
-def _begun(world: World, facts: frozenset[int], running: frozenset[Running], number: int) -> State | None:
+def _begun(world: TimedWorld, facts: frozenset[int], running: frozenset[Running], number: int) -> State | None:
     action = world.actions[number]
     if any(other == number for other, _ in running):
         return None
@@ -165,7 +165,9 @@ def _begun(world: World, facts: frozenset[int], running: frozenset[Running], num
     return after, running | {(number, action.seconds)}
 
 
-def _passed(world: World, facts: frozenset[int], running: frozenset[Running], order: tuple[int, ...]) -> State | None:
+def _passed(
+    world: TimedWorld, facts: frozenset[int], running: frozenset[Running], order: tuple[int, ...]
+) -> State | None:
     """Return the state a second later, where actions end one after the other; None if one can't."""
     left = frozenset((number, seconds - 1) for number, seconds in running)
     for number in order:
@@ -181,13 +183,13 @@ def _passed(world: World, facts: frozenset[int], running: frozenset[Running], or
     return facts, left
 
 
-def _taken(world: World, running: frozenset[Running], literals: list[Literal]) -> bool:
+def _taken(world: TimedWorld, running: frozenset[Running], literals: list[Literal]) -> bool:
     """Return whether a fact is in the making in what runs."""
     making = {fact for number, _ in running for fact, _ in world.actions[number].at("throughout", "makes")}
     return any(fact in making for fact, _ in literals)
 
 
-def _kept(world: World, facts: frozenset[int], running: frozenset[Running]) -> bool:
+def _kept(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]) -> bool:
     """Return whether what runs still has what it asks for throughout."""
     return all(_hold(facts, world.actions[number].at("throughout")) for number, _ in running)
 
@@ -202,7 +204,7 @@ def _made(facts: frozenset[int], literals: list[Literal]) -> frozenset[int]:
     return (facts - false) | true
 
 
-def problem_of(world: World) -> Problem:
+def problem_of(world: TimedWorld) -> Problem:
     """Return a world as a planning problem: facts of one thing, one behaviour for each action, which names its actor."""
     situations = {f"F{i}": SituationType(f"F{i}", ("Thing",), "Truth", boolean=True) for i in range(world.facts)}
     behaviors = {}
@@ -232,7 +234,7 @@ def problem_of(world: World) -> Problem:
     return Problem("urn:timed", Domain(situations, behaviors), classes, {}, initial, goal)
 
 
-def rejected(world: World, timed: TimedPlan) -> str | None:
+def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
     """Return what is wrong with a plan in time as this world sees it, which shares no code with any checker; None if nothing is."""
     if any(slot.begin.denominator != 1 for slot in timed.slots):
         return "a step begins between two seconds"
@@ -258,7 +260,7 @@ def rejected(world: World, timed: TimedPlan) -> str | None:
     return None
 
 
-def _all_begun(world: World, state: State, numbers: tuple[int, ...]) -> State | None:
+def _all_begun(world: TimedWorld, state: State, numbers: tuple[int, ...]) -> State | None:
     for number in numbers:
         after = _begun(world, *state, number)
         if after is None:

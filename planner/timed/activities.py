@@ -23,7 +23,7 @@ Key: TypeAlias = "tuple[str, object]"
 """A read access: the value of a symbol (situation type and arguments), or the holders of a value."""
 
 
-class Moment(Enum):
+class EventKind(Enum):
     """An event of a sequence: a step begins, ends, or is done as a whole."""
 
     BEGIN = "begin"
@@ -31,7 +31,7 @@ class Moment(Enum):
     WHOLE = "whole"
 
 
-Event: TypeAlias = "tuple[int, Moment]"
+StepEvent: TypeAlias = "tuple[int, EventKind]"
 """The number of a step, and its event."""
 
 
@@ -100,7 +100,7 @@ class Noting(Facts):
         return frozenset(key for key in self.reads if key[0] not in rules) if rules else frozenset(self.reads)
 
 
-def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event]) -> list[Activity]:
+def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEvent]) -> list[Activity]:
     """Return the activities of steps that are executed in the order of events.
 
     Parameters
@@ -108,7 +108,7 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event])
     problem : Problem
     steps : sequence of Step
         Without sub-steps.
-    events : iterable of Event
+    events : iterable of StepEvent
         Each step as a whole, or its begin and later its end.
 
     Raises
@@ -119,16 +119,16 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[Event])
     course = _Course(problem, steps)
     for number, moment in events:
         check("finding the order that the steps need")
-        if moment is not Moment.END:
+        if moment is not EventKind.END:
             course.begin(number)
-        if moment is not Moment.BEGIN:
+        if moment is not EventKind.BEGIN:
             course.end(number)
     return course.found()
 
 
-def in_sequence(steps: Sequence[Step]) -> Iterator[Event]:
+def in_sequence(steps: Sequence[Step]) -> Iterator[StepEvent]:
     """Yield the events of steps that are executed one after another."""
-    yield from ((number, Moment.WHOLE) for number in range(len(steps)))
+    yield from ((number, EventKind.WHOLE) for number in range(len(steps)))
 
 
 class _Course:

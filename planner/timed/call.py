@@ -11,13 +11,13 @@ from time import perf_counter
 import networkx
 
 from confab.planner.plan import Plan, Reason, Step, renumbered
-from confab.planner.timed.activities import Event, InapplicableError, activities, in_sequence
+from confab.planner.timed.activities import InapplicableError, StepEvent, activities, in_sequence
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
 from confab.planner.timed.order import Order, order_of
 from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
-    Candidate,
+    CandidateSchedule,
     Choices,
     durations_with,
     least,
@@ -45,7 +45,7 @@ def in_time(
     plan: Plan,
     seconds: float | None = None,
     separation: Fraction = Fraction(0),
-    events: Sequence[Event] | None = None,
+    events: Sequence[StepEvent] | None = None,
 ) -> Timed:
     """Return a plan in time.
 
@@ -58,7 +58,7 @@ def in_time(
         Limit of the search for a short schedule.
     separation : Fraction
         The time between conflicting events, in seconds: PDDL's epsilon.
-    events : sequence of Event, optional
+    events : sequence of StepEvent, optional
         The order in which its primitives begin and end; one after another if not given.
     """
     until = perf_counter() + (SECONDS if seconds is None else seconds)
@@ -118,7 +118,7 @@ def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
 
 
 def _timed(
-    problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: Candidate
+    problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
 ) -> TimedPlan | None:
     """Return a schedule as a timed plan, with the turns taken by their actors; None if its levels have no sequential order."""
     renamed: dict[int, dict[str, str]] = {}

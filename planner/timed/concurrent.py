@@ -28,7 +28,7 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import Evaluation, heuristic
 from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
-from confab.planner.timed.activities import Event, Moment
+from confab.planner.timed.activities import EventKind, StepEvent
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.pieces import duration_of
 from confab.planner.validation import Facts
@@ -184,23 +184,23 @@ class _Cut:
         ended = _behavior(behavior, behavior.name + END, (*held, replace(free, value=TRUE)), made)
         yield replace(ended, cost=0.0, price=None)
 
-    def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[Event]]:
+    def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[StepEvent]]:
         """Return the steps of a sequence of operators, numbered in the order of their begins, and the events."""
         steps: list[Step] = []
-        events: list[Event] = []
+        events: list[StepEvent] = []
         open_: dict[tuple[str, tuple[str, ...]], int] = {}
         for operator in operators:
             name, arguments, bindings = task.describe(operator)
             behavior, _, part = name.partition("@")
             if f"@{part}" == END:
-                events.append((open_.pop((behavior, arguments)), Moment.END))
+                events.append((open_.pop((behavior, arguments)), EventKind.END))
                 continue
             number = len(steps)
             identity = self.whole.id_of(behavior, arguments)
             steps.append(Step((number,), identity, task.level, behavior, arguments, bindings))
             if part:
                 open_[behavior, arguments] = number
-            events.append((number, Moment.BEGIN if part else Moment.WHOLE))
+            events.append((number, EventKind.BEGIN if part else EventKind.WHOLE))
         return Plan(tuple(steps)), events
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from confab.planner.timed.network import Network, earliest
 from confab.planner.timed.order import BEGIN, END, Order
-from confab.planner.timed.schedules import Candidate, Choices, TurnId, durations_with, turn_edges
+from confab.planner.timed.schedules import CandidateSchedule, Choices, TurnId, durations_with, turn_edges
 
 WORK = 8.0
 """Maximum deterministic time of the solver, about seconds."""
@@ -19,8 +19,8 @@ LARGEST = 2**40
 
 
 def shorter(
-    order: Order, network: Network, choices: Choices, found: Candidate, bound: int, seconds: float
-) -> tuple[Candidate, int]:
+    order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int, seconds: float
+) -> tuple[CandidateSchedule, int]:
     """Return the best schedule that the solver finds, at least as short as a given one, and a lower bound.
 
     Parameters
@@ -29,7 +29,7 @@ def shorter(
     network : Network
     choices : Choices
         Of the same order.
-    found : Candidate
+    found : CandidateSchedule
         A schedule.
     bound : int
         A lower bound of the makespan.
@@ -57,14 +57,14 @@ def shorter(
     begins = earliest(network, turn_edges(order, turns), durations_with(network, choices, turns))
     if begins is None or begins.makespan >= found.makespan:
         return found, min(best, found.makespan)
-    return Candidate(turns, begins), min(best, begins.makespan)
+    return CandidateSchedule(turns, begins), min(best, begins.makespan)
 
 
 class _Model:
     """The variables and constraints of a schedule."""
 
     def __init__(
-        self, model: Any, order: Order, network: Network, choices: Choices, found: Candidate, bound: int
+        self, model: Any, order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int
     ) -> None:
         self.model, self.order, self.network, self.choices, self.found = model, order, network, choices, found
         self.horizon = found.makespan + network.separation

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 
-from confab.planner.timed.activities import Activity, Event, InapplicableError, Key, Moment
+from confab.planner.timed.activities import Activity, EventKind, InapplicableError, Key, StepEvent
 from confab.planner.validation import Cell
 from confab.reasoner.symbols import FALSE, Problem, Times
 
@@ -79,7 +79,7 @@ class _Record:
     position: int  # of `low` among the events
 
 
-def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[Event]) -> Order:
+def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[StepEvent]) -> Order:
     """Return the necessary order of activities.
 
     Parameters
@@ -87,7 +87,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     problem : Problem
     activities : sequence of Activity
         As `confab.planner.timed.activities.activities` returns them for the same events.
-    events : iterable of Event
+    events : iterable of StepEvent
 
     Raises
     ------
@@ -126,7 +126,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
 
 
 def _records(
-    activities: Sequence[Activity], events: Iterable[Event]
+    activities: Sequence[Activity], events: Iterable[StepEvent]
 ) -> tuple[dict[Cell, list[_Record]], dict[Key, list[_Record]], dict[int, int], dict[int, int]]:
     """Return the accesses to each symbol, the accesses to holders of each value, and the positions of begins and of ends."""
     cells: dict[Cell, list[_Record]] = defaultdict(list)
@@ -136,15 +136,15 @@ def _records(
     position = 0
     for number, moment in events:
         one = activities[number]
-        parts = [(one.begin, BEGIN, BEGIN), (one.middle, BEGIN, END)] if moment is not Moment.END else []
+        parts = [(one.begin, BEGIN, BEGIN), (one.middle, BEGIN, END)] if moment is not EventKind.END else []
         starts.setdefault(number, position)
-        if moment is Moment.WHOLE:
+        if moment is EventKind.WHOLE:
             position += 1
-        if moment is not Moment.BEGIN:
+        if moment is not EventKind.BEGIN:
             ends[number] = position
             parts.append((one.end, END, END))
         for access, low, high in parts:
-            at = position - (moment is Moment.WHOLE and low == BEGIN)
+            at = position - (moment is EventKind.WHOLE and low == BEGIN)
             for key in access.reads:
                 if isinstance(key[1], str):
                     values[key].append(_Record(number, low, high, None, at))

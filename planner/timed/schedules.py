@@ -35,7 +35,7 @@ class Choices:
 
 
 @dataclass
-class Candidate:
+class CandidateSchedule:
     """The order of turns of each resource; `begins` follows from it."""
 
     turns: list[list[TurnId]]
@@ -47,7 +47,9 @@ class Candidate:
         return self.begins.makespan
 
 
-def shortest(order: Order, network: Network, choices: Choices, until: float, bound: int = 0) -> Candidate | None:
+def shortest(
+    order: Order, network: Network, choices: Choices, until: float, bound: int = 0
+) -> CandidateSchedule | None:
     """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`; None if none is found.
 
     The search ends with a schedule as short as the lower bound.
@@ -104,11 +106,11 @@ class _Search:
                 for member in turn.members:
                     self.turns_of[member].append((resource, number))
 
-    def evaluated(self, turns: list[list[TurnId]]) -> Candidate | None:
+    def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
         """Return the schedule of some turns; None if they have none."""
         durations = durations_with(self.network, self.choices, turns)
         begins = earliest(self.network, turn_edges(self.order, turns), durations)
-        return None if begins is None else Candidate(turns, begins)
+        return None if begins is None else CandidateSchedule(turns, begins)
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
         """Yield the turns of the sequence, and those with each turn taken by the actor that is free first."""
@@ -150,7 +152,7 @@ class _Search:
         members = self.order.resources[turn[0]].turns[turn[1]].members
         return sum(its.get(member, self.network.durations[member]) for member in members)
 
-    def improved(self, best: Candidate, until: float, bound: int) -> Candidate:
+    def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
         """Return a schedule after exchanges of turns on the critical path."""
         now, barren = best, 0
         left = MOST_ARCS // (1 + len(self.network.edges) + len(self.network.durations))
@@ -159,7 +161,7 @@ class _Search:
         while best.makespan > bound and barren < ROUNDS and left > 0 and perf_counter() < until:
             step += 1
             barren += 1
-            options: list[tuple[int, int, tuple[TurnId, TurnId], Candidate]] = []
+            options: list[tuple[int, int, tuple[TurnId, TurnId], CandidateSchedule]] = []
             for pair, turns in self.neighbours(now):
                 left -= 1
                 if left < 0 or perf_counter() > until:
@@ -176,7 +178,7 @@ class _Search:
                 best, barren = now, 0
         return best
 
-    def neighbours(self, now: Candidate) -> Iterator[tuple[tuple[TurnId, TurnId], list[list[TurnId]]]]:
+    def neighbours(self, now: CandidateSchedule) -> Iterator[tuple[tuple[TurnId, TurnId], list[list[TurnId]]]]:
         """Yield exchanges of neighbouring turns, and moves of turns to other actors, on the critical path."""
         critical = set(self.critical(now))
         for resource, line in enumerate(now.turns):
@@ -191,7 +193,7 @@ class _Search:
                             for turns in self.moved(now, turn, resource, target):
                                 yield (turn, (resource, -1 - target)), turns
 
-    def moved(self, now: Candidate, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
+    def moved(self, now: CandidateSchedule, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
         """Yield the turns with one given to another actor, among its turns by their begins, or one earlier or later."""
 
         def begin(one: TurnId) -> int:
@@ -204,14 +206,14 @@ class _Search:
         for at in range(max(place - 1, 0), min(place + 1, len(there)) + 1):
             yield self.replaced(now, {resource: left, target: [*there[:at], turn, *there[at:]]})
 
-    def replaced(self, now: Candidate, lines: Mapping[int, list[TurnId]]) -> list[list[TurnId]]:
+    def replaced(self, now: CandidateSchedule, lines: Mapping[int, list[TurnId]]) -> list[list[TurnId]]:
         return [lines.get(i, line) for i, line in enumerate(now.turns)]
 
     def meets(self, turn: TurnId, critical: set[int]) -> bool:
         """Return whether a turn has an activity on the critical path."""
         return not critical.isdisjoint(self.order.resources[turn[0]].turns[turn[1]].members)
 
-    def critical(self, now: Candidate) -> list[int]:
+    def critical(self, now: CandidateSchedule) -> list[int]:
         """Return the activities on the critical path, the last first."""
         durations = durations_with(self.network, self.choices, now.turns)
         ends = [b + d for b, d in zip(now.begins.begins, durations, strict=True)]

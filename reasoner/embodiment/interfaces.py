@@ -50,7 +50,7 @@ TIME_LIMIT = 60.0
 
 
 @dataclass(frozen=True)
-class Call:
+class InterfaceCall:
     """The action that carries out a behaviour. Of each argument: the position among the behaviour's parameters, or a constant."""
 
     action: str
@@ -84,7 +84,7 @@ class Interface:
     iri: str
     name: str
     transport: str
-    calls: Mapping[str, Call]
+    calls: Mapping[str, InterfaceCall]
     meanings: Mapping[str, Meaning]
     readings: tuple[Reading, ...]
     robot_names: Mapping[str, str] = field(default_factory=dict)
@@ -115,7 +115,7 @@ def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) ->
         known = f" (interfaces: {', '.join(found)})" if found else ", and no other interface; let the scene import one"
         raise EmbodimentError(f"no interface '{wanted}'{nearest(wanted, found)}{known}")
     iri, transport, query, attempts, failures = found[wanted]
-    calls: dict[str, Call] = {}
+    calls: dict[str, InterfaceCall] = {}
     for node, action, seconds, behavior in rows(store, ACTIONS % _literal(iri)):
         if names(behavior) in calls:
             raise EmbodimentError(f"{behavior} has two actions of {wanted}; one of them is {node}", node)
@@ -123,7 +123,7 @@ def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) ->
             name: _argument(node, name, position, constant)
             for name, position, constant in rows(store, ARGUMENTS % (_literal(node), _literal(behavior)))
         }
-        calls[names(behavior)] = Call(action, arguments, float(seconds or TIME_LIMIT))
+        calls[names(behavior)] = InterfaceCall(action, arguments, float(seconds or TIME_LIMIT))
     meanings: dict[str, Meaning] = {}
     for status, success, code, situation in rows(store, ANSWERS % _literal(iri)):
         known_so_far = meanings[status].refuted_while if status in meanings else ()

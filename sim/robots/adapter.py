@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.reasoner.amounts import written
-from confab.reasoner.embodiment.interfaces import Call, Interface, Reading
+from confab.reasoner.embodiment.interfaces import Interface, InterfaceCall, Reading
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
 from confab.sim.robots.transport import Model, RobotError, Transport
 
@@ -170,7 +170,7 @@ class InterfaceWorld:
         with self.changed:
             return self.changed.wait_for(lambda: self.running is None, GRACE)
 
-    def _cancelled(self, step: Step, call: Call) -> Report:
+    def _cancelled(self, step: Step, call: InterfaceCall) -> Report:
         """Cancel the running action and return why."""
         stopped = self.stopping
         ignored: list[Exception | None] = []
@@ -187,7 +187,7 @@ class InterfaceWorld:
         except Exception as error:
             ignored.append(error)
 
-    def _meaning(self, step: Step, call: Call, status: str, message: str) -> Report:
+    def _meaning(self, step: Step, call: InterfaceCall, status: str, message: str) -> Report:
         meaning = self.interface.meanings.get(status)
         if meaning is None:
             known = ", ".join(self.interface.meanings)

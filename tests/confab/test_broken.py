@@ -770,7 +770,7 @@ main()
 @pytest.mark.parametrize(
     ("command", "moment"),
     [
-        ("run one-arm-serving --no-video --out . --memory m.ttl", "confab.sim.world:World.execute"),
+        ("run one-arm-serving --no-video --out . --memory m.ttl", "confab.sim.world:PhysicsWorld.execute"),
         ("run towers-small --no-video --out . --memory m.ttl", "confab.reasoner.files:os.fsync"),
         ("plan living-room -o p.json", "confab.planner.validation:validate"),
         ("plan living-room -o p.json", "confab.reasoner.files:os.fsync"),

@@ -167,7 +167,7 @@ def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
 ) -> None:
     """Without a window, PyBullet's server refuses to draw; what is asked of it can be seen all the same."""
     from confab.sim.screen import Screen
-    from confab.sim.world import World
+    from confab.sim.world import PhysicsWorld
 
     written: list[str] = []
 
@@ -178,7 +178,9 @@ def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
     monkeypatch.setattr("confab.sim.screen.pybullet.addUserDebugText", write)
     monkeypatch.setattr("confab.sim.engine.pybullet.GUI", pybullet.DIRECT)
     begin = time.monotonic()
-    with World(scene.embodiment, scene.problem.initial, watch=Screen(("REACH", "GRASP"), 4.0), gui=True) as world:
+    with PhysicsWorld(
+        scene.embodiment, scene.problem.initial, watch=Screen(("REACH", "GRASP"), 4.0), gui=True
+    ) as world:
         for world.current in (0, 1):
             world.run(120)
         looks = [pybullet.getVisualShapeData(bead.body, physicsClientId=world.client)[0] for bead in world.beads]

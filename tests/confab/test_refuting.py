@@ -17,7 +17,7 @@ from confab.scene import Scene
 from confab.sim.swings import check_swing
 from confab.sim.verdict import SkillError
 from confab.sim.verify import expectations
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 BLOCKED = "blocked-cupboard"
 IN_THE_WAY = Fact(Symbol("LOCATION", ("bottle",)), "before_door")
@@ -70,10 +70,10 @@ def test_one_refutation_is_enough() -> None:
 
 def test_what_stands_elsewhere_is_not_in_the_way_of_a_swing() -> None:
     scene, _ = first()
-    with World(scene.embodiment, dict(scene.problem.initial) | {IN_THE_WAY.symbol: "left_spot"}) as world:
+    with PhysicsWorld(scene.embodiment, dict(scene.problem.initial) | {IN_THE_WAY.symbol: "left_spot"}) as world:
         check_swing(world, "door", [0.0, 0.5, 1.0, 1.5])
     with (
-        World(scene.embodiment, scene.problem.initial) as world,
+        PhysicsWorld(scene.embodiment, scene.problem.initial) as world,
         pytest.raises(SkillError, match="bottle stands in the way of door"),
     ):
         check_swing(world, "door", [0.0, 0.5, 1.0, 1.5])

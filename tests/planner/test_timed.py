@@ -19,7 +19,7 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, Symbol, Times
 from confab.reasoner.timing import only_during
-from worlds.timed import World, least_makespan, problem_of, rejected, timed_world
+from worlds.timed import TimedWorld, least_makespan, problem_of, rejected, timed_world
 
 
 @cache
@@ -90,7 +90,7 @@ def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
     return concurrent.plan(problem, Limits(seconds=5.0))
 
 
-def wrong(world: World) -> str | None:
+def wrong(world: TimedWorld) -> str | None:
     """Return what is wrong with the plan of a world: it isn't one, or it is shorter than any can be."""
     outcome, timed = planned(problem_of(world))
     assert outcome.status is not Status.UNSOLVABLE or only_during(problem_of(world)) == frozenset()

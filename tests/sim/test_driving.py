@@ -12,7 +12,7 @@ from confab.sim.driving import drive
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import SkillError
 from confab.sim.verify import verify
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 from .conftest import case
 
@@ -22,10 +22,10 @@ def tables() -> Embodiment:
     return case("two-tables").embodiment
 
 
-def world(embodiment: Embodiment, *fixtures: Fixture, perturb: Perturbation | None = None) -> World:
+def world(embodiment: Embodiment, *fixtures: Fixture, perturb: Perturbation | None = None) -> PhysicsWorld:
     """Return a world of the robot between its tables, with more furniture."""
     more = replace(embodiment, fixtures=(*embodiment.fixtures, *fixtures))
-    return World(more, case("two-tables").initial, beads=False, perturb=perturb)
+    return PhysicsWorld(more, case("two-tables").initial, beads=False, perturb=perturb)
 
 
 def test_a_robot_that_drives_serves_from_two_tables() -> None:

@@ -9,19 +9,19 @@ import pytest
 import confab
 from confab.sim.film import BAR, Film, _points, _visible
 from confab.sim.picture import view_of
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 SCENE = confab.load("spice-drawer")
 BLANK: Any = np.full((544, 960, 3), 255, np.uint8)
 
 
 @pytest.fixture
-def world() -> Iterator[World]:
-    with World(SCENE.embodiment, SCENE.problem.initial, beads=False) as world:
+def world() -> Iterator[PhysicsWorld]:
+    with PhysicsWorld(SCENE.embodiment, SCENE.problem.initial, beads=False) as world:
         yield world
 
 
-def test_a_name_is_written_only_where_the_thing_is_seen(world: World) -> None:
+def test_a_name_is_written_only_where_the_thing_is_seen(world: PhysicsWorld) -> None:
     film = Film("unwritten.mp4", SCENE.plan().plan.primitives)
     film.camera = view_of(SCENE.embodiment, film.width, film.height, BAR)
     named = film._named(BLANK, world)
@@ -33,7 +33,7 @@ def test_a_name_is_written_only_where_the_thing_is_seen(world: World) -> None:
     assert not (film._named(BLANK, world) == named).all()
 
 
-def test_the_camera_goes_where_the_handle_is_seen(world: World) -> None:
+def test_the_camera_goes_where_the_handle_is_seen(world: PhysicsWorld) -> None:
     """From across the table the drawer's handle is behind its chest."""
     film = Film("unwritten.mp4", [step for step in SCENE.plan().plan.primitives if "drawer" in step.arguments])
     first, handle = view_of(SCENE.embodiment, film.width, film.height, BAR), _points(world, "drawer")[0][0]

@@ -11,7 +11,7 @@ from confab.planner.plan import Step
 from confab.reasoner.symbols import Fact, Symbol
 from confab.sim.faults import knocked
 from confab.sim.live import LiveWorld
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 REACH = Step((0,), 8, 3, "B3_REACH_HAND_OBJECT", ("right_hand", "bottle1"), {"place": "location4"}, None, ())
 
@@ -19,7 +19,7 @@ REACH = Step((0,), 8, 3, "B3_REACH_HAND_OBJECT", ("right_hand", "bottle1"), {"pl
 @pytest.fixture
 def live() -> Iterator[LiveWorld]:
     scene = confab.load("beverage-serving")
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         yield LiveWorld(world, scene.problem.classes, scene.problem, "canReach")
 
 
@@ -89,7 +89,7 @@ def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
 def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
     """It lies on its side around the handle, where it can't turn: it draws back first."""
     scene = confab.load("kitchen-corner")
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         live, opening = LiveWorld(world, scene.problem.classes), Step((0,), 0, 3, "F3_OPEN", ("right_hand", "drawer"))
         live.announce((Intervention(InterventionKind.WORLD, (Fact(Symbol("OPENED", ("drawer",)), "false"),), at=1.7),))
         assert live.execute(opening).code == "interrupted"
@@ -148,7 +148,7 @@ def test_room_on_the_table_is_within_reach_and_clear_of_everything(live: LiveWor
 
 def test_a_timed_fault_that_was_planted_before_happens_in_a_live_world() -> None:
     scene = confab.load("beverage-serving")
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         knocked("cup2", 0, 0.1)(world)
         live = LiveWorld(world, scene.problem.classes)
         assert live.execute(REACH).code == "toppled"

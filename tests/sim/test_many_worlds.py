@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pybullet
 
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 from tests.sim.conftest import Case
 
 
@@ -28,7 +28,7 @@ def used() -> int:
 def test_worlds_that_come_and_go_take_no_memory_and_leave_no_files(serving: Case) -> None:
     def come_and_go(times: int) -> None:
         for _ in range(times):
-            with World(serving.embodiment, serving.initial, 0):
+            with PhysicsWorld(serving.embodiment, serving.initial, 0):
                 pass
 
     come_and_go(3)

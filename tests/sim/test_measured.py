@@ -11,7 +11,7 @@ from confab.reasoner.symbols import Symbol
 from confab.sim.interventions import UPRIGHT, put
 from confab.sim.verdict import Verdict
 from confab.sim.verify import compare
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 STACK = Path(__file__).parent / "right" / "stack.ttl"
 ON = """
@@ -31,7 +31,7 @@ def stack(tmp_path: Path, bounds: str) -> confab.Scene:
 
 def test_what_is_on_what_is_measured_and_a_difference_is_told_in_numbers(tmp_path: Path) -> None:
     scene = stack(tmp_path, "beside <= 0.02; over >= -0.004; over <= 0.004; contact >= 0.1")
-    with World(scene.embodiment, scene.problem.initial) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         a_on_b = Symbol("ON", ("a", "b"))
         state = world.observe()
         assert {value for symbol, value in state.items() if symbol.situation == "ON"} == {"false"}

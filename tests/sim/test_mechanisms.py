@@ -26,7 +26,7 @@ from confab.sim.skills import perform
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import CODES, SkillError, Verdict
 from confab.sim.verify import compare, expectations, verify
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 PANEL = Mechanism(
     "panel",
@@ -62,10 +62,10 @@ def by_skill(embodiment: Embodiment) -> Mapping[str, SkillUse]:
     return {use.skill: use for use in embodiment.skills.values()}
 
 
-def with_panel(**changed: float) -> World:
+def with_panel(**changed: float) -> PhysicsWorld:
     """A world with the board alone; the button's joint may be another one."""
     button = replace(PANEL.links[0], **changed)  # type: ignore[arg-type]
-    return World(
+    return PhysicsWorld(
         replace(kitchen().embodiment, mechanisms=(replace(PANEL, links=(button,)),), places={}, perceivers={}), {}
     )
 
@@ -100,7 +100,7 @@ def test_tubes_are_put_into_a_centrifuge_that_is_started_with_its_lid_shut() -> 
 def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
     scene = kitchen()
     skills, roles = by_skill(scene.embodiment), {"hand": "right_hand", "object": "drawer"}
-    with World(scene.embodiment, scene.problem.initial, seed=3, perturb=Perturbation(), beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, seed=3, perturb=Perturbation(), beads=False) as world:
         before = world.truth("jar")[1]
         measured = perform(world, skills["operate"], roles)
         moved = world.truth("jar")[1] - before
@@ -116,7 +116,7 @@ def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
 def test_a_handle_that_one_finger_closes_beside_is_taken_anew_where_the_other_met_it() -> None:
     scene = kitchen()
     roles = {"hand": "right_hand", "object": "drawer"}
-    with World(scene.embodiment, scene.problem.initial, 7007, Perturbation(), beads=False, noise=0.008) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, 7007, Perturbation(), beads=False, noise=0.008) as world:
         perform(world, by_skill(scene.embodiment)["operate"], roles)
         assert world.observe()[Symbol("OPENED", ("drawer",))] == "true"
 
@@ -124,7 +124,7 @@ def test_a_handle_that_one_finger_closes_beside_is_taken_anew_where_the_other_me
 def test_fingers_open_less_at_a_handle_with_little_room_beside_it() -> None:
     scene = kitchen()
     roles = {"hand": "left_hand", "object": "door"}
-    with World(scene.embodiment, scene.problem.initial, 7013, Perturbation(), beads=False, noise=0.008) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, 7013, Perturbation(), beads=False, noise=0.008) as world:
         for skill in ("operate", "operate_back"):
             perform(world, by_skill(scene.embodiment)[skill], roles)
         assert world.observe()[Symbol("OPENED", ("door",))] == "false"
@@ -141,7 +141,7 @@ def test_a_hand_gives_way_to_what_a_handle_that_seems_farther_is_on(
     name: str, link: str, opened: bool, off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = confab.load(name)
-    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
         world.links[link].set(link, opened)
         farther = {mechanic.body: np.array([off, 0.0, 0.0]) for mechanic in world.mechanics}
         monkeypatch.setattr(world, "look", lambda before=0: world.shifts.update(farther))
@@ -152,7 +152,7 @@ def test_a_hand_gives_way_to_what_a_handle_that_seems_farther_is_on(
 
 def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
     scene = kitchen()
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         before = world.truth("jar")[1]
         opened = Symbol("OPENED", ("drawer",))
         LiveWorld(world, {}).disturb(Intervention(InterventionKind.WORLD, (Fact(opened, "true"),)))
@@ -181,7 +181,7 @@ def test_a_button_that_resists_too_much_is_given_up_with_the_force() -> None:
 def test_what_stands_in_the_way_of_a_door_is_named_before_the_hand_moves() -> None:
     scene = kitchen()
     operate, roles = by_skill(scene.embodiment)["operate"], {"hand": "left_hand", "object": "door"}
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         displaced("lid", (-0.02, 0.52))(world)
         with pytest.raises(SkillError) as failure:
             perform(world, operate, roles)
@@ -206,7 +206,7 @@ def test_the_lever_of_the_guide_is_turned_and_turned_back(tmp_path: Path) -> Non
     assert list(confab.validate(file)) == []
     embodiment = confab.load(str(file)).embodiment
     skills, roles = by_skill(embodiment), {"hand": "left_hand", "object": "lever"}
-    with World(embodiment, {}, seed=2, perturb=Perturbation()) as world:
+    with PhysicsWorld(embodiment, {}, seed=2, perturb=Perturbation()) as world:
         for skill, value in (("operate", "true"), ("operate_back", "false")):
             perform(world, skills[skill], roles)
             assert world.observe()[Symbol("OPENED", ("lever",))] == value
@@ -217,7 +217,7 @@ def test_a_knob_is_turned_and_a_door_slides_aside_as_an_author_describes_them(tm
     (tmp_path / file.name).write_text(file.read_text())
     scene = with_reach(confab.load(tmp_path / file.name))
     assert str(scene.plan().verify()).startswith("verified")
-    with World(scene.embodiment, scene.problem.initial, seed=1, perturb=Perturbation(), beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, seed=1, perturb=Perturbation(), beads=False) as world:
         for i, behavior in enumerate(("F3_OPEN", "F3_SHUT")):
             verdict = world.execute(Step((i,), 0, 3, behavior, ("right_hand", "valve")))
             assert verdict.ok, verdict
@@ -235,7 +235,7 @@ def test_a_crank_is_turned_around_its_post_where_there_is_no_place_at_all(tmp_pa
 def test_a_button_that_seems_nearer_than_it_is_is_pressed_through(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = confab.load("centrifuge")
     press = by_skill(scene.embodiment)["press"]
-    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
         nearer = {mechanic.body: np.array([-0.009, 0.0, 0.0]) for mechanic in world.mechanics}
         monkeypatch.setattr(world, "look", lambda before=0: world.shifts.update(nearer))
         perform(world, press, {"hand": "right_hand", "object": "start"})
@@ -247,7 +247,7 @@ def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
     operate = by_skill(scene.embodiment)["operate"]
     wrong = replace(operate, phases=(replace(operate.phases[0], to="thing.handle"),))
     unset = replace(operate, phases=(replace(operate.phases[0], above="hover"),))
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         for use, word in ((wrong, "thing"), (unset, "hover")):
             with pytest.raises(SkillError, match=f"'{word}' is not stated") as failure:
                 perform(world, use, {"hand": "left_hand", "object": "door"})
@@ -266,7 +266,7 @@ def test_validation_finds_a_feature_that_a_link_has_not() -> None:
 def test_the_model_of_a_mechanism_is_where_physics_has_it() -> None:
     mechanism = next(one for one in kitchen().embodiment.mechanisms if one.name == "cupboard")
     mechanism = replace(mechanism, yaw=0.3)
-    with World(replace(kitchen().embodiment, mechanisms=(mechanism,), places={}, perceivers={}), {}) as world:
+    with PhysicsWorld(replace(kitchen().embodiment, mechanisms=(mechanism,), places={}, perceivers={}), {}) as world:
         mechanic = world.links["door"]
         for opened in (False, True):
             mechanic.set("door", opened)
@@ -288,7 +288,7 @@ def test_the_interpreter_has_all_that_phases_may_say() -> None:
 
 def test_a_joint_that_is_not_open_is_told_as_it_is_perceived_with_its_thresholds() -> None:
     scene = kitchen()
-    with World(scene.embodiment, scene.problem.initial) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         before = Verdict(True, measured={"joint": 1.2})
         verdict = compare(world, {Symbol("OPENED", ("door",)): "true"}, before)
     assert verdict.code == "stuck"
@@ -300,7 +300,7 @@ def test_where_on_a_joint_s_path_a_hand_does_not_get_is_told() -> None:
     cupboard, *others = scene.embodiment.mechanisms
     x, y, z = cupboard.position
     away = replace(scene.embodiment, mechanisms=(replace(cupboard, position=(x + 0.1, y + 0.35, z)), *others))
-    with World(away, scene.problem.initial) as world:
+    with PhysicsWorld(away, scene.problem.initial) as world:
         verdict = world.execute(Step((0,), 0, 3, "F3_OPEN", ("left_hand", "door")))
     assert verdict.code == "unreachable"
     assert verdict.message == "where the joint is at 1.05, the hand would be too far"

@@ -12,7 +12,7 @@ from confab.sim.motion import MotionLimits, Reacher, connect, leave, line, polyl
 from confab.sim.stages import MARGIN, Stage
 from confab.sim.urdf import Array, Spheres, read_urdf
 from confab.sim.verdict import SkillError
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 from .conftest import Case, case
 
@@ -142,7 +142,7 @@ def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
 
 def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
     one = case("beverage-serving")
-    with World(one.embodiment, one.initial, beads=False) as world:
+    with PhysicsWorld(one.embodiment, one.initial, beads=False) as world:
         hand = world.hands["left_hand"]
         turned, tip = hand.frame()
         for name in ("cup1", "bottle1"):
@@ -169,7 +169,7 @@ def put_beside(attempt: Attempt, q: Array, gap: float) -> None:
 
 @pytest.mark.parametrize(("gap", "enough"), [(0.01, True), (0.004, True), (0.001, False)])
 def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, gap: float, enough: bool) -> None:
-    with World(moved.embodiment, moved.initial, beads=False) as world:
+    with PhysicsWorld(moved.embodiment, moved.initial, beads=False) as world:
         attempt = Attempt.begin(world, "left_hand")
         pose = attempt.hand.pose
         put_beside(attempt, attempt.reacher().solve(pose[None])[0], gap)

@@ -9,7 +9,7 @@ from confab.sim.faults import displaced, drained, lying
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import Verdict
 from confab.sim.verify import compare
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 from .conftest import Case, case
 
@@ -31,7 +31,7 @@ def shuffled(case: Case, seed: int) -> State:
 @pytest.mark.parametrize("seed", range(5000, 5006))
 def test_random_worlds_are_perceived_as_they_were_set_up_in_spite_of_noise(serving: Case, seed: int) -> None:
     truth = shuffled(serving, seed)
-    with World(serving.embodiment, truth, seed, Perturbation(), noise=0.002) as world:
+    with PhysicsWorld(serving.embodiment, truth, seed, Perturbation(), noise=0.002) as world:
         for _ in range(5):
             assert dict(world.observe()) == dict(truth)
 
@@ -39,7 +39,7 @@ def test_random_worlds_are_perceived_as_they_were_set_up_in_spite_of_noise(servi
 def test_what_lies_or_stands_beside_every_place_is_at_none(serving: Case) -> None:
     where = {s.arguments[0]: s for s in serving.initial if s.situation == "LOCATION"}
     for plant, name in ((lying("cup1"), "cup1"), (displaced("cup2", (0.08, 0.0)), "cup2")):
-        with World(serving.embodiment, serving.initial, beads=False) as world:
+        with PhysicsWorld(serving.embodiment, serving.initial, beads=False) as world:
             plant(world)
             seen = world.observe()
             assert where[name] not in seen
@@ -51,7 +51,7 @@ def test_what_lies_or_stands_beside_every_place_is_at_none(serving: Case) -> Non
 def test_a_vessel_is_filled_from_a_tenth_of_a_serving_on(serving: Case) -> None:
     (symbol,) = (s for s in serving.initial if s.situation == "BEVERAGE" and s.arguments == ("bottle1",))
     for left, seen in ((2, serving.initial[symbol]), (1, "no_beverage")):
-        with World(serving.embodiment, serving.initial) as world:
+        with PhysicsWorld(serving.embodiment, serving.initial) as world:
             drained("bottle1", left)(world)
             assert world.observe()[symbol] == seen
 
@@ -70,7 +70,7 @@ def test_what_is_not_as_expected_is_looked_at_again_and_what_is_not_so_stays_fou
     wanted = {symbol: value for symbol, value in moved.initial.items() if symbol.situation == "LOCATION"}
     symbol = next(iter(wanted))
     who = symbol.arguments[0]
-    with World(moved.embodiment, moved.initial, beads=False, noise=0.002) as world:
+    with PhysicsWorld(moved.embodiment, moved.initial, beads=False, noise=0.002) as world:
         world.observe()
         world.errors[who] = world.steps, np.array([0.0, 0.0, 0.02])  # a look that was far off
         assert symbol not in world.observe()

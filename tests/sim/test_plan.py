@@ -16,7 +16,7 @@ from confab.sim.film import BAR, DOING, DONE, Film
 from confab.sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
 from confab.sim.staging import Perturbation
 from confab.sim.verify import verify
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 from .conftest import Case, case
 
@@ -147,14 +147,14 @@ def test_a_step_whose_promise_the_world_does_not_keep_fails(serving: Case) -> No
 
 def test_a_new_world_is_perceived_as_the_facts_that_it_was_set_up_with(serving: Case, moved: Case) -> None:
     for one in (serving, moved):
-        with World(one.embodiment, one.initial) as world:
+        with PhysicsWorld(one.embodiment, one.initial) as world:
             assert dict(world.observe()) == dict(one.initial)
 
 
 def test_the_beverage_can_be_seen_through_the_glass(serving: Case) -> None:
     images = []
     for beads in (True, False):
-        with World(serving.embodiment, serving.initial, beads=beads) as world:
+        with PhysicsWorld(serving.embodiment, serving.initial, beads=beads) as world:
             hide_vessels(world)
             images.append(picture(world, view_of(serving.embodiment, 480, 272)).astype(int))
     assert np.sum(np.abs(images[0] - images[1]).max(-1) > 40) > 60

@@ -8,7 +8,7 @@ import pytest
 
 from confab.sim.rollouts import Trial, rollouts, wilson
 from confab.sim.staging import Perturbation
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 from .conftest import Case
 
@@ -27,7 +27,7 @@ def first_steps(serving: Case, count: int = 2) -> Trial:
     )
 
 
-def die_once(mark: Path, world: World) -> None:
+def die_once(mark: Path, world: PhysicsWorld) -> None:
     """Kill the process that runs the second seed, the first time."""
     del world
     try:
@@ -37,7 +37,7 @@ def die_once(mark: Path, world: World) -> None:
     os._exit(9)
 
 
-def die(world: World) -> None:
+def die(world: PhysicsWorld) -> None:
     del world
     os._exit(9)
 

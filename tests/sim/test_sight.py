@@ -18,7 +18,7 @@ from confab.sim.live import LiveWorld
 from confab.sim.perception import observe_covered
 from confab.sim.verdict import SkillError
 from confab.sim.verify import Rollout, verify
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 CUP, JAR, LID = (Symbol("LOCATION", (name,)) for name in ("cup", "jar", "lid"))
 
@@ -28,13 +28,13 @@ def kitchen() -> Scene:
     return confab.load("kitchen-corner")
 
 
-def set_joint(world: World, link: str, opened: bool) -> None:
+def set_joint(world: PhysicsWorld, link: str, opened: bool) -> None:
     """Open or shut a link at once, with what it carries."""
     live = LiveWorld(world, {})
     live.disturb(Intervention(InterventionKind.WORLD, (Fact(Symbol("OPENED", (link,)), str(opened).lower()),)))
 
 
-def covered(world: World, name: str) -> str | None:
+def covered(world: PhysicsWorld, name: str) -> str | None:
     return observe_covered(world, PerceiverUse("COVERED", "perceive_covered"), (name,))
 
 
@@ -50,7 +50,7 @@ def with_hollow_pot() -> Embodiment:
 
 
 def test_what_is_in_a_shut_cupboard_is_believed_and_seen_once_it_is_open() -> None:
-    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+    with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         state = world.observe()
         assert state[CUP] == "shelf"
         assert Fact(CUP, "shelf") in world.believed(state)
@@ -63,7 +63,7 @@ def test_what_is_in_a_shut_cupboard_is_believed_and_seen_once_it_is_open() -> No
 
 def test_what_is_under_a_lid_is_believed_and_seen_once_the_lid_is_off() -> None:
     initial = {**kitchen().problem.initial, JAR: "in_pot", LID: "pot_top"}
-    with World(with_hollow_pot(), initial) as world:
+    with PhysicsWorld(with_hollow_pot(), initial) as world:
         assert not world.perceives("jar")
         assert world.observe()[JAR] == "in_pot"
         displaced("lid", (-0.2, -0.1))(world)
@@ -74,7 +74,7 @@ def test_what_is_under_a_lid_is_believed_and_seen_once_the_lid_is_off() -> None:
 
 def test_what_is_in_a_shut_drawer_goes_with_it_in_belief_and_is_seen_once_it_is_open() -> None:
     body = replace(kitchen().embodiment, cameras=((0.62, -0.4, 2.0),))
-    with World(body, kitchen().problem.initial) as world:
+    with PhysicsWorld(body, kitchen().problem.initial) as world:
         assert not world.perceives("jar")
         before = world.sense("jar")[1]
         set_joint(world, "drawer", True)
@@ -88,7 +88,7 @@ def test_what_is_in_a_shut_drawer_goes_with_it_in_belief_and_is_seen_once_it_is_
 
 
 def test_what_was_taken_out_meanwhile_is_believed_to_be_there_until_it_is_uncovered() -> None:
-    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+    with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         take_away(world, "cup")
         assert world.observe()[CUP] == "shelf"
         set_joint(world, "door", True)
@@ -98,7 +98,7 @@ def test_what_was_taken_out_meanwhile_is_believed_to_be_there_until_it_is_uncove
 
 
 def test_what_was_moved_within_a_shut_cupboard_is_noticed_when_it_is_opened() -> None:
-    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+    with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         displaced("cup", (0.0, -0.07))(world)
         world.run(30)
         assert world.observe()[CUP] == "shelf"
@@ -127,7 +127,7 @@ def test_a_plan_stops_where_uncovering_shows_that_the_belief_is_wrong() -> None:
 def test_the_verdict_of_a_goal_that_is_hidden_says_that_it_was_not_seen() -> None:
     scene = kitchen()
     plan = Plan(())
-    with World(scene.embodiment, scene.problem.initial) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         state = world.observe()
         rollout = Rollout(0, True, (), (), 1.0, 1.0, state, believed=world.believed(state))
     assert "; not seen in the end, believed: cup LOCATION shelf" in Report(plan, {CUP: "shelf"}, (rollout,)).summary()

@@ -12,7 +12,7 @@ from confab.reasoner.embodiment.solid_checks import through_a_solid
 from confab.reasoner.embodiment.values import Embodiment, Link, Mechanism, Part
 from confab.reasoner.validation.validate import validate
 from confab.sim.staging import Perturbation
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 WRONG = Path(__file__).parent / "wrong"
 
@@ -85,7 +85,7 @@ def test_a_link_behind_a_shut_neighbour_is_no_fault_since_the_neighbour_opens() 
 def test_a_world_in_which_solids_overlap_at_first_is_not_begun(file: str, said: str) -> None:
     scene = confab.load(WRONG / file)
     with pytest.raises(ValueError, match=re.escape(said)):
-        World(scene.embodiment, scene.problem.initial)
+        PhysicsWorld(scene.embodiment, scene.problem.initial)
 
 
 def test_perturbed_objects_do_not_overlap_at_first() -> None:
@@ -93,7 +93,7 @@ def test_perturbed_objects_do_not_overlap_at_first() -> None:
     p2 = replace(scene.embodiment.places["p2"], position=(0.42, 0.135, 0.7))  # 5 mm beside the other, which may turn
     embodiment = replace(scene.embodiment, places={**scene.embodiment.places, "p2": p2})
     for seed in range(5):
-        with World(embodiment, scene.problem.initial, seed, Perturbation()) as world:
+        with PhysicsWorld(embodiment, scene.problem.initial, seed, Perturbation()) as world:
             apart = pybullet.getClosestPoints(
                 world.bodies["a"].body, world.bodies["b"].body, 0.05, physicsClientId=world.client
             )
@@ -107,7 +107,7 @@ def test_a_drawer_does_not_slide_through_a_shut_door() -> None:
     tray = replace(tray, position=(0.0, 0.0, 0.1), axis=(-1.0, 0.0, 0.0))
     embodiment = replace(scene.embodiment, mechanisms=(replace(cupboard, links=(*cupboard.links, tray)),), places={})
     for opened in (False, True):
-        with World(replace(embodiment, perceivers={}), {}) as world:
+        with PhysicsWorld(replace(embodiment, perceivers={}), {}) as world:
             world.links["door"].set("door", opened)
             pull = {"controlMode": pybullet.VELOCITY_CONTROL, "targetVelocity": 0.3, "force": 5.0}
             joints, body = world.links["tray"].joints, world.links["tray"].body

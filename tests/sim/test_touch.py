@@ -12,7 +12,7 @@ from confab.sim.faults import misaligned
 from confab.sim.motion import line, pose_of
 from confab.sim.urdf import Array
 from confab.sim.verify import expectations, verify
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 
 @pytest.mark.parametrize("off", [(0.0, -0.004), (0.006, 0.0), (-0.006, 0.0)])
@@ -47,7 +47,7 @@ def test_what_is_put_down_is_let_go_when_it_stands_even_where_the_table_is_lower
 
 def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_look_tells() -> None:
     scene = confab.load("beverage-serving")
-    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
         assert np.array_equal(world.sense("cup1")[1], world.sense("cup1")[1])
         seen = []
         for _ in range(200):
@@ -58,7 +58,7 @@ def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_
 
 def test_looks_at_a_mechanism_again_are_averaged() -> None:
     scene = confab.load("kitchen-corner")
-    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
         seen = []
         for _ in range(300):
             for before in range(3):
@@ -71,7 +71,7 @@ def test_a_straight_line_that_the_elbow_is_in_the_way_of_is_gone_with_the_elbow_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = confab.load("panda-serving")
-    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+    with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         attempt, driven = Attempt.begin(world, "gripper"), list[Array]()
         start = np.array([0.598, 0.359, 0.965, 0.412, 0.0, 0.0])
         goal = start - np.array([0.0, 0.0, 0.03, 0.0, 0.0, 0.0])

@@ -12,7 +12,7 @@ from confab.reaching import with_reach
 from confab.reasoner.symbols import Symbol
 from confab.scene import Scene
 from confab.sim.faults import displaced
-from confab.sim.world import World
+from confab.sim.world import PhysicsWorld
 
 POSITION = Symbol("HAND_POSITION", ("left_hand",))
 
@@ -29,8 +29,8 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 @pytest.fixture
-def world(stack: Scene) -> Iterator[World]:
-    with World(stack.embodiment, stack.problem.initial) as world:
+def world(stack: Scene) -> Iterator[PhysicsWorld]:
+    with PhysicsWorld(stack.embodiment, stack.problem.initial) as world:
         yield world
 
 
@@ -39,7 +39,7 @@ def test_three_stacked_blocks_verify(stack: Scene) -> None:
     assert str(report).startswith("verified"), report
 
 
-def test_a_hand_that_was_stopped_on_its_way_is_at_nothing_that_has_a_name(world: World) -> None:
+def test_a_hand_that_was_stopped_on_its_way_is_at_nothing_that_has_a_name(world: PhysicsWorld) -> None:
     assert world.observe()[POSITION] == "raised"
     world.hands["left_hand"].limit = 1.0
 
@@ -52,13 +52,13 @@ def test_a_hand_that_was_stopped_on_its_way_is_at_nothing_that_has_a_name(world:
     assert POSITION not in world.observe()
 
 
-def test_a_hand_is_no_longer_at_an_object_that_has_been_moved(world: World) -> None:
+def test_a_hand_is_no_longer_at_an_object_that_has_been_moved(world: PhysicsWorld) -> None:
     assert world.execute(step("B3_REACH_HAND_OBJECT", "a")).ok
     assert world.observe()[POSITION] == "a"
     displaced("a", (0.0, 0.2))(world)
     assert POSITION not in world.observe()
 
 
-def test_a_place_that_is_carried_is_at_0_where_no_coordinate_is_stated(stack: Scene, world: World) -> None:
+def test_a_place_that_is_carried_is_at_0_where_no_coordinate_is_stated(stack: Scene, world: PhysicsWorld) -> None:
     assert stack.embodiment.places["p4"].position == (0.0, 0.0, 0.095)
     np.testing.assert_allclose(world.place("p4")[:2], world.truth("b")[1][:2], atol=1e-4)
