@@ -22,7 +22,7 @@ NAMES = tuple(
 
 
 def run(names: list[str]) -> int:
-    """Run some of the benchmarks; 2 if a name is none of them."""
+    """Run the named benchmarks; return 2 if a name is unknown."""
     unknown = [name for name in names if name not in NAMES]
     if unknown:
         print(f"no benchmark {', '.join(unknown)}; there are: {', '.join(NAMES)}", file=sys.stderr)

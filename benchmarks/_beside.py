@@ -59,7 +59,7 @@ def served(folder: str, n: int, seed: int) -> tuple[Path, Problem]:
 def beside_peers(python: str, seed: int) -> None:
     """Print the CPU seconds and steps of whole processes, and how many times ours each peer takes.
 
-    The peers get a domain by hand, which is kind to them (`_tabletop.pddl` says why), and the one that `confab export` writes.
+    The peers get a domain by hand, which favours them (see `_tabletop.pddl`), and the one that `confab export` writes.
     A planner without a plan within its time at one size isn't tried on larger ones of that encoding.
     """
     commands, rows = planners(python), Rows()

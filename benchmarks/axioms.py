@@ -1,4 +1,4 @@
-"""What follows inside planning beside Fast Downward, which knows axioms: solvability and the least number of steps.
+"""Axioms inside planning, compared with Fast Downward, which supports them: solvability and the least number of steps.
 
 python -m benchmarks axioms
 CONFAB_PROBLEMS=200 …        how many random problems of each kind
@@ -37,7 +37,7 @@ from worlds.axioms import Plain, axioms
 
 SECONDS = 60.0
 GOAL = "REACH_GOAL"
-"""The behaviour that an imported goal becomes which is no conjunction of facts that change; it costs nothing."""
+"""The behaviour that represents an imported goal which is no conjunction of changeable facts; its cost is 0."""
 
 
 def boxes(problem: Problem, rng: Random) -> Problem:

@@ -1,4 +1,4 @@
-"""Whole calls beside those of an earlier commit, in turns: so that a busy machine slows both.
+"""Whole calls compared with an earlier commit, alternating, so that load on the machine affects both.
 
 python -m benchmarks before
 CONFAB_BEFORE=f43f953 …      the commit; its files are taken from Git into a temporary folder

@@ -1,12 +1,12 @@
-"""Tasks, robots and noise: how many perturbed rollouts of each are verified, why the others aren't, and what a rollout costs.
+"""Tasks, robots and noise: the share of verified perturbed rollouts, the failures, and the cost of a rollout.
 
-    python -m benchmarks.bodies            the table of what was rolled out so far, of the code as it is
-    python -m benchmarks.bodies run [MM …] [TASK …]   roll out what is missing of the reporting seeds, one row after another
-    python -m benchmarks.bodies carry [TASK …]   let older rollouts count, of tasks whose first two come out the same, bit by bit
-    python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
+    python -m benchmarks.bodies            the table of all rollouts of the present code so far
+    python -m benchmarks.bodies run [MM …] [TASK …]   run the missing rollouts of the reporting seeds, one row after another
+    python -m benchmarks.bodies carry [TASK …]   count older rollouts of tasks whose first two are reproduced bit by bit
+    python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, with each failure
 
-A line per rollout goes to confab-out/bodies.jsonl, with what tells its code and its course from others; a run that was stopped
-goes on where it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 80000 are for reporting only.
+A line per rollout goes to confab-out/bodies.jsonl, with a digest of its code; an interrupted run continues where it was. Seeds
+from 7000 are for development, and their failures may be corrected; seeds from 80000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Rows are measured in this order."""
 AGAIN = 2
 """Number of rollouts of a task that are repeated to find out whether other code gives the same results."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
-"""Files on which a rollout depends most: when one of them changes, rollouts begin anew."""
+"""Files on which a rollout depends most: when one of them changes, all rollouts are repeated."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
 
 
 def code() -> str:
-    """Return what tells the code and bodies that are committed from others: git's names of their contents."""
+    """Return the identity of the committed code and bodies: git's names of their contents."""
     command = ["git", "rev-parse", *(f"HEAD:{path}" for path in MEASURED)]
     found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
     return "-".join(name[:7] for name in found)
@@ -137,7 +137,7 @@ def read() -> list[dict[str, Any]]:
 
 
 def kept() -> list[dict[str, Any]]:
-    """Return the lines of the rollouts of the code as it is."""
+    """Return the lines of the rollouts of the present code."""
     now = code()
     return [one for one in read() if one["code"] == now]
 
@@ -183,7 +183,7 @@ def tried(name: str, noise: int, seeds: Sequence[int]) -> None:
 
 
 def main() -> None:
-    """Print the table of what was rolled out."""
+    """Print the table of the rollouts."""
     rows = kept()
     print(
         "| task | robot | noise | verified | 95 % confidence | CPU s, median | of it planning | simulated s | failures |"

@@ -189,7 +189,7 @@ def other_end(draw: random.Random, triples: Triples) -> None:
 
 
 def other_property(draw: random.Random, triples: Triples) -> None:
-    """Say a triple by another property."""
+    """Change the property of a triple."""
     if triples:
         place, by = _any(draw, triples), draw.choice(triples).predicate
         triples[place] = ox.Triple(triples[place].subject, by, triples[place].object)
@@ -350,7 +350,7 @@ def validate(draw: random.Random, folder: Path) -> Arguments:
 
 
 def look(draw: random.Random, folder: Path) -> Arguments:
-    """Ask for affordances; draw, export, explain or learn."""
+    """Query affordances; draw, export, explain or learn."""
     scene, memory = _broken(draw, folder), str(folder / "memory.ttl")
     return draw.choice(
         [
@@ -431,7 +431,7 @@ TOKENS = [
 
 
 def sparql(draw: random.Random, folder: Path) -> Arguments:
-    """Ask a broken query."""
+    """Send a broken query."""
     text = draw.choice(QUERIES)
     text = mutated_words(draw, text, TOKENS) if draw.random() < 0.95 else "SELECT * WHERE " + "{" * 2000 + "}" * 2000
     more = (
@@ -550,7 +550,7 @@ def interventions(draw: random.Random, folder: Path) -> Arguments:
 
 
 def options(draw: random.Random, folder: Path) -> Arguments:
-    """Ask in words that mean nothing."""
+    """Ask a question in meaningless words."""
     scene, out = str(folder / "scene.ttl"), str(folder / "out")
     calls = (
         ["plan", scene, "--goal", mutated_words(draw, draw.choice(FACTS)), "--time-limit", "5"],
@@ -735,6 +735,6 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
         (urdf, 5),
     )
 }
-"""What breaks something, and how many of some thousand cases it gets: those that take long get fewer."""
+"""The kinds of broken inputs, and the number of cases of each among some thousand: slow ones get fewer."""
 TARGETS = {"memory.ttl", "broken.ttl", "out", "out.ttl", "out.svg"}
 """Time limit and files of a case."""

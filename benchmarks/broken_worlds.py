@@ -142,7 +142,7 @@ def sources(folder: Path) -> None:
 
 
 def defining(draw: random.Random, triples: Triples) -> None:
-    """Say of two nodes what definitions say, or that a property is transitive, symmetric or an inverse."""
+    """State of two nodes that one defines the other, or that a property is transitive, symmetric or an inverse."""
     if triples:
         one, other = draw.choice(triples), draw.choice(triples)
         if draw.random() < 0.2:
@@ -161,7 +161,7 @@ def defining(draw: random.Random, triples: Triples) -> None:
 
 
 def numeric(draw: random.Random, triples: Triples) -> None:
-    """Put another number in the place of one, or another sign or change; or say one more part of a calculation."""
+    """Replace a number, a sign or a change in a calculation by another one, or add a part to the calculation."""
     kinds = ("decimal", "integer", "double", "string")
     number = ox.Literal(draw.choice(NUMBERS), datatype=ox.NamedNode(XSD + draw.choice(kinds)))
     places = [i for i, t in enumerate(triples) if re.fullmatch(r"[-+.\dEe]+", getattr(t.object, "value", ""))]
@@ -196,7 +196,7 @@ def _planned(draw: random.Random, folder: Path) -> Arguments:
 
 
 def defined(draw: random.Random, folder: Path) -> Arguments:
-    """Plan where what follows from other situations is defined in a broken way."""
+    """Plan with broken definitions of derived situations."""
     more = (defining, *draw.choices(MUTATIONS, k=2))
     mutated_triples(draw, folder / draw.choice(("domain.ttl", "domain.ttl", "scene.ttl")), more)
     return _planned(draw, folder)
@@ -248,7 +248,7 @@ def numbers(draw: random.Random, folder: Path) -> Arguments:
         file.write_text(text, encoding="utf-8", errors="replace")
     try:
         import_pddl(files[0], files[1], folder / "imported.ttl")
-    except Exception:  # whatever it is, the command is to say it
+    except Exception:  # the command must report every error
         return ["import", *map(str, files), "-o", str(folder / "out.ttl")]
     mode: tuple[Arguments, ...] = (["--optimal"], ["--mode", "paper"], [], [])
     return ["plan", str(folder / "imported.ttl"), "--time-limit", "5", "--json", *draw.choice(mode)]
@@ -322,7 +322,7 @@ def meshes(draw: random.Random, folder: Path) -> Arguments:
     """Compute the reach of a robot whose hand has a broken mesh."""
     from benchmarks.broken_inputs import urdf
 
-    call = urdf(random.Random(0), folder)  # the files; then those of the robot as they were
+    call = urdf(random.Random(0), folder)  # writes the files; then the robot's files are restored
     robot, bodies = ROOT / "ontology" / "robots" / "two-arms.urdf", folder / "bodies"
     kind, text = draw.choice((("obj", OBJ), ("stl", STL)))
     boxes = list(re.finditer(r"<box size=\"[^\"]*\"/>", robot.read_text()))
@@ -345,4 +345,4 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
     door.__name__: (door, share)
     for door, share in ((defined, 40), (amounts, 40), (updates, 40), (numbers, 60), (edited, 30), (meshes, 3))
 }
-"""What breaks something, and how many cases it gets beside those of `benchmarks.broken_inputs`."""
+"""The kinds of broken inputs, and the number of cases of each besides those of `benchmarks.broken_inputs`."""

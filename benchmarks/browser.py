@@ -69,7 +69,7 @@ class Browser:
         self.profile.cleanup()
 
     def call(self, method: str, **parameters: object) -> Any:
-        """Return what the browser answers to a command; faults of the page are kept in `faults`."""
+        """Return the browser's response to a command; faults of the page are kept in `faults`."""
         self.number += 1
         message = {"id": self.number, "method": method, "params": parameters}
         if self.session:

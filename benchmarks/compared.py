@@ -31,7 +31,7 @@ from worlds.hierarchies import hierarchy
 LIMIT = Limits(seconds=float(os.environ.get("COMPARED_SECONDS", "10")))
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 LEAST = 0.05
-"""CPU seconds that a call counts as, at least, where times are compared: what is shorter is noise."""
+"""Minimum CPU seconds of a call when times are compared: shorter times are noise."""
 Made = tuple[str, Callable[[], Problem]]
 
 

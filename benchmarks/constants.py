@@ -1,8 +1,8 @@
-"""What each tuned constant of the planner is worth: halved and doubled, what becomes of lengths, expansions and time.
+"""The effect of each tuned constant of the planner: halved and doubled, changes in lengths, expansions and time.
 
-Each run is a process of its own on a copy of the planner in which the one number is another, so that nothing is patched. It plans
+Each run is a separate process on a copy of the planner with one changed number, so that no module is patched. It plans
 what its room is there for (`INSTRUMENTS`). CONFAB_ROOMS names the rooms in `planner/` that are tried, all if left out; with
-CONFAB_ROWS=FILE what was measured is kept there, and what is there already isn't measured again.
+CONFAB_ROWS=FILE results are stored there, and stored ones aren't measured again.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Constant:
         return self.name + (f" [{self.number}]" if self.number else "")
 
     def times(self, factor: float) -> float:
-        """Return the number halved or doubled; a whole number stays one, and doesn't become nothing."""
+        """Return the number halved or doubled; a whole number stays one, and is at least 1."""
         old = self.node.value
         assert isinstance(old, int | float)
         return max(1, round(old * factor)) if isinstance(old, int) and old else old * factor
@@ -139,7 +139,7 @@ def led() -> Iterator[Row]:
 
 
 def repaired() -> Iterator[Row]:
-    """Repair a plan after interventions of all kinds; what counts of a repair is its cost, and whether all was planned anew."""
+    """Repair a plan after interventions of all kinds; the result is the repair's cost, and whether it is a new plan."""
     trial = Trial.of(served(10))
     for seed in range(80):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]

@@ -1,4 +1,4 @@
-"""What the planners do, in counts that are the same on every machine: lengths, expansions, fallbacks; CPU seconds beside.
+"""Results of the planners that are the same on every machine: lengths, expansions, fallbacks; with CPU seconds.
 
 python -m benchmarks counts
 CONFAB_COUNTS=worlds …       some of: families, worlds
@@ -52,7 +52,7 @@ def worlds() -> None:
 
 
 def measured(source: str) -> str:
-    """Return the cells of one scene, which is loaded anew each time."""
+    """Return the cells of one scene, which is loaded afresh each time."""
     seconds: list[float] = []
     while len(seconds) < REPEATS and sum(seconds) < LONG:
         scene = confab.load(source)

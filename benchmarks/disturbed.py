@@ -1,6 +1,6 @@
 """Twenty interventions in PyBullet's world: objects pushed and knocked over, boxes put in the way, things taken, links shut.
 
-``python -m benchmarks.disturbed FROM TO [NUMBER …]`` runs all interventions, or those of some numbers, with seeds FROM to TO - 1,
+``python -m benchmarks.disturbed FROM TO [NUMBER …]`` runs all interventions, or the numbered ones, with seeds FROM to TO - 1,
 bodies perturbed. An episode *recovers* if it reaches its goals; it *gives up rightly* if each goal that is left is one that the
 intervention made impossible, and a reason names the cause. Anything else is wrong.
 """
@@ -40,7 +40,7 @@ CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
 
 
 def outcome(episode: Episode, words: str) -> str:
-    """Return how an episode ended: recovered, gave up rightly, or what is wrong with it."""
+    """Return how an episode ended: recovered, gave up rightly, or wrong, with the fault."""
     open_ = [str(symbol) for symbol, value in episode.goal.items() if episode.observed.get(symbol) != value]
     reasons = "; ".join(reason.text for reason in episode.reasons)
     if episode.missed:

@@ -1,4 +1,4 @@
-"""Definitions in random states: what search, checker and plain Python derive, each by itself, beside what HermiT entails.
+"""Definitions in random states: the derived facts of search, checker and plain Python, compared with those that HermiT entails.
 
 python -m benchmarks entailed
 CONFAB_STATES=10000 …        how many states; 10,000 take an hour of one core
@@ -66,7 +66,7 @@ def in_state(problem: Problem, facts: list[tuple[str, str, str]]) -> Problem:
 
 
 def derived(problem: Problem) -> Iterator[tuple[str, Derived]]:
-    """Yield what each evaluator derives in the initial state, with its name."""
+    """Yield the facts that each evaluator derives in the initial state, with its name."""
     situations = problem.domain.situations
     defined = [
         Symbol(name, arguments)

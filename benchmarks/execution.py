@@ -120,7 +120,7 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
 
 
 def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
-    """Return the value that means nothing, and the others: nothing is in no class below that of the values."""
+    """Return the value "nothing" and the other values: the former belongs to no class below that of the values."""
     below = {v for k, m in problem.classes.items() if content.range in problem.parents.get(k, ()) for v in m}
     values = problem.classes[content.range]
     return next(v for v in values if v not in below), [v for v in values if v in below]
@@ -177,7 +177,7 @@ def interventions() -> None:
 
 
 def physical() -> None:
-    """Print how episodes with one random intervention end, in PyBullet; a line per episode goes to a file."""
+    """Print the results of episodes with one random intervention in PyBullet; a line per episode goes to a file."""
     scene = confab.load("beverage-serving")
     trial, ends = Trial.of(scene.problem), Counter[tuple[str, str]]()
     failures, wrong, lines = Counter[str](), 0, list[str]()

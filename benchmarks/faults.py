@@ -2,7 +2,7 @@
 
     python -m benchmarks.faults          print the table, and write it to docs/physics-faults.md
 
-Whatever stops elsewhere, or otherwise, than it should is marked.
+Faults that stop at another step or with another code than expected are marked.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MEANS = {
     "stuck": "joint",
     "too slow": "seconds",
 }
-"""The number that tells most about a code, where it is always the same."""
+"""The measured number that characterises a failure code, if it is always the same."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Planted:
         return replace(trial, prepare=self.fault, beads=self.beads).run(0)
 
     def found(self, rollout: Rollout) -> bool:
-        """Tell whether the rollout stopped where and as it must."""
+        """Return whether the rollout stopped at the expected step with the expected code."""
         failure = rollout.failure
         return (
             failure is not None

@@ -1,16 +1,16 @@
-"""Figures in the documentation, each in a block that says what printed it, at which commit, and which code it measures.
+"""Figures in the documentation: each block names the command that printed it, the commit, and the code that it measures.
 
     <!-- figures NAME: COMMAND; commit ABC1234; 2026-01-31; measures PATH PATH; table 2; quick -->
     …
     <!-- end -->
 
     python -m benchmarks.figures            which blocks are older than the code that they measure
-    python -m benchmarks.figures quick      write those marked quick anew: counts, lengths, ratios (`make figures`)
-    python -m benchmarks.figures all        write all anew, for hours (`make bench`)
-    python -m benchmarks.figures NAME …     write these anew
+    python -m benchmarks.figures quick      update those marked quick: counts, lengths, ratios (`make figures`)
+    python -m benchmarks.figures all        update all, which takes hours (`make bench`)
+    python -m benchmarks.figures NAME …     update these
 
 A block holds what its command printed, or the table of that number in it. Several blocks may share a command, which is then run
-once. What says `prose` was edited after it was printed: the new figures go to confab-out/figures/NAME.md, to be edited again.
+once. A block marked `prose` was edited by hand: its new figures go to confab-out/figures/NAME.md, to be edited again.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def printed(command: str) -> str:
 
 
 def chosen(text: str, number: int) -> str:
-    """Return a table of a text, counted from 1, or all of it: as it is if it has tables, else set as it was printed."""
+    """Return a table of a text, counted from 1, or all of it: unchanged if it has tables, otherwise as a code block."""
     tables = [found.strip() for found in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE)]
     if number:
         return tables[number - 1] if number <= len(tables) else ""
@@ -159,7 +159,7 @@ def write(wanted: Sequence[Block]) -> int:
 
 
 def main(names: Sequence[str]) -> int:
-    """Write blocks, or say which are stale."""
+    """Write blocks, or list the stale ones."""
     there = blocks()
     unknown = set(names) - {block.name for block in there} - {"quick", "all"}
     if unknown:

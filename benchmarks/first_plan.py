@@ -1,4 +1,4 @@
-"""From a clone to the first verified plan: how long that takes where nothing is installed, and nothing cached.
+"""From a clone to the first verified plan: the time without installed packages and caches.
 
     python -m benchmarks.first_plan
 

@@ -1,4 +1,4 @@
-"""What it costs that situations follow: the same scene with three of them defined, and kept by effects that somebody wrote by hand.
+"""The cost of derived situations: a scene with three defined ones, compared with the same scene with handwritten effects.
 
 python -m benchmarks following
 CONFAB_SIZES=66,333 …   how many cups; there are two places to each, and two rooms

@@ -3,7 +3,7 @@
     python -m benchmarks.fuzz                          until 100,000 cases are tried, going on where the last run ended
     python -m benchmarks.fuzz --cases 500 --door plan  so many more of one door
     python -m benchmarks.fuzz --again memory:17        one case again, its files kept
-    python -m benchmarks.fuzz --table                  what was tried and what broke, as docs/figures/promises.md has it
+    python -m benchmarks.fuzz --table                  the number of inputs tried and broken, as in docs/figures/promises.md
 
 A case is a door and a number, from which everything in it is drawn. Cases run one after the other in a process that has limits of
 time and memory and ends after `BATCH` of them; what breaks is run again in a process of its own. How many were tried stands in
@@ -70,7 +70,7 @@ class Failure:
     what: str
 
     def __str__(self) -> str:
-        """Return it as it stands in the file of seeds."""
+        """Return the case as it is written in the file of seeds."""
         return f"{self.door}:{self.seed}  {' '.join(self.what.split())[:160]}"
 
 
@@ -117,7 +117,7 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
 
 
 def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep: bool) -> None:
-    """In the child: run cases, write a line for each, and never come back."""
+    """In the child: run cases, write a line for each, and exit."""
     code = 1
     try:
         for sign in TIME_IS_OVER:
@@ -135,7 +135,7 @@ def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep
 
 
 def _recorded() -> list[Result]:
-    """Let every plan of this process be noted in the list that is returned, and nothing be built twice that never changes."""
+    """Record every plan of this process in the returned list, and build constant objects only once."""
     import rdflib.plugins.sparql.processor as sparql
     from rdflib.plugins.sparql.algebra import translateQuery
     from rdflib.plugins.sparql.parser import parseQuery
@@ -289,7 +289,7 @@ def _check_plan(result: Result) -> None:
         return
     faults = validate(problem, outcome.plan)
     assert not faults, f"no plan of what was read: {faults[0]}"
-    with suppress(KnowledgeError):  # what the task doesn't need may be broken
+    with suppress(KnowledgeError):  # parts that the task doesn't need may be broken
         whole = replace(result.scene.reading.problem, goal=problem.goal)
         names = {
             member for members in whole.classes.values() for member in members
@@ -314,7 +314,7 @@ def quantified_behaviors(problem: Problem) -> int:
 
 
 def _import_all() -> None:
-    """Import what the cases need, once for all of them."""
+    """Import the modules that the cases need, once for all of them."""
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
         "confab.planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",

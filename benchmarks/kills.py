@@ -158,7 +158,7 @@ def forked(write: Callable[[], object], folder: Path) -> int:
         code = 1
         try:
             os.chdir(folder)
-            logging.disable()  # each says that it waits
+            logging.disable()  # each prints that it waits
             write()
             code = 0
         finally:
@@ -167,7 +167,7 @@ def forked(write: Callable[[], object], folder: Path) -> int:
 
 
 def torn(folder: Path) -> list[str]:
-    """Return the files in a folder that can't be read; what a kill leaves of a new one is hidden and ends in ``.part``."""
+    """Return the unreadable files in a folder; an unfinished file after a kill is hidden and ends in ``.part``."""
     found = []
     for file in (*folder.rglob("*.ttl"), *folder.rglob("*.json")):
         try:
@@ -215,7 +215,7 @@ def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -
         }
         learn(file, -1)
         with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), suppress(SystemExit):
-            writes[command](-2)  # imports what it needs, once for all
+            writes[command](-2)  # imports its modules, once for all
         code, _, calls = killed(lambda: writes[command](-3))
         assert code == 0, f"{command} doesn't work at all"
         _, seconds, _ = killed(lambda: writes[command](-4), after=1e9)

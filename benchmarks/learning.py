@@ -4,7 +4,7 @@
     CONFAB_PDDL=FOLDER python -m benchmarks learning   any folder of that form: ``…/domain.pddl``, ``training…``, ``testing…``
     CONFAB_ALL=1 …                                     every problem to test on, not only four per folder
 
-The problems to learn from are taken in their order until a minute of CPU is over; what was learned is one file, which each call
+Lessons are taken from the problems in their order for a minute of CPU time; the memory is one file, which each call
 reads. A call has 30 s of CPU and 4 GB, from the start of its process on. Each plan is checked.
 """
 
@@ -86,7 +86,7 @@ def _said(runs: list[Run], lama: list[Run]) -> str:
 
 
 def solve(domain: str, problem: str, target: str, memory: str | None = None) -> None:
-    """Solve one problem, and write its plan (what a benchmarked process does)."""
+    """Solve one problem, and write its plan (run in a benchmarked process)."""
     from confab.planner.experience.advice import Memory, plan
     from confab.planner.plan import Limits
     from confab.planner.validation import validate

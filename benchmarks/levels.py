@@ -1,6 +1,6 @@
-"""Random worlds of two and three levels: how each mode keeps the levels, whether it tells the truth, how short its plans are.
+"""Random worlds of two and three levels: conformity of each mode to the levels, correctness of its answers, length of its plans.
 
-LEVELS_FROM and LEVELS_COUNT choose other worlds. Those of seeds below 1,000,000 are there to develop with.
+LEVELS_FROM and LEVELS_COUNT choose other worlds. Seeds below 1,000,000 are for development.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from urllib.parse import quote
 
 HONEST, SLOW, ABANDONED, MALFORMED, SECONDS = 1_000, 300, 500, 200, 60.0
 CLIENTS = 8
-"""Honest clients; each asks again as soon as it is its turn and it has its answer."""
+"""Honest clients; each sends the next query as soon as it has a turn and its response."""
 SHORT = quote("SELECT ?x WHERE { ?x a :Behavior } ORDER BY ?x")
 LONG = quote("SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i FILTER(?c != ?d) }")
 HOST = "Host: localhost\r\nConnection: close\r\n"
@@ -86,7 +86,7 @@ class Load:
             self.seconds.append(perf_counter() - begin)
 
     async def honest(self, times: int, pause: float) -> None:
-        """Ask one short query after the other."""
+        """Send one short query after another."""
         for _ in range(times):
             await self.request("honest", get(SHORT))
             await asyncio.sleep(pause)

@@ -117,7 +117,7 @@ def transfer(sizes: tuple[int, ...] = (20, 40), seeds: int = 3) -> None:
 
 
 def worlds() -> None:
-    """Print what one lesson in a small world is worth in a large one of its kind, and in itself."""
+    """Print the benefit of one lesson in a small world for a large one of its kind, and for itself."""
     print(HEAD)
     folders = [
         ontology.ROOT / "scenes",
@@ -155,7 +155,7 @@ def curve(world: str = "laboratory", episodes: int = 3) -> None:
 
 
 def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None:
-    """Print the rules of a lesson as the page of advice has them, those of the most abstract level."""
+    """Print the rules of a lesson as on the page of advice, those of the most abstract level."""
     for world in worlds:
         scene = confab.load(f"{world}-small")
         memory = confab.Memory.of(scene)

@@ -3,7 +3,7 @@
     python -m benchmarks.mixed                                    the next worlds: COUNT of them from FIRST on
     python -m benchmarks.mixed --from 5000000 --count 100000 --workers 2 --into FOLDER
     python -m benchmarks.mixed --mutants 100                      which share of small faults, so many in each part, they notice
-    python -m benchmarks.mixed --seed 5000123                     one of them, with everything that is asked of it, and its scene
+    python -m benchmarks.mixed --seed 5000123                     one of them, with all checks, and its scene
 
 A run goes on where it was interrupted, if it is given the same folder: there it notes what came of each stretch of worlds, and
 writes the smallest world for each thing that is wrong. The exit code is 1 if something is.
@@ -222,7 +222,7 @@ def main(arguments: Sequence[str] = ()) -> int:
         words = [
             str(asked.mutants),
             str(asked.into or "confab-out"),
-        ]  # a process of its own, without what is to get faults
+        ]  # a separate process, without the modules that get faults
         return subprocess.run([sys.executable, "-m", "benchmarks.mixed_mutants", *words], check=False).returncode
     if asked.seed is not None:
         with TemporaryDirectory() as folder:

@@ -3,7 +3,7 @@
     python -m benchmarks.mutants               60 faults in each module, drawn by seed, going on where the last run ended
     python -m benchmarks.mutants 20 validation so many in one
     python -m benchmarks.mutants --again repair what survived in one, after its tests were changed
-    python -m benchmarks.mutants --table       what was noticed, as docs/figures/promises.md has it
+    python -m benchmarks.mutants --table       the detected faults, as in docs/figures/promises.md
 
 The faults are cosmic-ray's (`pip install cosmic-ray`; no extra has it). Each is put into the module of a process of its own, which
 runs the module's tests until the first that fails. Faults in annotations and docstrings are none. What came of each stands in
@@ -39,7 +39,7 @@ SECONDS, TIMES, WAITING = 10, 5, 6
 """Tests that take longer than this, and so many times as long as they take without a fault, come to no end;
 by the clock so many times that."""
 LIBRARIES = ("pytest", "hypothesis", "numpy", "networkx", "pyoxigraph", "rdflib", "urllib3")
-"""What no fault is put into, imported once for all."""
+"""Modules without injected faults, imported once for all."""
 TESTS: dict[str, tuple[str, ...]] = {
     "reasoner/language.py": ("tests/planner/test_language.py", "tests/planner/test_behaviors.py"),
     "reasoner/symbols.py": ("tests/reasoner/test_symbols.py", "tests/planner/test_validation.py"),
@@ -54,7 +54,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "reasoner/memory/rules_file.py": ("tests/reasoner/test_memory_lines.py", "tests/reasoner/test_remembering.py"),
     "reasoner/memory/links_file.py": ("tests/reasoner/test_memory.py",),
 }
-"""The fast tests that are each module's own, those that notice most first."""
+"""The fast tests of each module, those that detect most faults first."""
 SAME = ("Eq_Is", "Eq_IsNot")
 """Changes that are no faults: names are interned, so that equal ones are mostly identical."""
 Fault = tuple[str, int]
@@ -109,7 +109,7 @@ class Record(TypedDict):
 
 
 def noticed(file: str, text: str, seconds: float = 600.0) -> bool:
-    """Return whether a module's tests fail, or come to no end, with this text in its place."""
+    """Return whether a module's tests fail, or don't end, with this text as the module."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
         child = os.fork()
@@ -117,7 +117,7 @@ def noticed(file: str, text: str, seconds: float = 600.0) -> bool:
         code = 1
         try:
             signal.setitimer(signal.ITIMER_PROF, seconds)
-            signal.alarm(int(WAITING * seconds))  # some wait for what never comes
+            signal.alarm(int(WAITING * seconds))  # some wait for ever
             with open(os.devnull, "w") as nowhere:  # noqa: PTH123
                 os.dup2(nowhere.fileno(), 1)
                 os.dup2(nowhere.fileno(), 2)
@@ -160,7 +160,7 @@ def records() -> dict[str, Record]:
 
 
 def record(file: str, source: str) -> Record:
-    """Return the results for a module as it is now."""
+    """Return the results for the present text of a module."""
     of = hashlib.sha256(meaning(source).encode()).hexdigest()[:12]
     known = records().get(file)
     return known if known and known["of"] == of else Record(of=of, noticed=[], survived={}, same={})

@@ -1,4 +1,4 @@
-"""Execute the book of notebooks anew, keep what they show, and print what each took: `make notebooks`.
+"""Execute the book of notebooks, keep their outputs, and print the time of each: `make notebooks`.
 
 python -m benchmarks.notebooks [PART OF A NAME …]
 """

@@ -1,4 +1,4 @@
-"""What derived situations and amounts cost where nothing is derived or counted: tables with and without what serves only them.
+"""The cost of derived situations and amounts in scenes without any: tables with and without the code that serves only them.
 
 python -m benchmarks nothing_derived
 CONFAB_PAIRS=10 …            how many calls of each kind, by turns in one process

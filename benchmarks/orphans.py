@@ -46,7 +46,7 @@ IMPORTED = (
 
 
 def commands(folder: Path) -> dict[str, Callable[[], object]]:
-    """Return the commands, each with what runs it; their files are written into a folder."""
+    """Return the commands with their arguments; their files are written into a folder."""
     for module in (*IMPORTED, *(["unified_planning.shortcuts"] if find_spec("unified_planning") else [])):
         import_module(module)
     new_domain("tearoom", folder)
@@ -70,7 +70,7 @@ def commands(folder: Path) -> dict[str, Callable[[], object]]:
 
 
 def served(scene: Path) -> None:
-    """Serve a scene and ask it what takes long."""
+    """Serve a scene and send it a slow query."""
     from urllib.parse import quote
     from urllib.request import urlopen
 
@@ -98,7 +98,7 @@ def begun(run: Callable[[], object]) -> int:
             code = 0
         finally:
             os._exit(code)
-    os.setpgid(child, child)  # the child does so, too; one of both is first
+    os.setpgid(child, child)  # the child does so, too; the order is arbitrary
     return child
 
 

@@ -1,4 +1,4 @@
-"""What each command does to a file that is there already where it writes: a table for docs/figures/promises.md.
+"""The effect of each command on an existing file at its output path: a table for docs/figures/promises.md.
 
 python -m benchmarks outputs
 
@@ -51,7 +51,7 @@ class Door:
     file : str
         The name that the output has.
     kind : str
-        What is written.
+        The kind of output.
     physics : bool
         Whether it takes a rollout, so that only refusals are tried.
     """
@@ -93,7 +93,7 @@ DOORS = (
     Door("import domain.pddl problem.pddl -o OUT", "out.ttl", IMPORTED),
     Door(f"export {SCENE} -o .", "domain.pddl", DOMAIN),
 )
-MADE = {  # by which door the files of each kind come about
+MADE = {  # the commands that create the files of each kind
     MEMORY: f"learn {SCENE} --memory memory.ttl",
     PLAN: f"plan {SCENE} -o plan.json",
     EPISODE: f"execute {SCENE} --save episode.ttl",

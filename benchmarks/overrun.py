@@ -4,7 +4,7 @@
     python -m benchmarks.overrun validated                      what validation takes
 
 The longest limit comes first, in one scene after the other, until one takes longer; the others are tried in that scene.
-A call that ends before its limit says nothing about it: its cell says "before".
+A call that ends before its limit proves nothing about it: its cell says "before".
 
 The limit is one of the clock, so a call is watched from outside: what CPU time it has used when the limit is over, and in the end,
 with that of all processes that it runs.
@@ -87,7 +87,7 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("LARGE", "within: confab.validate(scene.knowledge.path)"),
     ("LARGE", "within: scene.problem"),
 )
-"""Calls in Python with the scene in which they are made; `within` stands for a block of `confab.within(S)`."""
+"""Calls in Python with the scene in which they are made; `within` represents a block of `confab.within(S)`."""
 BEGUN = """
 import os, sys
 from confab.reasoner.limits import Deadline
@@ -98,7 +98,7 @@ def after(cls, seconds):
     return begin(cls, seconds)
 Deadline.after = classmethod(after)
 """
-"""Says when a call begins to count."""
+"""Marks the time from which a call counts."""
 COMMAND = "from confab.start import main; main()"
 CALL = """
 import confab
@@ -132,7 +132,7 @@ class Ended:
 
     @property
     def measured(self) -> bool:
-        """Whether the limit came before its end, or ended it early."""
+        """Whether the limit was reached before its end, or ended it early."""
         return self.after is not None or self.code == 3
 
     def share(self, seconds: float) -> str:
@@ -171,7 +171,7 @@ def cpu_seconds(process: int) -> float:
     try:
         own = int((folder / "schedstat").read_text().split()[0]) / 1e9
         children = (folder / "task" / str(process) / "children").read_text().split()
-    except OSError:  # it ended meanwhile
+    except OSError:  # the process has ended
         return 0.0
     return own + sum(map(cpu_seconds, map(int, children)))
 

@@ -47,14 +47,14 @@ OURS = {
     "confab-whole": (*CORE, "planner/*.py", "planner/hierarchical/*.py"),
     "confab-engine": (*CORE, "confab/engines.py"),
 }
-"""The files that say what our plans are."""
+"""The files that determine our plans."""
 ENGINE = "fast-downward"
 """What ``confab-engine`` hands the level to."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What became of one problem: `plan` is None where there is none, `accepted` what unified-planning's validator says."""
+    """The result for one problem: `plan` is None if there is none, `accepted` the verdict of unified-planning's validator."""
 
     plan: tuple[str, ...] | None
     seconds: float
@@ -84,7 +84,7 @@ def main() -> None:
 
 
 def wanted() -> list[str]:
-    """Return the planners to run: all, or those that CONFAB_PLANNERS names."""
+    """Return the planners to run: all, or those named by CONFAB_PLANNERS."""
     named = os.environ.get("CONFAB_PLANNERS")
     return named.split(",") if named else ["confab", "pyperplan", "lama-first", "grounding", "read-back"]
 
@@ -347,7 +347,7 @@ def read_back(python: str) -> None:
 
 
 def _solve(domain: str, problem: str, target: str) -> None:
-    """Solve one problem with the flat core and write its plan (what a benchmarked process does)."""
+    """Solve one problem with the search of one level and write its plan (run in a benchmarked process)."""
     gc.disable()
     from confab.planner.grounded.best_first import search
     from confab.planner.grounded.grounding import ground

@@ -1,10 +1,10 @@
-"""Perception held against the truth, over random scenes and levels of noise: what is seen that isn't so, and what is missed.
+"""Perception compared with the truth, over random scenes and levels of noise: wrong and missing facts.
 
     python -m benchmarks.perception [SCENES]
 
 In each scene objects stand at random places, perturbed, some of them aside or lying, and vessels are filled or not; then a hand
 takes an object and lifts it. At each of these moments everything is looked at several times, at every level of noise. What is
-true is known from how the scene was set up and what was done, not from perceiving it without noise.
+The truth is known from the setup and the actions, and not from perception without noise.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def _taken(world: PhysicsWorld, truth: Truth, rng: np.random.Generator, reach: S
             perform(world, reach, {"hand": hand, "target": name})
         except SkillError:
             if not np.allclose(world.hands[hand].posture, world.hands[hand].hand.home):
-                return "", ""  # it has set out, and isn't where anybody could say
+                return "", ""  # the hand has started, and is at no named place
             continue
         return hand, name
     return "", ""

@@ -140,7 +140,7 @@ def _per_minute(seeds: Sequence[int], begin: float) -> float:
 
 
 def _timed(name: str, one: Trial, seeds: Sequence[int], alone: list[Rollout], workers: int | str, kill: bool) -> None:
-    """Print how fast some workers are, one of them killed perhaps, and whether they give what one process gives."""
+    """Print the speed of some workers, with one of them possibly killed, and whether the results equal those of one process."""
     with TemporaryDirectory() as folder:
         mark = Path(folder) / "died"
         begin = time.perf_counter()

@@ -101,7 +101,7 @@ def live(studio: Studio) -> None:
 
 
 def endpoint(studio: Studio) -> None:
-    """Picture the page on which facts are turned and queries asked."""
+    """Picture the page with changed facts and queries."""
     with serving(confab.load(TABLE), 0) as server:
         studio.take("endpoint", server.url, "document.querySelector('.plan') !== null")
 

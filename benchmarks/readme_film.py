@@ -1,4 +1,4 @@
-"""README's picture: the film of the main job as an animation that begins by itself; `python -m benchmarks.readme_film`."""
+"""README's picture: the film of the main job as an animation; `python -m benchmarks.readme_film`."""
 
 from __future__ import annotations
 

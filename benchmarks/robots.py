@@ -105,7 +105,7 @@ def another_hand(draw: random.Random) -> Callable[[Any], str]:
 
 
 def run(scene: Scene, problem: int, worlds: Path, seed: int, disturbed: bool) -> dict[str, Any]:
-    """Return what came of one run."""
+    """Return the result of one run."""
     file = worlds / f"world{problem}.yaml"
     inner, retry_policy = connected(scene, scene.problem, f"pyrobosim:{file}", seed)
     world = Watched(inner.interface, inner.transport, scene.problem)

@@ -1,10 +1,10 @@
-"""The fast planner: scale, peers, lengths, random tables against exhaustion, and what each part contributes.
+"""The default planner: scale, other planners, lengths, random tables compared with exhaustive search, the benefit of each part.
 
     python -m benchmarks search
     CONFAB_SEARCH=scale,random …     some of: scale, hands, peers, optimal, lengths, random, parts
     CONFAB_TABLES=2000 …             so many random tables (200 if not given)
     CONFAB_SECONDS=480 …             no further random table after so many seconds
-    CONFAB_ROWS=FILE …               keep each random table's row there, and go on from what is there
+    CONFAB_ROWS=FILE …               store each random table's row there, and continue from the stored rows
     CONFAB_PEER_ROWS=FILE …          the same for the peers' runs
 
 Seconds are CPU seconds, which a busy machine changes little; medians of several runs. Nothing here was looked at while the
@@ -98,7 +98,7 @@ def timed(function: Callable[[], Any], runs: int = 5) -> tuple[Any, float]:
 
 
 def cold(problem: Problem, program: Compiled, improve: int | None = None) -> Callable[[], Outcome]:
-    """Return a planning call with nothing learned from earlier ones."""
+    """Return a planning call without memory."""
     if improve is None:
         return lambda: plan(problem, using=Compiled(program.program))
     return lambda: plan(problem, improve=improve, using=Compiled(program.program))
@@ -207,7 +207,7 @@ def gtpyhop(python: str, problem: Problem) -> tuple[str, str]:
 
 
 def lengths() -> None:
-    """Compare the length of the first and of the improved plan with the best known (`lengths.json` says whose)."""
+    """Compare the length of the first and of the shortened plan with the best known (`lengths.json` has the sources)."""
     known: dict[str, dict[str, Any]] = json.loads(LENGTHS.read_text()) if LENGTHS.exists() else {}
     print(
         "| family | n | first | improved | first ms | improving ms | best known | source | ratio | at least | ratio |"

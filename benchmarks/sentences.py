@@ -1,4 +1,4 @@
-"""Draw sentences at random from docstrings and pages, to be read by people who don't know the project.
+"""Draw random sentences from docstrings and pages, to be rated by readers who don't know the project.
 
     python -m benchmarks.sentences                     two hundred sentences of this checkout, with seed 1
     python -m benchmarks.sentences 50 7                fifty, with seed 7

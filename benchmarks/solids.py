@@ -31,7 +31,7 @@ WRONG, HARMLESS = 0.003, 0.0
 """Metres of overlap from which on a mutant is wrong, and up to which it is harmless."""
 
 VALUES = 25
-"""Number of values of each joint at which PyBullet is asked."""
+"""Number of values of each joint at which PyBullet's distances are computed."""
 
 
 @dataclass(frozen=True)

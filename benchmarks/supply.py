@@ -1,4 +1,4 @@
-"""What others' work this one needs: each package of the lock files with its licence, as it says itself.
+"""The dependencies: each package of the lock files with its licence, as stated by the package.
 
     python -m benchmarks.supply
 

@@ -103,7 +103,7 @@ def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool |
 
 
 def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
-    """Whether steps of lower levels stand in a plan because it is shorter, without violating a condition of a level above."""
+    """Whether a plan has lower-level steps because they shorten it, without violating a condition of a level above."""
     if outcome.plan is None or other.plan is None or outcome.given_up:
         return False
     whole = any(left.broken for left in levels_left(problem, outcome.plan))

@@ -1,6 +1,6 @@
 """Random PDDL with axioms: derived predicates in strata that need themselves, each other, and that lower ones don't hold.
 
-What is random is all but the types: formulas of any kind over constants, equality and predicates of no, one and two arguments, in
+Everything but the types is random: formulas of any kind over constants, equality and predicates of no, one and two arguments, in
 axioms, preconditions, conditions of effects and goals. Text only, so that every planner reads it with its own reader. `Plain`
 reads it, too, line by line as PDDL says: it leads to goals that can be reached, and is a judge of its own.
 """
@@ -31,7 +31,7 @@ class Formulas:
     ----------
     rng : Random
     known : mapping of predicate to the types of its arguments
-        Of which it may be asked whether it holds and whether it doesn't.
+        Facts of which conditions may require both the truth and the negation.
     own : mapping likewise
         Of which only their holding may help, and that of some one, not of all: Fast Downward takes "all" for "none doesn't".
     """
@@ -51,7 +51,7 @@ class Formulas:
         return self.rng.choice(free) if free and self.rng.random() < 0.93 else self.rng.choice(CONSTANTS[kind])
 
     def formula(self, bound: Mapping[str, str], depth: int = 2, helps: bool = True) -> str:
-        """Return a formula over some variables; `helps` tells whether the formula should rather be true."""
+        """Return a formula over some variables; `helps` says whether the formula should preferably be true."""
         rng, deeper = self.rng, depth - 1
         match rng.choice((*("atom",) * 8, "same", "and", "or", "not", "imply", "exists", "forall")):
             case "same":

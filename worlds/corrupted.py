@@ -12,7 +12,7 @@ from worlds.interpreter import Interpreter
 
 
 def corrupted(plan: Plan, problem: Problem, rng: Random) -> Plan:
-    """Return a plan with one change somewhere in its tree."""
+    """Return a plan with one random change in its tree."""
     path = rng.choice([step.path for step in plan.walk()])
     return Plan(renumbered(_changed(plan.steps, path, problem, rng)))
 

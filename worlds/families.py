@@ -71,7 +71,7 @@ def table(
 
 
 def strips(places: int, columns: int, hands: int) -> list[set[int]]:
-    """Return what each hand reaches: overlapping strips of columns, three quarters each if there are two."""
+    """Return the reach of each hand: overlapping strips of columns, three quarters each if there are two."""
     width = (3 * columns + 3) // 4 if hands == 2 else max(2, -(-2 * columns // hands))
     found = []
     for hand in range(hands):
@@ -127,7 +127,7 @@ def family(name: str, n: int, seed: int = 0, hands: int = 2) -> Problem:
         pours = {f"cup{i + 1}": f"beverage{i + 1}" for i in range(cups) if f"cup{i + 1}" in goals}
     elif name == "blocked":
         served = cups // 2
-        goals = {f"cup{i + 1}": at[bottles + served + i] for i in range(served)}  # other cups stand there
+        goals = {f"cup{i + 1}": at[bottles + served + i] for i in range(served)}  # other cups are there
         pours = {f"cup{i + 1}": f"beverage{i + 1}" for i in range(served)}
         goals |= {f"bottle{i + 1}": at[(i + 1) % bottles] for i in range(bottles)}
     return table(places, hands, cups, bottles, at, goals, pours, reach)

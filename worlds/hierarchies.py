@@ -1,10 +1,10 @@
-"""Random worlds of two or three levels: a robot that carries items between spots, and what can stand in its way.
+"""Random worlds of two or three levels: a robot that carries items between spots, with obstacles.
 
 Each world has some of these, drawn at random: covers over spots that have to be shut again (or needn't, or can't be); one or two
 hands; a robot that drives, on roads some of which are one-way, with fuel or without, that returns to its place or doesn't; spots
 for one item, for two, or for any number; items that fit some spots only, or may be moved only after they were treated; a station
 that has to be covered, or uncovered, for that; a lamp that one move turns off and on; covers that are open at first. The levels
-are those of the paper: what is done to an item, what a hand does, what an arm does. Small enough to be searched to the end.
+are those of the paper: actions on items, of hands, of arms. The worlds are small enough to be searched exhaustively.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class _Draft:
             self.chance(0.3),
             self.chance(0.3),
         )
-        self.under = rng.choice(("open", "shut", ""))  # what the station's cover has to be
+        self.under = rng.choice(("open", "shut", ""))  # required state of the station's cover
         self.free_hand, self.sticky = self.chance(0.5), self.chance(0.15)
         self.no_return, self.stay = self.chance(0.1), self.chance(0.6)
         self.shuts = not self.chance(0.1)

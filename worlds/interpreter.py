@@ -1,10 +1,10 @@
-"""A plain interpreter of problems: what each quantified behaviour does in a state, and which states can be reached.
+"""A plain interpreter of problems: the effect of each quantified behaviour in a state, and the reachable states.
 
 It shares no code with a search, a proof or the checker of plans, so that all of these can be held against it. Conditions are
 grounded by trying every binding, and written out as Python expressions over a tuple of values.
 
-slot     the position of a symbol's value in a state; symbols that nothing changes have none
-state    a tuple: a text per symbol, a number per amount; what is defined comes last
+slot     the position of a symbol's value in a state; static symbols have none
+state    a tuple: a text per symbol, a number per amount; defined situations come last
 node     a state, with the symbols that have been changed and aren't at rest
 """
 
@@ -148,7 +148,7 @@ class Interpreter:
         self._named: dict[tuple[str, tuple[str, ...]], Action] = {}
 
     def unsettled(self) -> dict[int, str]:
-        """Return the rest values that have to hold in the end, unless the goal says otherwise."""
+        """Return the rest values that must hold in the end, unless the goal requires other values."""
         return {
             i: rest
             for symbol, i in self.slots.items()
@@ -410,7 +410,7 @@ class Interpreter:
         Raises
         ------
         TooManyStatesError
-            More than `most` nodes can be reached, and none of the first is wanted, or nothing is.
+            More than `most` nodes are reachable, and none of the first satisfies the goal, or there is no goal.
         """
         actions = [(outcome, action) for action in self.actions(level) for outcome in action.outcomes]
         watched = dict(self.rests) if rests else {}

@@ -283,7 +283,7 @@ class Judge:
                 return
 
     def false_certificates(self, read: Scene) -> None:
-        """Check the checker of certificates with certificates of tasks that lack a behaviour.
+        """Test the checker of certificates with certificates of tasks that lack a behaviour.
 
         If there is a plan, none is valid.
         """
@@ -372,7 +372,7 @@ class Judge:
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # its own use of what pyparsing calls outdated
+                warnings.simplefilter("ignore")  # its own use of deprecated functions of pyparsing
                 PDDLReader().parse_problem_string(domain, problem)
         except Exception as error:
             self.complain("unified-planning can't read the export", mode, f"{type(error).__name__}: {error}")

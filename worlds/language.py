@@ -72,7 +72,7 @@ class BehaviorWriter:
         self.rng = rng
         self.kinds: dict[str, str] = {}
         self.asked = {**SITUATIONS, **{name: DEFINED[name] for name in defined}}
-        self.positive = positive  # those that are asked for only where their being true helps
+        self.positive = positive  # required only where their truth helps
         self.flipped = False
 
     def behavior(self, name: str, level: int = 1) -> Behavior:

@@ -1,9 +1,9 @@
-"""Small random worlds in which everything that a domain can say meets everything else.
+"""Small random worlds in which every construct of a domain meets every other.
 
 Situation types with one value per object, with many, of several arguments, with numbers, and defined by rules or by property
 axioms; behaviours on one to three levels, with effects on all of a class, on individuals that they name, and under conditions;
 rest values, values and situation types of lower levels; classes without individuals, and individuals that nothing mentions.
-What is wanted is drawn from states that can be reached, mixed from several of them, or drawn at random.
+Goals are drawn from reachable states, mixed from several of them, or drawn at random.
 
 Each world is small enough to be searched to the end by `worlds.interpreter`, or nearly so.
 """
@@ -187,7 +187,7 @@ class _Wishes:
             if not changed:
                 return {}
             symbol = rng.choice(changed)
-            if kind != "random" and rng.random() < 0.6:  # what is reached last
+            if kind != "random" and rng.random() < 0.6:  # the last states reached
                 symbol = max(
                     changed, key=lambda s: (self.first[self.of.slots[s], source[self.of.slots[s]]], rng.random())
                 )
@@ -217,7 +217,7 @@ class _Wishes:
 
 
 def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:
-    """Return whether an aggregate needs what is defined by itself."""
+    """Return whether an aggregate depends on a recursively defined situation type."""
     waiting, seen = list(read_by(aggregate)), set[str]()
     while waiting:
         name = waiting.pop()
@@ -248,7 +248,7 @@ class _Draft(Vocabulary):
         for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
             self.situation(number)
         self.static()
-        own = Random(f"aggregates {self.seed}")  # so that worlds without any are those of earlier versions
+        own = Random(f"aggregates {self.seed}")  # worlds without aggregates are the same as in earlier versions
         many = own.choice((1, 1, 2)) if own.random() < self.share else 0
         first = own.random() < 0.5
         for number in range(many if first else 0):
@@ -494,7 +494,7 @@ class _Draft(Vocabulary):
     # -------------------------------------------------------------------------------------------------------- behaviours
 
     def behaviors(self) -> list[Behavior]:
-        """Return behaviours: those of a lower level mostly do what one of the level above does, and more."""
+        """Return behaviours: a lower-level behaviour mostly has the effects of one of the level above, and more."""
         rng, found = self.rng, list[Behavior]()
         above: list[Behavior] = []
         for level in range(1, self.levels + 1):

@@ -224,9 +224,7 @@ class Phrases:
             right: Expression | None = Fraction(rng.choice((0, 1, 2, 2)))
             if rng.random() < 0.4:
                 right = self.number(bound, 0, extrema)
-            if (
-                sign in "*/" and isinstance(right, Amount) and rng.random() < 0.98
-            ):  # nothing multiplies what both change
+            if sign in "*/" and isinstance(right, Amount) and rng.random() < 0.98:  # no product of two changing amounts
                 right = Fraction(2)
             return Calculation(sign, left, right) if left is not None and right is not None else None
         if "size" in self.draft.relations and rng.random() < 0.2:

@@ -30,7 +30,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.timing import projected
 
 MOST_STATES = 20_000
-"""Maximum number of states of an exhaustive search; larger worlds are drawn anew."""
+"""Maximum number of states of an exhaustive search; a larger world is replaced by another one."""
 SPANS = {"start": Span.START, "throughout": Span.THROUGHOUT, "end": Span.END}
 
 Literal = tuple[int, bool]
@@ -38,7 +38,7 @@ Literal = tuple[int, bool]
 
 @dataclass(frozen=True)
 class Action:
-    """What an action asks and does: facts with their values, at its start, throughout and at its end."""
+    """The conditions and effects of an action: facts with their values, at its start, throughout and at its end."""
 
     seconds: int
     actor: int | None
@@ -46,13 +46,13 @@ class Action:
     makes: tuple[tuple[str, Literal], ...]
 
     def at(self, span: str, of: str = "asks") -> list[Literal]:
-        """Return what is asked or made in a span."""
+        """Return the conditions or effects in a span."""
         return [literal for at, literal in getattr(self, of) if at == span]
 
 
 @dataclass(frozen=True)
 class TimedWorld:
-    """Actions, the facts that hold at first, and those that are wanted."""
+    """Actions, initial facts, and goals."""
 
     facts: int
     actions: tuple[Action, ...]
@@ -190,7 +190,7 @@ def _taken(world: TimedWorld, running: frozenset[Running], literals: list[Litera
 
 
 def _kept(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]) -> bool:
-    """Return whether what runs still has what it asks for throughout."""
+    """Return whether the conditions throughout of all running actions still hold."""
     return all(_hold(facts, world.actions[number].at("throughout")) for number, _ in running)
 
 
@@ -235,7 +235,7 @@ def problem_of(world: TimedWorld) -> Problem:
 
 
 def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
-    """Return what is wrong with a plan in time as this world sees it, which shares no code with any checker; None if nothing is."""
+    """Return the fault of a plan in time in this world, which shares no code with any checker; None if there is none."""
     if any(slot.begin.denominator != 1 for slot in timed.slots):
         return "a step begins between two seconds"
     facts, running = world.initial, frozenset[Running]()

@@ -1,12 +1,12 @@
-"""What can be reached, counted by a program that shares no code with the planner: the truth that random tables are held against.
+"""Reachable states, enumerated by a program that shares no code with the planner: the truth for random tables.
 
-It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.Rules`), and asks that one only once
+It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.Rules`), and calls it only once
 for every
 combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which arrays
 of states descend.
 
 code    a state as one integer, a field of bits per symbol
-tree    dictionary from a value of the symbol that was looked at to a tree; a leaf is what is assigned, or None (not applicable)
+tree    maps the values of a symbol to trees; a leaf has the assigned values, or None (not applicable)
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class StateSpace:
                 waiting.append((tree.after[rank], rows if len(present) == 1 else rows[ranks == rank]))
 
     def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
-        """Ask the interpreter about one state, and return the tree extended by its answer."""
+        """Ask the interpreter about one state, and return the tree extended by its result."""
         ranks = [(int(code) >> shift) & mask for shift, mask in self.places]
         asked = Asked(self.problem, {s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
         changes = self.rules.changes(*self.steps[number], asked)

@@ -89,7 +89,7 @@ class _Walk:
         return end
 
     def as_said(self, level: int, before: State, said: State, end: State) -> bool:
-        """Return whether a refinement leaves what a level sees as the step determines."""
+        """Return whether a refinement leaves the symbols that a level sees as the step determines."""
         for slot in range(self.of.stated):
             symbol = self.of.symbols[slot]
             seen = self.problem.first_level(symbol) <= level
