@@ -3,7 +3,7 @@
     python -m benchmarks.perception [SCENES]
 
 In each scene objects stand at random places, perturbed, some of them aside or lying, and vessels are filled or not; then a hand
-takes an object and lifts it. At each of these moments everything is looked at several times, at every level of noise. What is
+takes an object and lifts it. At each of these times the scene is perceived repeatedly, at every level of noise.
 The truth is known from the setup and the actions, and not from perception without noise.
 """
 
