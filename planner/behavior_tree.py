@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 import networkx
 
-from confab.planner.acting.schedule import Order, partial_order, worker_of, workers_of
+from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
 from confab.planner.causal_links import FactChange, Kind, Need, Purpose, purposes
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import Facts, Rules, successor
@@ -130,7 +130,7 @@ class _Tree:
                 }
             self.needs[step.path] = [need for need in needs if not need.by or self.needs.get(need.by)]
         self.position = {step.path: number for number, step in enumerate(primitives)}
-        self.order: Order = partial_order(problem, primitives)
+        self.order: PartialOrder = partial_order(problem, primitives)
         self.workers = workers_of(problem)
 
     # --------------------------------------------------------------------------------------------------- steps

@@ -29,11 +29,11 @@ class CompiledRules:
         for group in strata(self.domain.rules):
             stratum = Stratum(table)
             for name in group:
-                table.now[name] = Derived(name, len(self.domain.situations[name].arguments), stratum)
+                table.now[name] = DerivedCells(name, len(self.domain.situations[name].arguments), stratum)
         tests = self._bind(table.now, table.holders)
         for name in self.domain.rules:
             cells = table.now[name]
-            assert isinstance(cells, Derived)
+            assert isinstance(cells, DerivedCells)
             cells.stratum.tests[name] = tests[name]
 
 
@@ -53,7 +53,7 @@ def _lines(writer: PythonWriter) -> Iterator[str]:
         yield f"rules[{name!r}] = {identifier('rule', name)}"
 
 
-class Derived(dict[Key, str]):
+class DerivedCells(dict[Key, str]):
     """Replaces the cells of a defined situation type: it stores nothing, and `get` derives a value."""
 
     def __init__(self, name: str, arity: int, stratum: Stratum) -> None:

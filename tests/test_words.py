@@ -1,6 +1,8 @@
 """Docstrings, comments, messages and pages name things: no pronoun stands for a missing noun, and no turn has to be guessed."""
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -26,6 +28,16 @@ OTHER_PAGES = ("memory",)
 """Pages that may have some; all others have none, nor have the rewritten rooms."""
 LEFT, RIDDLES_LEFT = 118, 36
 """Occurrences in all other rooms and pages, and riddles everywhere, at most; lower them when there are fewer."""
+OLD_NAMES = frozenset(
+    ["Alike", "Concern", "Effort", "Mended", "Moment", "Patience", "Want", "Wants", "Width", "astray", "despair", "fast_plan", "mending", "wary"]
+)
+"""Names of classes, functions and parameters that were replaced: SymmetryClasses, StepFootprint, SearchBudget, RepairResult,
+Event, RetryPolicy, Subgoal, Subgoals, SearchBudget, dead_end, on_no_plan, hierarchical_plan, repairs, dead_end_check."""
+NEW_ROOMS = ("planner", "reasoner", "confab", "sim")
+UNIQUE = frozenset(
+    ["Call", "Change", "Event", "PhysicsWorld", "PythonWriter", "SearchBudget", "Subgoals", "SymmetryClasses", "World"]
+)
+"""Names of classes and types that have one meaning in all rooms."""
 KIND = '"facts of what hands reach"'
 """The name of a kind of file."""
 
@@ -37,6 +49,32 @@ def texts() -> dict[str, str]:
     return {
         file.relative_to(ROOT).as_posix(): " ".join(file.read_text("utf-8").split()).replace(KIND, "") for file in files
     }
+
+
+def defined(path: Path) -> Iterator[str]:
+    """Yield the names of classes, functions, parameters and type aliases of a module."""
+    tree = ast.parse(path.read_text("utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node.name
+        if isinstance(node, ast.arg):
+            yield node.arg
+    for node in tree.body:
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            yield node.target.id
+        elif isinstance(node, ast.Assign):
+            yield from (target.id for target in node.targets if isinstance(target, ast.Name))
+
+
+def test_replaced_names_do_not_come_back_and_common_names_have_one_meaning() -> None:
+    modules = [file for room in NEW_ROOMS for file in sorted((ROOT / room).rglob("*.py"))]
+    names = {file.relative_to(ROOT).as_posix(): set(defined(file)) for file in modules}
+    back = {file: found & OLD_NAMES for file, found in names.items() if found & OLD_NAMES}
+    assert back == {}, "use the new name (the docstring of OLD_NAMES)"
+    twice = {
+        name: files for name in UNIQUE if len(files := [file for file, found in names.items() if name in found]) > 1
+    }
+    assert twice == {}, "one name for one thing"
 
 
 def test_no_pronoun_stands_for_a_missing_noun() -> None:

@@ -16,7 +16,7 @@ from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.symbols import Problem, State, Symbol
 
-Order: TypeAlias = "networkx.DiGraph[int]"
+PartialOrder: TypeAlias = "networkx.DiGraph[int]"
 Compatible = Callable[[Step, Step], bool]
 """Function of two primitives: whether there is enough room to execute both at the same time."""
 
@@ -32,7 +32,7 @@ class Slot:
     end: float
 
 
-def partial_order(problem: Problem, primitives: Sequence[Step]) -> Order:
+def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     """Return the necessary order of primitives as a transitively reduced graph over their positions.
 
     Parameters
@@ -55,13 +55,13 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> Order:
         before = states[-1]
         writes.append({s: (before.get(s), v) for s, v in after.items() if before.get(s) != v})
         states.append(after)
-    order: Order = networkx.DiGraph()
+    order: PartialOrder = networkx.DiGraph()
     for j, step in enumerate(primitives):
         order.add_node(j, label=str(step))
         for i in range(j - 1, -1, -1):
             if not networkx.has_path(order, i, j) and _needs(problem, primitives, states, writes, i, j):
                 order.add_edge(i, j)
-    reduced: Order = networkx.transitive_reduction(order)
+    reduced: PartialOrder = networkx.transitive_reduction(order)
     reduced.add_nodes_from(order.nodes(data=True))
     return reduced
 
@@ -112,7 +112,7 @@ def schedule(
 
 
 def ready(
-    order: Order,
+    order: PartialOrder,
     primitives: Sequence[Step],
     workers: Iterable[str],
     begun: Iterable[int],
@@ -136,7 +136,7 @@ def ready(
     return found
 
 
-def urgency_of(order: Order) -> dict[int, float]:
+def urgency_of(order: PartialOrder) -> dict[int, float]:
     """Return for each primitive the length of the longest chain of primitives that begins with it."""
     return _urgency(order, dict.fromkeys(order, 1.0))
 
@@ -152,7 +152,7 @@ def makespan(slots: Sequence[Slot]) -> float:
     return max((slot.end for slot in slots), default=0.0)
 
 
-def _urgency(order: Order, seconds: Mapping[int, float]) -> dict[int, float]:
+def _urgency(order: PartialOrder, seconds: Mapping[int, float]) -> dict[int, float]:
     """Return for each primitive the duration of the longest chain of primitives that begins with it."""
     found: dict[int, float] = {}
     for i in reversed(list(networkx.topological_sort(order))):

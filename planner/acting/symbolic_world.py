@@ -15,7 +15,7 @@ from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol
 
 DONE = Report(True)
-Fault = Callable[[Step, State], Report | None]
+FaultInjection = Callable[[Step, State], Report | None]
 """Decides whether a primitive fails in a situation, and how; for tests."""
 
 
@@ -32,7 +32,7 @@ class SymbolicWorld:
     """
 
     def __init__(
-        self, problem: Problem, seconds_of: Mapping[str, float] | None = None, fault: Fault | None = None
+        self, problem: Problem, seconds_of: Mapping[str, float] | None = None, fault: FaultInjection | None = None
     ) -> None:
         self.problem = problem
         self.state: dict[Symbol, str] = dict(problem.initial)

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
 
-from confab.planner.grounded.exploring import Order, explore, path_to
+from confab.planner.grounded.exploring import SearchOrder, explore, path_to
 from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import MOST_ROWS, ground
 from confab.planner.grounded.hff import heuristic
@@ -134,8 +134,8 @@ def search(
 
     novelty = Novelty(task, evaluate, begun.work, landmarks(task, deadline), counts)
     greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
-    going: dict[Order, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
-    spent: dict[Order, int] = dict.fromkeys(going, 0)
+    going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
+    spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
     del novelty, greedy  # releases the states of an order that ran out of memory
     while True:
         order = min(going, key=spent.__getitem__)

@@ -29,7 +29,7 @@ class Candidate(NamedTuple):
     cost: float
 
 
-class Order(Protocol):
+class SearchOrder(Protocol):
     """An order of search. `work` counts bits processed by relaxed plans; a turn ends after `turn` of it.
 
     `reached` maps each state to the candidate that reached it last; `bytes` is the memory used besides these states; `best` is the
@@ -49,7 +49,7 @@ class Order(Protocol):
         """Rank a newly reached state; discard it if the goal is unreachable from it."""
 
 
-def explore(task: Task, order: Order) -> Iterator[int]:
+def explore(task: Task, order: SearchOrder) -> Iterator[int]:
     """Reach states until the order has no more candidates; yield the work of each turn.
 
     Raises

@@ -14,7 +14,7 @@ from itertools import count
 from typing import Protocol
 
 from confab.planner.grounded.amounts import AmountTable
-from confab.planner.grounded.joins import Table
+from confab.planner.grounded.joins import JoinTable
 from confab.planner.grounded.schemas import plain_variables
 from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import Amount, bounds
@@ -51,8 +51,8 @@ class ReachableFacts(Protocol):
     situations: dict[str, SituationType]
     individuals: tuple[str, ...]
     amounts: AmountTable
-    tables: dict[tuple[str, str], Table]
-    symbols: dict[str, Table]
+    tables: dict[tuple[str, str], JoinTable]
+    symbols: dict[str, JoinTable]
 
     def find(self, situation: SituationType, arguments: Sequence[str], value: str) -> int:
         """Return the row of a fact in its table, or -1."""

@@ -27,7 +27,7 @@ from confab.planner.grounded.amounts import Amounts, Linear, Move, pushes, settl
 from confab.planner.grounded.derived import Derived, in_parts
 from confab.planner.grounded.derived_arrays import Bit
 from confab.planner.grounded.formulas import Formulas, Literals
-from confab.planner.grounded.joins import Ints, Table, ranges
+from confab.planner.grounded.joins import Ints, JoinTable, ranges
 from confab.planner.grounded.reachability import Flags, Reached
 from confab.planner.grounded.schemas import Schema
 from confab.planner.grounded.shortage import shortage
@@ -139,7 +139,7 @@ class _Assembly:
         for i, schema in enumerate(self.reached.schemas):
             if schema.conditional:
                 parent = max(b for b in base if b < i)
-                table = Table(len(self.reached.schemas[parent].terms), self.reached.radix)
+                table = JoinTable(len(self.reached.schemas[parent].terms), self.reached.radix)
                 table.rows = rows[parent]
                 place = table.find(rows[i][:, : table.arity])
                 keep = np.flatnonzero(place >= 0)

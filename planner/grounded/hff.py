@@ -26,7 +26,7 @@ from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
 """Maximum number of repetitions that count, enough to distinguish distances."""
-Push: TypeAlias = "tuple[Linear, str, Exact | None]"
+AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
 """A difference, its required sign, and how far an operator moves it; None if that depends on the state."""
 
 
@@ -134,13 +134,13 @@ def heuristic(task: Task) -> Evaluate:
     return evaluate
 
 
-def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[Push, list[int]]]:
+def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:
     """Return the required and added bits of the relaxed operators, their owners, and by how far they move amounts.
 
     An operator that moves amounts towards a comparison is a separate relaxed operator.
     """
     needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
-    repeated = defaultdict[Push, list[int]](list)
+    repeated = defaultdict[AmountPush, list[int]](list)
     if task.amounts is not None:
         compared = {bit: key for key, bit in task.amounts.bits.items()}
         for o, bits in enumerate(adds[:]):

@@ -1,6 +1,6 @@
 """Tables of small integers and their joins, which take most of the time of grounding.
 
-A `Table` is append-only, so the rows known before a round are a prefix of its rows: semi-naive evaluation
+A `JoinTable` is append-only, so the rows known before a round are a prefix of its rows: semi-naive evaluation
 needs no second table. An index sorts the rows by some columns once per size of the table; a match is then a binary
 search.
 """
@@ -20,7 +20,7 @@ PAIR = 1e-7
 """Minimum time of a row of a join, in seconds. A join can't be interrupted, so one that would exceed the deadline isn't begun."""
 
 
-class Table:
+class JoinTable:
     """Distinct rows of integers in [0, radix), in order of insertion."""
 
     def __init__(self, arity: int, radix: int) -> None:

@@ -27,7 +27,7 @@ CHILD, VISIT = 20, 2
 """Number of bits that h_FF processes in the time of making one successor, and of visiting a tree node."""
 
 
-class Place(NamedTuple):
+class Progress(NamedTuple):
     """The progress of a state: open goals, landmarks ahead, facts of its relaxed plan (-1: not made yet), and facts met."""
 
     state: int
@@ -44,11 +44,11 @@ class Novelty:
         self.task, self.evaluate, self.counts = task, evaluate, counts
         self.reached: dict[int, Candidate] = {}
         self.work, self.turn, self.bytes = 0, relaxing, 0
-        self.open = OpenList[Place]()
+        self.open = OpenList[Progress]()
         self.best: int | None = None
         above = -1 << task.size if task.amounts else 0  # the number of the amounts is no fact
         self.known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # facts met, by distance
-        self.begin = Place(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
+        self.begin = Progress(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
 
     def candidates(self) -> Iterator[Candidate]:
         """Yield the successors of the most novel states."""
@@ -81,15 +81,15 @@ class Novelty:
             self.best = state
             return
         open_ = missing.bit_count() + unmet.bit_count()
-        place = Place(state, open_, unmet, -1, 0)
+        place = Progress(state, open_, unmet, -1, 0)
         if open_ >= begin.open:
-            place = Place(state, open_, unmet, begin.wanted, begin.met | state & begin.wanted)
+            place = Progress(state, open_, unmet, begin.wanted, begin.met | state & begin.wanted)
         distance = open_, place.met.bit_count()
         old = self.known[distance]
         self.known[distance] = old | state
         self.open.push((not state & ~old, open_, -len(self.reached)), place)
 
-    def relaxed(self, place: Place) -> Place | None:
+    def relaxed(self, place: Progress) -> Progress | None:
         """Return the progress of a state with the facts of its relaxed plan; None if the goal is unreachable."""
         if place.wanted >= 0:
             return place

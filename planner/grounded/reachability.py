@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.formulas import Formulas
-from confab.planner.grounded.joins import Ints, Table, pack
+from confab.planner.grounded.joins import Ints, JoinTable, pack
 from confab.planner.grounded.merged_effects import lifted
 from confab.planner.grounded.schemas import Atom, Schema, rules_apart, schemas
 from confab.planner.grounded.separation import in_parts
@@ -46,7 +46,7 @@ class Reached:
 
     Attributes
     ----------
-    tables : mapping of (kind, name) to Table
+    tables : mapping of (kind, name) to JoinTable
         Kind is situation, relation or class; a row of a situation type has the arguments and the value (no value if it is
         boolean, since only true facts are listed).
     rows : list of Ints
@@ -99,8 +99,8 @@ class Reached:
         self.individuals = tuple(dict.fromkeys(self._individuals()))
         self.number = {name: i for i, name in enumerate(self.individuals)}
         self.radix = max(len(self.individuals), 1)
-        self.tables: dict[tuple[str, str], Table] = defaultdict(lambda: Table(1, self.radix))
-        self.symbols: dict[str, Table] = {}
+        self.tables: dict[tuple[str, str], JoinTable] = defaultdict(lambda: JoinTable(1, self.radix))
+        self.symbols: dict[str, JoinTable] = {}
         self._fill()
         self.rows: list[Ints] = [np.empty((0, len(schema.terms)), np.int64) for schema in self.schemas]
 
@@ -136,12 +136,12 @@ class Reached:
             arity = len(situation.arguments) + (not situation.boolean)
             self._put(("situation", name), arity, facts)
             if not situation.boolean:
-                self.symbols[name] = Table(arity - 1, self.radix)
+                self.symbols[name] = JoinTable(arity - 1, self.radix)
                 self.symbols[name].add(self.tables["situation", name].rows[:, :-1])
 
     def _put(self, key: tuple[str, str], arity: int, rows: Sequence[tuple[str, ...]]) -> None:
         number = self.number
-        table = self.tables[key] = Table(arity, self.radix)
+        table = self.tables[key] = JoinTable(arity, self.radix)
         flat = [number[name] for row in rows for name in row]
         table.add(np.array(flat, np.int64).reshape(len(rows), arity))
 

@@ -17,7 +17,7 @@ Waiting = tuple[int, list[int], int]
 """An operator, its required bits in the order of testing, and their number."""
 
 
-class Tree:
+class SuccessorTree:
     """Operators by the values that they require, symbol by symbol.
 
     `mask` has the bits of a symbol; `by_value` has the subtree of each of its values, `otherwise` that of operators that don't test
@@ -29,8 +29,8 @@ class Tree:
     def __init__(self, masks: Sequence[int], waiting: list[Waiting]) -> None:
         self.masks, self.waiting = masks, waiting
         self.mask = 0
-        self.by_value: dict[int, Tree] = {}
-        self.otherwise: Tree | None = None
+        self.by_value: dict[int, SuccessorTree] = {}
+        self.otherwise: SuccessorTree | None = None
         self.operators: list[int] = []
 
     def of(self, state: int) -> tuple[list[int], int]:
@@ -39,7 +39,7 @@ class Tree:
         visited = 0
         heads = [self]
         for head in heads:  # the list grows
-            node: Tree | None = head
+            node: SuccessorTree | None = head
             while node is not None:
                 visited += 1
                 if node.waiting:
@@ -70,12 +70,12 @@ class Tree:
                 by_value.setdefault(1 << bit, []).append((operator, bits, asked + 1))
             else:
                 others.append(one)
-        self.by_value = {value: Tree(masks, waiting) for value, waiting in by_value.items()}
-        self.otherwise = Tree(masks, others) if others else None
+        self.by_value = {value: SuccessorTree(masks, waiting) for value, waiting in by_value.items()}
+        self.otherwise = SuccessorTree(masks, others) if others else None
         self.waiting = []
 
 
-def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> Tree:
+def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:
     """Return the tree of operators; symbols that many operators require are tested first.
 
     Parameters
@@ -95,4 +95,4 @@ def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> Tree:
     owners = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     bits = items[np.lexsort((place[symbol_of[items]], owners))].tolist()
     ends = starts.tolist()
-    return Tree(masks, [(i, bits[ends[i] : ends[i + 1]], 0) for i in range(len(ends) - 1)])
+    return SuccessorTree(masks, [(i, bits[ends[i] : ends[i + 1]], 0) for i in range(len(ends) - 1)])

@@ -64,7 +64,7 @@ class Achiever:
 
 
 @dataclass
-class Bound:
+class BoundProgram:
     """The compiled functions of a program, bound to one table."""
 
     forward: dict[str, Forward]
@@ -101,11 +101,11 @@ class Program:
         self._rules = CompiledRules(self.writer) if self.domain.rules else None
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
-    def bind(self, table: Table, few: int = FEW) -> Bound:
+    def bind(self, table: Table, few: int = FEW) -> BoundProgram:
         """Return the functions bound to a table; of more than `few` interchangeable candidates, they try one."""
         if self._rules is not None:
             self._rules.define(table)
-        return Bound(*self._bind(table.now, table.holders, few))
+        return BoundProgram(*self._bind(table.now, table.holders, few))
 
     def _picked(
         self,

@@ -41,7 +41,7 @@ class RefinedStep(NamedTuple):
     steps: tuple[RefinedStep, ...]
 
 
-class Task(NamedTuple):
+class RefinementTask(NamedTuple):
     """A step to be refined: its behaviour, its arguments, the individuals of its variables, and the manner.
 
     If `careful`, symbols that the level above doesn't see keep their values.
@@ -106,7 +106,7 @@ class Refiner:
         steps = None
         for careful in (True, False) if self.careful else (False,):
             if steps is None:
-                task = Task(name, arguments + bindings, careful)
+                task = RefinementTask(name, arguments + bindings, careful)
                 steps = self.achieve(below, targets, self.space.refining(level, careful), budgets, task)
         if steps is None:
             return None
@@ -119,7 +119,7 @@ class Refiner:
         targets: Mapping[Cell, str],
         keep: Keep,
         budgets: Sequence[SearchBudget],
-        task: Task | None = None,
+        task: RefinementTask | None = None,
     ) -> Sequence[RefinedStep] | None:
         """Apply steps of a level after which the targets hold and the rest is kept; on failure return None, the table unchanged.
 
@@ -130,7 +130,7 @@ class Refiner:
         keep : function of a cell and its first value
         budgets : sequence of SearchBudget
             Tried one after the other.
-        task : Task, optional
+        task : RefinementTask, optional
             The step to be refined; without one the targets are goals.
         """
         here: object = None

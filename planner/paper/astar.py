@@ -26,7 +26,7 @@ Goal = Mapping[int, str]
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """The result of a search; `path` is meaningful only if `status` is solved."""
 
     status: Status
@@ -48,7 +48,7 @@ def a_star(
     rank: Callable[[Values], Callable[[Applied], float]] | None = None,
     bonus: Callable[[float, int], float] = lambda c, n: 0.0,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-) -> Found:
+) -> SearchResult:
     """Search a path from `start` to a state with the values of `goal`.
 
     Parameters
@@ -78,7 +78,7 @@ def a_star(
         if not mismatches(state, goal):
             return _reconstruct(came_from, state, counts)
         if counts.expanded >= limits.expansions:
-            return Found(Status.GAVE_UP, (), (), counts)
+            return SearchResult(Status.GAVE_UP, (), (), counts)
         counts.expanded += 1
         n = depth[state] + 1
         score = rank(state) if rank else None
@@ -97,16 +97,16 @@ def a_star(
                     open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g)
                 )
         except OutOfTimeError:
-            return Found(Status.GAVE_UP, (), (), counts)
-    return Found(Status.UNSOLVABLE, (), (), counts)
+            return SearchResult(Status.GAVE_UP, (), (), counts)
+    return SearchResult(Status.UNSOLVABLE, (), (), counts)
 
 
 def _reconstruct(
     came_from: Mapping[Values, tuple[Values, Applied, float | None]], state: Values, counts: Counts
-) -> Found:
+) -> SearchResult:
     path, ranks = [], []
     while state in came_from:
         state, applied, c_m = came_from[state]
         path.append(applied)
         ranks.append(c_m)
-    return Found(Status.SOLVED, tuple(reversed(path)), tuple(reversed(ranks)), counts)
+    return SearchResult(Status.SOLVED, tuple(reversed(path)), tuple(reversed(ranks)), counts)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TypeAlias
 
-from confab.planner.paper.astar import Found, Goal, a_star, mismatches
+from confab.planner.paper.astar import Goal, SearchResult, a_star, mismatches
 from confab.planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from confab.planner.paper.transitions import Applied, Model, Values, ground
 from confab.planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
@@ -234,7 +234,7 @@ def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -
     return call.known[state, ground]
 
 
-def search(call: PaperCall, level: int, start: Values, wanted: Target) -> Found:
+def search(call: PaperCall, level: int, start: Values, wanted: Target) -> SearchResult:
     """Search one level with eq. (5), without the behaviours known to have no refinement.
 
     The searched states are those of the model, followed by the marks of the target.

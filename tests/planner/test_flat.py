@@ -12,7 +12,7 @@ import pytest
 
 from confab.planner.grounded import reachability
 from confab.planner.grounded.best_first import plan_level, search
-from confab.planner.grounded.exploring import Order, explore, path_to
+from confab.planner.grounded.exploring import SearchOrder, explore, path_to
 from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import Evaluate, Evaluation, heuristic
@@ -141,7 +141,7 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
     assert len(shortened(task, doubled)) <= len(plan)
 
 
-ORDERS: dict[str, Callable[[Task], Order]] = {
+ORDERS: dict[str, Callable[[Task], SearchOrder]] = {
     "novelty": lambda task: Novelty(task, heuristic(task), 1, landmarks(task), Counts()),
     "h_FF": lambda task: Greedy(task, heuristic(task), ahead(task), Counts()),
     "cost": lambda task: Cheapest(task, nothing, math.inf, Counts()),

@@ -10,7 +10,7 @@ import pytest
 import confab
 from confab.planner.acting import executive
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.grounded.joins import Table
+from confab.planner.grounded.joins import JoinTable
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Status
 from confab.planner.solve import Mode
@@ -68,7 +68,7 @@ def test_blocks_of_limits_nest_and_the_earliest_deadline_counts() -> None:
 
 
 def test_a_join_that_would_outlast_the_deadline_is_not_begun() -> None:
-    table = Table(1, 4000)
+    table = JoinTable(1, 4000)
     table.add(np.arange(4000).reshape(-1, 1))
     begin = process_time()
     with within(0.2), pytest.raises(OutOfTimeError):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from confab.planner.acting.schedule import Order, makespan, partial_order, ready, schedule, urgency_of, worker_of
+from confab.planner.acting.schedule import PartialOrder, makespan, partial_order, ready, schedule, urgency_of, worker_of
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
@@ -29,7 +29,7 @@ def planned() -> Plan:
 
 
 @cache
-def needed() -> Order:
+def needed() -> PartialOrder:
     return partial_order(serving(), planned().primitives)
 
 
@@ -77,7 +77,7 @@ def step(name: str, *arguments: str) -> Step:
     return Step((0,), 0, 1, name, arguments)
 
 
-FORK: Order = networkx.DiGraph([(0, 1), (1, 2), (0, 3)])
+FORK: PartialOrder = networkx.DiGraph([(0, 1), (1, 2), (0, 3)])
 
 
 def test_how_urgent_a_step_is_is_how_long_the_longest_chain_behind_it_takes() -> None:
