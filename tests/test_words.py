@@ -28,9 +28,10 @@ OTHER_PAGES = ("memory",)
 """Pages that may have some; all others have none, nor have the rewritten rooms."""
 LEFT, RIDDLES_LEFT = 118, 36
 """Occurrences in all other rooms and pages, and riddles everywhere, at most; lower them when there are fewer."""
-OLD_NAMES = frozenset(
-    ["Alike", "Concern", "Effort", "Mended", "Moment", "Patience", "Want", "Wants", "Width", "astray", "despair", "fast_plan", "mending", "wary"]
-)
+OLD_NAMES = {
+    *("Alike", "Concern", "Effort", "Mended", "Moment", "Patience", "Want", "Wants", "Width"),
+    *("astray", "despair", "fast_plan", "mending", "wary"),
+}
 """Names of classes, functions and parameters that were replaced: SymmetryClasses, StepFootprint, SearchBudget, RepairResult,
 Event, RetryPolicy, Subgoal, Subgoals, SearchBudget, dead_end, on_no_plan, hierarchical_plan, repairs, dead_end_check."""
 NEW_ROOMS = ("planner", "reasoner", "confab", "sim")
