@@ -80,7 +80,7 @@ def several(given: Facts) -> list[str]:
     Raises
     ------
     KnowledgeError
-        It is no text, or holds what is none.
+        It isn't text, or contains an invalid value.
 
     Examples
     --------

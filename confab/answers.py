@@ -43,7 +43,7 @@ def scene_of(folder: Path, name: str) -> Scene:
     Raises
     ------
     KnowledgeError
-        As `inside`; or a catalog or an import leads out of the folder.
+        As for `inside`; or a catalog or an import leads out of the folder.
     """
     from confab.reaching import with_current_reach
 

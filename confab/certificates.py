@@ -51,7 +51,7 @@ def checked_certificate(scene: Scene, goals: tuple[str, ...], file: Path) -> Che
     goals : tuple of str
         Each replaces the scene's goal of that symbol, as in planning.
     file : Path
-        What `confab plan --json` wrote of an unsolvable task, or the certificate alone.
+        The output of `confab plan --json` for an unsolvable task, or the certificate alone.
 
     Raises
     ------

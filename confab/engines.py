@@ -67,15 +67,15 @@ def plan_by_engine(
     ----------
     problem : Problem
     engine : str, optional
-        As unified-planning calls it, e.g. ``fast-downward``; any installed one that takes the problem if left out.
+        Its name in unified-planning, e.g. ``fast-downward``; if left out, any installed engine that supports the problem.
     level : int, optional
     seconds : float, optional
-        What all this may take; `ENGINE_SECONDS` if left out. A plan that the engine has written by then counts.
+        Time limit of the whole call; `ENGINE_SECONDS` if left out. A plan that the engine has written by then counts.
 
     Raises
     ------
     KnowledgeError
-        There is no such engine or level, or something is defined or an amount, which this engine doesn't take.
+        There is no such engine or level, or the engine doesn't support the definitions or amounts of the problem.
     """
     with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:  # exporting and importing are slow, too
         return _planned(problem, engine, level, deadline)
@@ -158,7 +158,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
     Raises
     ------
     KnowledgeError
-        unified-planning isn't installed, or has no such engine, or none for such a problem.
+        unified-planning isn't installed, has no such engine, or has none for such a problem.
     """
     try:
         from unified_planning.engines import PDDLPlanner

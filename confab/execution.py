@@ -374,7 +374,7 @@ class Execution:
         return self.summary()
 
     def report(self, path: str | Path) -> Path:
-        """Write what happened as one HTML page, and return where."""
+        """Write the episode as one HTML page, and return the path."""
         from confab.page.data import page_data
         from confab.page.frozen import write_page
 
@@ -390,7 +390,7 @@ class Execution:
 
 
 class Options(TypedDict, total=False):
-    """What else `execute` takes."""
+    """Further options of `execute`."""
 
     prepare: Callable[[PhysicsWorld], None] | None
     retry_policy: RetryPolicy
@@ -489,7 +489,7 @@ def execute(
     problem : Problem
         The scene's, or one with other goals.
     plan : Plan, optional
-        What to begin with.
+        The first plan.
     interventions : iterable of str or Intervention
         Each like ``after=28 cup2 LOCATION location8``.
     world : {'symbolic', 'pybullet'}, World, or str
@@ -504,7 +504,7 @@ def execute(
         Called with the PyBullet world before it begins, for instance to inject a fault.
     retry_policy : RetryPolicy
     caution : Caution, optional
-        What failed in earlier episodes.
+        Failures in earlier episodes.
     perturb : bool
         Vary poses, friction, masses and fill in PyBullet, by `seed`.
     noise : float
@@ -515,7 +515,7 @@ def execute(
     Raises
     ------
     KnowledgeError
-        An intervention isn't of a known form, or can't happen; the scene has no geometry; no such world.
+        An intervention has no known form, or can't take place; the scene has no geometry; there is no such world.
     """
     texts = list(interventions)
     wanted = [i for i in texts if isinstance(i, Intervention)]

@@ -132,7 +132,7 @@ def explain(
     number : int
         The step to be explained.
     against : behaviour and arguments, optional
-        The alternative; if left out, what else rules would do there.
+        The alternative; if left out, the other advice of the rules there.
     labels : Labels, optional
         The labels for the text.
 
@@ -186,7 +186,7 @@ def explain(
 
 
 def behind(memory: Memory, name: str) -> str:
-    """Return how often a rule was chosen, passed over, and failed, and in whose episodes."""
+    """Return how often a rule was chosen, passed over, and failed, and in which episodes."""
     tally = memory.experience.totals().get(name, {}).get(ITSELF, Tally())
     those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
     lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))

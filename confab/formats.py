@@ -19,7 +19,7 @@ class _Step(TypedDict):
 
 
 class StepJson(_Step, total=False):
-    """A step with all below it; `rank` is the one that memory gave it."""
+    """A step with all steps below it; `rank` is given by the memory."""
 
     rank: float
 

@@ -38,7 +38,7 @@ class Run:
     page: PageData
 
     def figures(self) -> dict[str, str]:
-        """Return how it ended and its figures, by name, as text."""
+        """Return the outcome of the run and its figures, by name, as text."""
         sign = {True: "✓ ", False: "✗ ", None: ""}[self.page.get("good")]
         figures = {"verdict": sign + self.page["status"]}
         figures |= {tile["name"]: tile["text"] for tile in self.page["tiles"]}
@@ -120,7 +120,7 @@ def listed(those: Sequence[Run]) -> Table:
 
 
 def compared(those: Sequence[Run], one: str, other: str) -> Table:
-    """Return in what two runs differ: a row for each figure, step of the first level and goal that isn't the same.
+    """Return the differences of two runs: a row for each figure, first-level step and goal that differs.
 
     Raises
     ------

@@ -42,9 +42,9 @@ class Known:
     Attributes
     ----------
     knowledge : KnowledgeGraph
-        The store behind it.
+        The store with its triples.
     seconds : mapping of stage to seconds
-        What loading took.
+        Statistics of loading.
     """
 
     knowledge: KnowledgeGraph

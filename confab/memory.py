@@ -177,7 +177,7 @@ class Memory:
         ----------
         scene : Scene
         plan : Plan, Result or file
-            How it was solved.
+            The plan that solved it.
 
         Raises
         ------

@@ -171,7 +171,7 @@ class Report:
 
 
 class Options(TypedDict, total=False):
-    """What else `verify` takes."""
+    """Further options of `verify`."""
 
     perturb: bool
     noise: float

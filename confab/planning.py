@@ -87,9 +87,9 @@ def plan(
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
         The memory; none if left out.
     mode : str
-        ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
-        ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
-        it; behaviours are then numbered among the individuals that were recognised. ``optimal``: as `optimal` says.
+        ``paper``: A* with eq. (5) on each level, over all behaviours quantified in the scene. ``guarded``,
+        ``leading`` and ``strict``: the default planner, over the individuals that the task can need; experience leads it if
+        it has proved useful, always, or never. IDs then number the recognised individuals. ``optimal``: see `optimal`.
     time_limit : float or Deadline, optional
         Seconds until the call gives up, or its deadline; `OPTIMAL_SECONDS` if `optimal` is requested without a limit.
     optimal : bool
@@ -97,9 +97,9 @@ def plan(
     observed : str or Path, optional
         File of observed facts, which replace the scene's.
     engine : str, optional
-        A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
-        where ours gives up and levels may be left, and is given what is left of a time limit, at least two fifths of it; without
-        one, after work of some twenty seconds, and ours goes on where it finds nothing. With ``none`` none is.
+        Another planner known to unified-planning, e.g. ``fast-downward``. If left out, an installed one is tried where ours
+        gives up and levels may be left: with the rest of the time limit, at least two fifths of it; without a limit after
+        some twenty seconds of work, and ours continues if it finds no plan. With ``none`` no other planner is tried.
     level : int, optional
         The level that the engine plans; the lowest if left out.
     leave_levels : bool
@@ -382,7 +382,7 @@ class Result:
         asked : str
             ``cup2 LOCATION location8``, also with ``by left_hand``; or ``B2_PICK right_hand cup1``, ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
-            In the place of which step; if left out, of the most similar one where it can be done.
+            The step to be replaced; if left out, the most similar step in whose place it is applicable.
         seconds : float, optional
             Limit of the whole call.
         """

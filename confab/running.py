@@ -161,7 +161,7 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
 
 
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
-    """Write report and record, of a plan the plan, of a rollout verdicts and observed facts too, and return what lies where."""
+    """Write report and record; for a plan the plan, for a rollout verdicts and observed facts too; return the paths."""
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 

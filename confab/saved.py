@@ -43,7 +43,7 @@ def read_episode(scene: Known, path: Path) -> Execution:
     scene : Scene
         The scene in which it happened.
     path : Path
-        What ``confab execute --json`` printed, or `Execution.save` wrote into a file whose name ends in ``.json``. The situation
+        Output of ``confab execute --json``, or a file written by `Execution.save` whose name ends in ``.json``. The situation
         before a failure and the static facts that a step relied on aren't in it.
 
     Raises
@@ -93,7 +93,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
     ----------
     scene : Scene
     verdicts : Path
-        What ``confab verify --json`` printed, or ``confab run`` wrote as ``verify.json``.
+        Output of ``confab verify --json``, or ``verify.json`` written by ``confab run``.
     plan : Plan
         The plan that was verified.
 

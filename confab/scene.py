@@ -46,9 +46,9 @@ class Scene(Known):
     Attributes
     ----------
     knowledge : KnowledgeGraph
-        The store behind it.
+        The store with its triples.
     seconds : mapping of stage to seconds
-        What loading took.
+        Statistics of loading.
     """
 
     plan = planning.plan
@@ -239,7 +239,7 @@ class Scene(Known):
         Raises
         ------
         confab.reasoner.limits.OutOfTimeError
-            The time limit, which holds for both, is over before it is known why.
+            The time limit for both passes before the reason is found.
         """
         limit = options.get("time_limit")
         if not isinstance(limit, Deadline):

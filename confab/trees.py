@@ -54,7 +54,7 @@ RESERVED |= {
 class Element:
     """A node as both engines have it.
 
-    `kind` is Fallback, Sequence (both ask their first children again in each tick), Once (a sequence that goes on where it was),
+    `kind` is Fallback, Sequence (both tick their first children again in each tick), Once (a sequence that resumes where it was),
     Parallel, SubTree, Check, Set, Again, Condition or Action. `name` is that of a subtree, a mark or a leaf; `key` tells leaves
     apart.
     """
@@ -306,7 +306,7 @@ def filled(
     Parameters
     ----------
     tree : Tree
-        The one that was exported.
+        The exported tree.
     path : Path
         Its ``tree.py``.
     problem : Problem

@@ -247,7 +247,7 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
     Raises
     ------
     KnowledgeError
-        No step, or more than one, is so called.
+        No step, or more than one, matches.
     """
     steps = list(plan.walk())
     if isinstance(asked, Step):
@@ -385,8 +385,8 @@ def why_not(
     Parameters
     ----------
     asked : str
-        A fact, ``cup2 LOCATION location8``, that could have been wanted; with ``by hand2`` behind it, who shall take part in what
-        changes it. Or a behaviour, ``B2_PICK right_hand cup1``, with individuals for its parameters in their order, or some of
+        A fact, ``cup2 LOCATION location8``, as an alternative goal; followed by ``by hand2``, the individual that must take part in
+        its changes. Or a behaviour, ``B2_PICK right_hand cup1``, with individuals for its parameters in their order, or some of
         them by name: ``B2_PICK hand=right_hand``.
     problem, plan
         The problem and its plan.

@@ -42,7 +42,7 @@ class Output(click.Path):
     Parameters
     ----------
     kind : str
-        What will be written, as `confab.reasoner.kinds` calls it; empty if only the command knows.
+        The kind of the output file, as in `confab.reasoner.kinds`; empty if only the command knows.
     may_be : str
         The parameter whose files it may replace.
     """
