@@ -28,7 +28,7 @@ def main() -> None:
     folder = Path(os.environ.get("CONFAB_PDDL", ROOT.parent / "shared" / "pddl"))
     lama = planners(peers())["lama-first"]
     print(
-        "Solved of so many, CPU seconds over what was solved, steps over those of lama-first where both solve; rules, and the"
+        "Solved problems (CPU seconds for these, ratio of steps to lama-first where both solve a problem); rules, and the"
     )
     print("CPU seconds of learning them.\n")
     print(f"| problems | {' | '.join(SERIES)} | rules |\n|---|---|---|---|---|", flush=True)

@@ -24,7 +24,7 @@ REWRITTEN: tuple[str, ...] = (
     "reasoner/pddl",
 )
 REWRITTEN += ("reasoner/validation", "planner/acting", "planner/paper")
-OTHER_PAGES = ("memory",)
+OTHER_PAGES: tuple[str, ...] = ()
 """Pages that may have some; all others have none, nor have the rewritten rooms."""
 LEFT, RIDDLES_LEFT = 118, 36
 """Occurrences in all other rooms and pages, and riddles everywhere, at most; lower them when there are fewer."""
