@@ -63,7 +63,7 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
     Raises
     ------
     DocumentError
-        Another kind of file, and what to save it as; no XML; entities that read other files, or grow.
+        Another kind of file, and the suffix to save it with; invalid XML; entities that read other files, or grow.
     OSError
         The file can't be read.
     """

@@ -85,11 +85,11 @@ class KnowledgeGraph:
     store : pyoxigraph.Store
         Named graphs as in `GRAPHS`.
     files : mapping of ontology IRI to file
-        What was read into the graph `asserted`, the scene first.
+        The files read into the graph `asserted`, the scene first.
     prefixes : mapping of prefix to namespace
-        Those of our own queries: `PREFIXES`, and what the files declare besides.
+        The prefixes of our own queries: `PREFIXES`, and others that the files declare.
     declared : mapping of prefix to namespace
-        What the files declare, the scene's own first; the empty prefix is that of the scene's own file.
+        The prefixes that the files declare, the scene's own first; the empty prefix is that of the scene's own file.
     faults : list of str
         The reason why the scene can be queried but not planned in, if it was loaded in spite of faults.
     written : mapping of individual to place

@@ -336,7 +336,7 @@ class _Import:
         if not single:
             return goal, None
         conditions = self.simplified(c for part in parts for c in variables.condition(part))
-        if conditions is None:  # reached only where it is reached already
+        if conditions is None:  # it can be reached only if it holds already
             conditions = (ValueCondition(name, (THE_WORLD,), TRUE),)
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
         reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)

@@ -1,4 +1,4 @@
-"""What durative actions and timed facts of PDDL become: timings of behaviours, and behaviours that happen at a time."""
+"""Timings from durative actions and timed facts of PDDL: timings of behaviours, and behaviours at fixed times."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Variables(Protocol):
 
 
 class Table(Protocol):
-    """What reads actions: see `confab.reasoner.pddl.importing`."""
+    """The reader of actions: see `confab.reasoner.pddl.importing`."""
 
     pddl: Pddl
     level: int
@@ -51,7 +51,7 @@ class Table(Protocol):
         """Return our name for a PDDL name of a kind."""
 
     def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
-        """Return a conjunction without what always holds, or None if it never holds."""
+        """Return a conjunction without conditions that always hold, or None if it never holds."""
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
         """Return the value of a number, a function or a calculation."""
@@ -73,7 +73,7 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
     Parameters
     ----------
     table : Table
-        What reads the action.
+        The reader of actions.
     parts : Durative
     variables : Variables
         Those of the behaviour that aren't its parameters.
@@ -136,7 +136,7 @@ def _all(forms: Sequence[Form], place: Word) -> Form | None:
 def happenings(
     table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
-    """Return the behaviours that happen at their times one after the other, the goal that all do, and their times."""
+    """Return the behaviours at fixed times in their order, the goal that all of them have happened, and their times."""
     pddl = table.pddl
     moments = sorted({time for time, _, _ in pddl.timed})
     if not moments:

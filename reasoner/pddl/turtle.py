@@ -247,7 +247,7 @@ class _SceneWriter:
         yield from (f"{statement} ." for statement in nodes.nodes)
 
     def lasting(self, name: str, timing: Timing, nodes: NodeWriter) -> Iterator[tuple[str, str | Sequence[str]]]:
-        """Yield what is said of the duration and the actors of a behaviour."""
+        """Yield the properties of the duration and the actors of a behaviour."""
         if isinstance(timing.duration, Fraction):
             yield "c:duration", seconds_text(timing.duration)
         elif timing.duration is not None:

@@ -118,7 +118,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
 
 
 def defined(case: Case) -> Iterator[Fault]:
-    """Report for each defined situation type whether it is evaluated in every state, and from what, or is static."""
+    """Report for each defined situation type whether it is static, or evaluated in every state and its dependencies."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
