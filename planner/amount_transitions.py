@@ -63,7 +63,7 @@ def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Consta
     return f"{function}(amounts, {effect.situation!r}, {key}, {old}, {effect.operation!r}, {by})"
 
 
-def comes_nearer(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
+def approaches_goal(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
     """Return the test that an effect brings its amount nearer to a goal, which is in a variable."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     after = (

@@ -120,7 +120,7 @@ class _Tree:
         self.problem = problem
         primitives = plan.primitives
         self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
-        asked_above = _asked_above(self.purposes, purposes(problem, plan), plan)
+        asked_above = _abstract_links(self.purposes, purposes(problem, plan), plan)
         self.needs: dict[Path, list[Need]] = {}
         for step in reversed(primitives):  # a primitive required only by needless steps is needless
             needs = dict.fromkeys(self.purposes[step.path].needs)
@@ -210,7 +210,7 @@ class _Tree:
         return Fact(symbol, f">={value}" if Fraction(value) > Fraction(change.before) else f"<={value}")
 
 
-def _asked_above(
+def _abstract_links(
     below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
 ) -> dict[Path, list[tuple[FactChange, list[Path]]]]:
     """Return the links between abstract steps by primitives: the fact, and the primitives with which the link may end.

@@ -158,7 +158,7 @@ class _Course:
             for path, group in self.groups.items():
                 if group.steps[0].path == step.path:
                     open_[path] = number, len(self.facts.log), self.changes(group) or {}
-            for writer, changes, conditions, differs in self.asked(step):
+            for writer, changes, conditions, differs in self.needs_of(step):
                 if conditions or not differs:
                     found.append((self.steps[writer].path, Need(Kind.LATER, changes, step.path, conditions)))
                 else:
@@ -170,7 +170,7 @@ class _Course:
         if self.whole:
             goal = {(symbol.situation, symbol.arguments): value for symbol, value in self.problem.goal.items()}
             found += self.left((), 0, 0, 0, goal)
-            found += [need for cell, value in goal.items() for need in self.followed(cell, value)]
+            found += [need for cell, value in goal.items() for need in self.derivation_givers(cell, value)]
         needed = {(path, change.fact) for path, need in found for change in need.gives}
         for writer, number, changes, differs in reversed(deeds):
             step = self.steps[number]
@@ -185,7 +185,9 @@ class _Course:
         found = self.rules.changes(behavior, step.arguments, self.facts)
         return None if found is None else {(situation, key): value for situation, key, value in found}
 
-    def asked(self, step: Step) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
+    def needs_of(
+        self, step: Step
+    ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
         """Yield the givers of a step's needs, with the conditions that fail without them or the cells that would differ."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
@@ -204,13 +206,15 @@ class _Course:
         for cell in read:
             by.setdefault(self.written[cell].by, []).append(cell)
         for writer, cells in sorted(by.items()):
-            alone = [found for cell in cells if (found := self.without(step, [cell], before, bound)) is not None]
+            alone = [
+                found for cell in cells if (found := self.failures_without(step, [cell], before, bound)) is not None
+            ]
             if not alone and len(cells) > 1:
-                alone = [found for found in (self.without(step, cells, before, bound),) if found is not None]
+                alone = [found for found in (self.failures_without(step, cells, before, bound),) if found is not None]
             for changes, conditions, differs in alone:
                 yield writer, changes, conditions, differs
 
-    def without(
+    def failures_without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
         """Return what fails for a step if cells have their previous values; None if nothing does."""
@@ -240,7 +244,7 @@ class _Course:
         )
         return (changes, (), differs) if differs else None
 
-    def goes_on(self, cell: Cell, before: str) -> _Written | None:
+    def givers_of_amount(self, cell: Cell, before: str) -> _Written | None:
         """Return the givers of an amount that was consumed: without any of them it would have been less."""
         if cell not in self.written or not self.counted(cell):
             return None
@@ -262,7 +266,7 @@ class _Course:
             if cell in self.written:
                 for value in (self.written[cell].before, before):
                     self.having.get((cell[0], value), {}).pop(cell, None)
-            self.written[cell] = self.goes_on(cell, before) or _Written(number, before)
+            self.written[cell] = self.givers_of_amount(cell, before) or _Written(number, before)
             for value in (before, str(self.facts.value(*cell))):
                 self.having.setdefault((cell[0], value), {})[cell] = None
 
@@ -289,7 +293,7 @@ class _Course:
                 continue
             yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
 
-    def followed(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
+    def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the givers of the facts from which a defined goal follows.
 
         These are facts that the goal's derivation read and without which it wouldn't hold.
@@ -307,13 +311,13 @@ class _Course:
         for other in read:
             by.setdefault(self.written[other].by, []).append(other)
         for writer, cells in sorted(by.items()):
-            alone = [changes for one in cells if (changes := self.otherwise(cell, wanted, [one]))]
+            alone = [changes for one in cells if (changes := self.changes_that_matter(cell, wanted, [one]))]
             if not alone and len(cells) > 1:
-                alone = [changes for changes in (self.otherwise(cell, wanted, cells),) if changes]
+                alone = [changes for changes in (self.changes_that_matter(cell, wanted, cells),) if changes]
             for changes in alone:
                 yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
 
-    def otherwise(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
+    def changes_that_matter(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
         """Return the changes of some cells if a defined situation would differ without them; otherwise nothing."""
         facts, mark = self.facts, len(self.facts.log)
         now = {other: str(facts.value(*other)) for other in cells}

@@ -39,7 +39,7 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
         case Calculation(sign, one, other):
             of_left, of_right = worth(one, key, relations), worth(other, key, relations)
 
-            def comes_to(said: Said, values: Values) -> Fraction | None:
+            def result(said: Said, values: Values) -> Fraction | None:
                 left, right = of_left(said, values), of_right(said, values)
                 if left is None or right is None or (sign == "/" and not right):
                     return None
@@ -47,7 +47,7 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
                     return left / right
                 return {"+": left + right, "-": left - right, "*": left * right}[sign]
 
-            return comes_to
+            return result
         case number:
             return lambda said, values: number
 

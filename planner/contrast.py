@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from confab.planner.causal_links import on_level
 from confab.planner.checked_conditions import Bindings
-from confab.planner.levels import lacking
+from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import Facts, Rules, successor, validate
@@ -76,8 +76,10 @@ def instead_of(
         if found is not None:
             possible.append((i, tuple(found[p.name] for p in behavior.parameters)))
     if not possible:
-        return _lacking(rules, behavior, given, [(course[i], Facts(problem, states[i])) for i in places], before)
-    at, arguments = max(possible, key=lambda one: (_alike(course[one[0]], behavior, one[1]), -one[0]))
+        return _fewest_failures(
+            rules, behavior, given, [(course[i], Facts(problem, states[i])) for i in places], before
+        )
+    at, arguments = max(possible, key=lambda one: (_similarity(course[one[0]], behavior, one[1]), -one[0]))
     asked = Contrast(before, behavior.name, arguments, course[at])
     step, why = _refined(problem, states[at], behavior, arguments, ask)
     if step is None:
@@ -152,18 +154,18 @@ def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
     return {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
 
 
-def _alike(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
+def _similarity(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
     """Return the similarity of two steps: first by common individuals, then by the behaviour."""
     return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
 
 
-def _lacking(
+def _fewest_failures(
     rules: Rules, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
 ) -> Contrast:
     """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
     best: Contrast | None = None
     for step, facts in places:
-        found, lacks = lacking(rules, behavior.preconditions, given, behavior.kinds, (facts,))
+        found, lacks = failing_conditions(rules, behavior.preconditions, given, behavior.kinds, (facts,))
         if best is None or len(lacks) < len(best.lacks):
             arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
             best = Contrast(before, behavior.name, arguments, step, lacks)

@@ -169,10 +169,12 @@ class _Watch:
     ) -> tuple[Bindings, tuple[Condition, ...]]:
         """Return the fewest conditions without which a behaviour would be applicable, with individuals."""
         conditions = (*behavior.preconditions, *effect.when)
-        return lacking(self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level]))
+        return failing_conditions(
+            self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level])
+        )
 
 
-def lacking(
+def failing_conditions(
     rules: Rules, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
 ) -> tuple[Bindings, tuple[Condition, ...]]:
     """Return the fewest conditions without which the others hold in one of some states, with individuals.

@@ -114,7 +114,7 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:
-        same = [(other, e) for other in every.values() for e in other.effects if _alike(e, effect)]
+        same = [(other, e) for other in every.values() for e in other.effects if _same_effect(e, effect)]
         if {*effect.arguments} != {*bound} or not {o.name for o, _ in same if o.level == own.level} <= {*likewise}:
             continue
         for other, e in same:
@@ -124,7 +124,7 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
                 yield replace(one, behavior=other.name, arguments=arguments)
 
 
-def _alike(one: ValueEffect, other: ValueEffect) -> bool:
+def _same_effect(one: ValueEffect, other: ValueEffect) -> bool:
     """Return whether two effects make the same fact true."""
     return (one.situation, one.value) == (other.situation, other.value)
 

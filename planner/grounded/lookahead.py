@@ -40,7 +40,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
 
     @cache
     def set_by(operator: int) -> int:
-        found = reduce(or_, (set_ for _, _, set_ in task.known(operator)[1]), 0)
+        found = reduce(or_, (set_ for _, _, set_ in task.changes_of(operator)[1]), 0)
         return found if task.amounts is None else found | task.amounts.compared & moved()[operator]
 
     @cache
@@ -54,7 +54,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
     def replaced(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
         needed = [task.goal]  # required by the goal and by the later operators, from the last one
         for operator in reversed(stuck):
-            needed.append(needed[-1] | task.known(operator)[0])
+            needed.append(needed[-1] | task.changes_of(operator)[0])
         for i, operator in enumerate(stuck):
             for bit in bits_of(set_by(operator) & needed[-2 - i] & ~state):
                 for other in setters()[bit]:
@@ -76,7 +76,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
         return state, done, stuck
 
     def enabling(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
-        lacking = Counter(task.known(operator)[0] & ~state for operator in stuck)
+        lacking = Counter(task.changes_of(operator)[0] & ~state for operator in stuck)
         best: tuple[tuple[int, int], int, int] | None = None
         applicable = task.applicable(state)[0]
         single = [bits for bits, _ in lacking.most_common() if bits.bit_count() == 1]

@@ -100,14 +100,14 @@ class Novelty:
             return None
         wanted = 0
         for operator in evaluation.plan:
-            for _, _, set_ in self.task.known(operator)[1]:
+            for _, _, set_ in self.task.changes_of(operator)[1]:
                 wanted |= set_
         return place._replace(wanted=wanted & ~place.state)
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
     """Return the bits of a state that an operator keeps, and the bits that it sets; None if that depends on the state."""
-    changes = task.known(operator)[1]
+    changes = task.changes_of(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None
     if task.derived.parts or len(changes) != 1 or changes[0][0]:

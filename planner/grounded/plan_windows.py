@@ -124,7 +124,7 @@ def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
     clearer: dict[int, int] = {}
     causes: list[set[int]] = [set() for _ in range(n)]
     for i, operator in enumerate(plan):
-        precondition, changes = task.known(operator)
+        precondition, changes = task.changes_of(operator)
         need, clear, set_ = precondition, 0, 0
         for when, c, s in changes:
             if states[i] & when == when:
@@ -226,7 +226,7 @@ class _Windows:
         wanted = self.task.goal
         found = [wanted]
         for state, operator in zip(reversed(states[:-1]), reversed(plan), strict=True):
-            precondition, changes = self.task.known(operator)
+            precondition, changes = self.task.changes_of(operator)
             more = precondition
             for when, _, set_ in changes:
                 if state & when == when and set_ & wanted:
@@ -303,7 +303,7 @@ class _Windows:
             known[task.adds.items[ready[self.arrays[2]]]] = True
         lost = 0
         for operator in steps:
-            for _, cleared, _ in task.known(operator)[1]:
+            for _, cleared, _ in task.changes_of(operator)[1]:
                 lost |= cleared
         target = self.flags(wanted & (~state | lost))
         backward = np.full(len(owners), far)
@@ -327,7 +327,9 @@ class _Windows:
         for operator in owners[order].tolist():
             if len(chosen) >= OPERATORS:
                 break
-            if operator >= 0 and not any(cleared & kept and not when for when, cleared, _ in task.known(operator)[1]):
+            if operator >= 0 and not any(
+                cleared & kept and not when for when, cleared, _ in task.changes_of(operator)[1]
+            ):
                 chosen[operator] = None
         return sorted(chosen)
 
@@ -341,7 +343,7 @@ class _Windows:
             return self._part_with_amounts(task.amounts, operators, state, wanted), operators
         changing, asked = 0, wanted
         for operator in operators:
-            precondition, changes = task.known(operator)
+            precondition, changes = task.changes_of(operator)
             asked |= precondition
             for when, cleared, set_ in changes:
                 asked |= when
@@ -349,7 +351,7 @@ class _Windows:
         derived = task.derived.within(state, changing, asked)
         bits = derived.mask | changing & (asked | derived.needed)
         missing = asked & ~(changing | derived.mask | state)
-        operators = [operator for operator in operators if not task.known(operator)[0] & missing]
+        operators = [operator for operator in operators if not task.changes_of(operator)[0] & missing]
         rows = self._rows(operators)
         lost = set(bits_of(missing))
         rows = [r for r in rows if lost.isdisjoint(task.needs[r])]
@@ -359,7 +361,7 @@ class _Windows:
             return sum(1 << new[bit] for bit in bits_of(state & bits))
 
         def change(operator: int) -> tuple[int, tuple[BitChange, ...]]:
-            precondition, changes = task.known(operators[operator])
+            precondition, changes = task.changes_of(operators[operator])
             kept = (one for one in changes if not one[0] & missing)
             return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in kept)
 
@@ -399,7 +401,7 @@ class _Windows:
             owners=[place.get(task.owners[r], -1) for r in rows],
             needs=_grouped([task.needs[r] for r in rows]),
             adds=_grouped([task.adds[r] for r in rows]),
-            change=lambda operator: task.known(operators[operator]),
+            change=lambda operator: task.changes_of(operators[operator]),
             describe=lambda operator: task.describe(operators[operator]),
             amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}),
             _changes={},

@@ -128,7 +128,7 @@ class _Sums:
 
     def undone(self, operator: int, worth: Mapping[int, Fraction]) -> Fraction:
         """Return the worth of the bits that an operator certainly clears."""
-        asked, changes = self.task.known(operator)
+        asked, changes = self.task.changes_of(operator)
         cleared = reduce(or_, (bits for when, bits, _ in changes if not when & ~asked), 0)
         kept = reduce(or_, (bits for _, _, bits in changes), 0)
         return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))

@@ -131,7 +131,7 @@ class Task:
 
         Derived bits are updated only if `follow`.
         """
-        precondition, changes = self._changes.get(operator) or self.known(operator)
+        precondition, changes = self._changes.get(operator) or self.changes_of(operator)
         if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
             return None
         after = state
@@ -154,7 +154,7 @@ class Task:
         kept = []
         for operator in plan:
             if not follow:
-                asked, changes = self.known(operator)
+                asked, changes = self.changes_of(operator)
                 for when, _, _ in changes:
                     asked |= when
                 for move in () if self.amounts is None else self.amounts.made(operator):
@@ -176,7 +176,7 @@ class Task:
         masks += [1 << bit for bit in range(len(self.facts), self.size)]
         return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
 
-    def known(self, operator: int) -> tuple[int, tuple[BitChange, ...]]:
+    def changes_of(self, operator: int) -> tuple[int, tuple[BitChange, ...]]:
         """Return an operator's precondition and changes, computed once."""
         known = self._changes.get(operator)
         if known is None:

@@ -45,7 +45,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
     while before != len(fewer):  # others may only have been needed by the removed steps
         before = len(fewer)
         table.undo(0)
-        done, left = _lasting(refiner, fewer, owners, left)
+        done, left = _without_cycles(refiner, fewer, owners, left)
         fewer = {one.number: one.step for one in done}
     table.undo(0)
     if len(fewer) == len(kept):
@@ -64,7 +64,7 @@ def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
         yield from parts(child, level)
 
 
-def _lasting(
+def _without_cycles(
     refiner: Refiner, steps: Mapping[int, RefinedStep], owners: Sequence[int], left: int
 ) -> tuple[list[_Done], int]:
     """Apply the steps that can't be removed; return them.
@@ -86,7 +86,7 @@ def _lasting(
         circle = _circle(one, latest)
         if circle and owners[circle[0].number] != owners[number]:
             left -= one.number - circle[0].number
-            if left > 0 and _left_out(refiner, done, circle):
+            if left > 0 and _removed(refiner, done, circle):
                 for cell in one.changes[0]:
                     del latest[cell][-len(circle) :]
     return done, left
@@ -105,7 +105,7 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
     return []
 
 
-def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
+def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
     """Undo steps whose changes cancel out, if the steps between them work without them; return whether they do."""
     table, mark = refiner.table, circle[0].mark
     first = next(i for i in reversed(range(len(done))) if done[i] is circle[0])

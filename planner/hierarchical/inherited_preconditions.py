@@ -49,13 +49,13 @@ def binding(problem: Problem, level: int) -> Domain:
     bound = {}
     for name, behavior in domain.behaviors.items():
         if behavior.level == level:
-            asked = [guard for effect in behavior.effects for guard in _guards(problem, behavior, effect, above)]
+            asked = [guard for effect in behavior.effects for guard in _inherited(problem, behavior, effect, above)]
             behavior = replace(behavior, preconditions=(*behavior.preconditions, *asked))
         bound[name] = behavior
     return replace(domain, behaviors=bound)
 
 
-def _guards(
+def _inherited(
     problem: Problem, behavior: Behavior, effect: ValueEffect, above: Sequence[Behavior]
 ) -> Iterator[Condition]:
     """Yield the conditions that the levels above impose on an effect: at most one for each level."""
@@ -66,14 +66,18 @@ def _guards(
         makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]
         if not makers:
             continue  # the level has the symbol, but changes it nowhere: it imposes nothing
-        alternatives = [*_between(problem, behavior, effect, level)]
-        alternatives += [group for maker in makers for group in _asked(problem, behavior, effect, *maker, level)]
+        alternatives = [*_unseen_values(problem, behavior, effect, level)]
+        alternatives += [
+            group for maker in makers for group in _conditions_for(problem, behavior, effect, *maker, level)
+        ]
         alternatives += [(AnyOf((effect.when,), negated=True),)] if effect.when else []
         if () not in alternatives:
             yield AnyOf(tuple(alternatives))
 
 
-def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: int) -> Iterator[tuple[Condition, ...]]:
+def _unseen_values(
+    problem: Problem, behavior: Behavior, effect: ValueEffect, level: int
+) -> Iterator[tuple[Condition, ...]]:
     """Yield one alternative for each value of the effect that the level doesn't see: the level imposes nothing on these."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
@@ -84,7 +88,7 @@ def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: i
         yield (EqualityCondition(effect.value, value),)
 
 
-def _asked(
+def _conditions_for(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
     """Yield the conditions under which an upper behaviour could have this effect; nothing if it never could."""

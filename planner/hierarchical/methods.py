@@ -24,7 +24,7 @@ Roles: TypeAlias = "tuple[str | None, ...]"
 Ranked: TypeAlias = "Callable[[Method, list[Roles]], list[Roles]]"
 
 
-def as_they_come(method: Method, ways: list[Roles]) -> list[Roles]:
+def unranked(method: Method, ways: list[Roles]) -> list[Roles]:
     """Return the ways to fill the roles of a method in the given order."""
     return ways
 
@@ -41,7 +41,7 @@ class Methods:
 
     def __init__(self, space: Workspace, known: dict[str, list[Method]]) -> None:
         self.space, self.known = space, known
-        self.ranked: Ranked = as_they_come
+        self.ranked: Ranked = unranked
         """Returns the ways to fill the roles of a method, best first."""
 
     def of(self, behavior: str, individuals: tuple[str, ...]) -> Iterator[tuple[Method, Roles]]:

@@ -16,7 +16,7 @@ from functools import cached_property
 from math import prod
 from typing import TypeAlias
 
-from confab.planner.amount_transitions import comes_nearer
+from confab.planner.amount_transitions import approaches_goal
 from confab.planner.derived_facts import CompiledRules
 from confab.planner.generated import identifier, tuple_written, written
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
@@ -219,7 +219,7 @@ class Program:
             emit(f"if not ({test}): unmet += ({len(soft)},)")
             soft.append(condition)
         if isinstance(effect, AmountEffect):
-            emit(f"if {comes_nearer(effect, inputs[-1], self.problem.relations, self.writer.constant)}:")
+            emit(f"if {approaches_goal(effect, inputs[-1], self.problem.relations, self.writer.constant)}:")
             depth += 1
         names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
         arguments = tuple_written(written(p.name) for p in behavior.parameters)

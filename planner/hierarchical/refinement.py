@@ -183,7 +183,7 @@ class Refiner:
                     break
                 steps.append(step)
             if len(steps) == len(found):
-                wrong = self.left_wrong(mark, wanted, keep)
+                wrong = self.wrong_value(mark, wanted, keep)
                 if wrong is None:
                     return steps
                 first = next((old for s, key, old in table.trail[mark:] if (s, key) == wrong), None)
@@ -210,7 +210,7 @@ class Refiner:
                 found[situation, key] = value
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
-    def left_wrong(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
+    def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
         """Return a target, or a symbol touched since a mark, that doesn't have its required value; None if all have it."""
         now = self.table.now
         for cell, first in self.table.before(mark).items():
@@ -233,7 +233,7 @@ class Refiner:
             if step is None:
                 break
             steps.append(step)
-        if len(steps) < len(method.steps) or self.left_wrong(mark, targets, keep) is not None:
+        if len(steps) < len(method.steps) or self.wrong_value(mark, targets, keep) is not None:
             self.table.undo(mark)
             return None
         if method.open and (self.drifting or len(steps) >= LONG):
@@ -244,7 +244,7 @@ class Refiner:
         """Return the steps done since a mark without needless ones: single steps, or pairs that undo each other."""
         for dropped in self._idle(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
-            if self._replayed(rest, mark) and self.left_wrong(mark, targets, keep) is None:
+            if self._replayed(rest, mark) and self.wrong_value(mark, targets, keep) is None:
                 return self.pruned(rest, mark, targets, keep)
         self._replayed(steps, mark)
         return steps
@@ -285,7 +285,7 @@ class Refiner:
                 self.table.undo(mark)
                 return None
             inner.append(again)
-        if self.left_wrong(mark, targets, self.space.refining(level)) is not None:
+        if self.wrong_value(mark, targets, self.space.refining(level)) is not None:
             self.table.undo(mark)
             return None
         return RefinedStep(level, name, arguments, done[0], tuple(inner))

@@ -59,7 +59,7 @@ def chains(
         length += 1
         yield length, None
         if blocked:  # calculated late: a caller that needs no longer chains has stopped
-            subgoals = _lacking(space, level, blocked)
+            subgoals = _unmet_subgoals(space, level, blocked)
         blocked = []
         for situation, key, values in subgoals:
             for wanted in values:
@@ -79,7 +79,9 @@ def chains(
                             yield length, (achiever.behavior, arguments)
 
 
-def _lacking(space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]) -> list[Subgoal]:
+def _unmet_subgoals(
+    space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]
+) -> list[Subgoal]:
     """Return the subgoals of achievers that aren't applicable."""
     found: list[Subgoal] = []
     for achiever, unmet, env in blocked:

@@ -31,11 +31,11 @@ def gave_up(call: Call, why: str) -> Reason:
         name, arguments = call.refiner.at
         parts.append(f"{' '.join((name, *arguments))} wasn't refined there")
         terms.update(dict.fromkeys((name, *arguments)))
-    parts += lacking(call)
+    parts += missing_amounts(call)
     return Reason("; ".join(parts), tuple(terms))
 
 
-def lacking(call: Call) -> Iterator[str]:
+def missing_amounts(call: Call) -> Iterator[str]:
     """Yield the unmet requirements on amounts of behaviours towards the goal that was aimed at first, in the final state."""
     space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):

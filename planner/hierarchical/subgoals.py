@@ -387,16 +387,16 @@ class Subgoals:
 
     def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
         """Return whether a condition of an achiever holds now; undetermined terms have no value."""
-        test, names = self._asked(achiever, condition, env, False)
+        test, names = self._evaluator(achiever, condition, env, False)
         return bool(test(*[env.get(name) for name in names]))
 
     def _satisfying(self, achiever: Achiever, witness: Witness, env: Env) -> list[str]:
         """Return the individuals that satisfy all conditions of a witness now."""
-        test, names = self._asked(achiever, witness, env, True)
+        test, names = self._evaluator(achiever, witness, env, True)
         found: list[str] = test(*[env.get(name) for name in names])
         return found
 
-    def _asked(
+    def _evaluator(
         self, achiever: Achiever, condition: Condition, env: Env, individuals: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
         """Return the function that tests a condition, or yields the individuals of a witness, and its arguments."""

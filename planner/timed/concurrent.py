@@ -434,7 +434,7 @@ class _Finder:
         """Return the bits that a running step requires throughout: those that its end requires and its begin doesn't change."""
         if end not in self._held:
             whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
-            asked = self.task.known(end)[0]
+            asked = self.task.changes_of(end)[0]
             its = timing_of(whole).asked(Span.END)
             self._held[end] = 0 if its else asked
         return self._held[end]
