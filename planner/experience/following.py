@@ -21,7 +21,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 
 from confab.planner.experience.matching import Bind, Find, finder, known, soft
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.methods import Ranked, as_they_come
+from confab.planner.hierarchical.methods import Ranked, unranked
 from confab.planner.hierarchical.operators import FEW, Achiever, Program
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.symmetry import representatives
@@ -104,7 +104,7 @@ class Guide:
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
-        ranked: Ranked = as_they_come,
+        ranked: Ranked = unranked,
     ) -> None:
         self.call, self.ranked, self.score = call, ranked, score
         self.joins: dict[str, Bind | None] = {} if joins is None else joins
@@ -221,7 +221,7 @@ class Guide:
                     steps = self.together(level, list(self.open().items()))
         except TooMuchError:
             steps = None
-        if steps is not None and call.refiner.left_wrong(start, targets, keep) is None:
+        if steps is not None and call.refiner.wrong_value(start, targets, keep) is None:
             return steps if level == self.first else call.refiner.pruned(steps, start, targets, keep)
         self.wasted += space.expanded - expanded if level == self.first else 0
         self.vain = max(self.vain, vain + space.effort + self.spent - began)
