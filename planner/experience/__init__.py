@@ -1,1 +1,1 @@
-"""Experience at the planner's side: what is counted, how it judges, and the search that it leads."""
+"""Experience in planning: learned rules with counts, their evaluation, and their use before search."""

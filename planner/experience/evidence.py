@@ -1,12 +1,12 @@
 """Choice among rule instances: cogency, from the facts of earlier choices and rejections.
 
-Of each individual in a role of a rule these facts are looked at, none of them written by hand: to which of the classes that
-behaviours tell apart it belongs, its values and what the task wants of it, whether somebody has it or wants it as a value, and the
-static relations that tie it to the other roles.
+The facts about an individual in a role of a rule are generated from the domain: the classes that behaviours distinguish, its values
+and the task's goals for them, whether some object has it, or should have it, as a value, and its static relations to the other
+roles.
 
-Cogency is eq. (1) of the paper as ln odds: ln((c + ½)/(p + ½)) for how often the rule was chosen and passed over or failed, and for
-each fact ln(p(fact | chosen)/p(fact | not)), since the facts of two candidates differ. What was never seen says nothing: a class
-that is new is judged by the classes above it. Who was preferred weighs a tenth less with each episode.
+Cogency is eq. (1) of the paper as log odds: ln((c + ½)/(p + ½)) for c choices and p rejections or failures of the rule, and for
+each fact ln(p(fact | chosen)/p(fact | not)), since the facts of two candidates differ. An unseen fact counts nothing; an unseen
+class is judged by its superclasses. Preferences for single individuals decay by a tenth with each episode.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class View:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
-    """Return the individuals in the open roles of a method that few can fill: alone, and with each individual of its behaviour."""
+    """Return the individuals in the open roles of a method that few can fill: alone, and with each of its behaviour's."""
     found = list[Fact]()
     for role, who in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and who is not None and 1 < len(problem.members(role.kind)) <= CROWD:
@@ -151,7 +151,7 @@ class Judge:
                 spread[asks] = spread.get(asks, 0) + 1
             found = self._weights[rule.name] = {ITSELF: log((whole.chosen + 0.5) / (not_ + 0.5))} if counted else {}
             for fact, tally in counted.items():
-                if fact != ITSELF and spread[fact[0]] > 1:  # else there is nothing to tell apart
+                if fact != ITSELF and spread[fact[0]] > 1:  # otherwise the fact doesn't distinguish candidates
                     chosen = (tally.chosen + 1) / (whole.chosen + spread[fact[0]])
                     passed = (tally.passed_over + tally.failed + 1) / (not_ + spread[fact[0]])
                     found[fact] = log(chosen / passed)
@@ -169,7 +169,7 @@ class Judge:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
     def cogency(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
-        """Return the sum."""
+        """Return the sum of the factors."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
     def told(self, view: View, rule: Rule, roles: tuple[str, ...]) -> float:

@@ -21,7 +21,7 @@ Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]
 conditions."""
 
 Pick: TypeAlias = "Callable[[tuple[str, ...], str], Sequence[str]]"
-"""Returns one individual of each symmetry class, free ones first where they are to be values of a situation type."""
+"""Returns one individual of each symmetry class, free ones first if they become values of a situation type."""
 Bind: TypeAlias = "Callable[[Table, Pick], Find]"
 
 DEEPEST = 18
@@ -29,7 +29,7 @@ DEEPEST = 18
 
 
 def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
-    """Return what may be achieved before a rule's step: its conditions on the state, and its comparisons."""
+    """Return the conditions of a rule that can be achieved before its step: those on the state, and its comparisons."""
     behavior = problem.domain.behaviors[rule.does[0]]
     put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
     compared = (c for c in behavior.preconditions if isinstance(c, Comparison) and mentions(c) <= put.keys())

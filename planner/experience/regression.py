@@ -1,14 +1,14 @@
-"""From a plan to rules: which step brought about what was needed, and what it asked, over roles instead of individuals.
+"""From a plan to rules: the facts that each step achieved for later steps, and its conditions, with roles for individuals.
 
-need     the conditions under which the rest of the steps leads to the goals; in the end the goals alone
-back     a step serves the need if some of it doesn't hold before the step: that is replaced by what the step asks
-link     each change of a step that served something is a goal for rules, and the step what to do for it
-lift     each individual that no behaviour names becomes a role of the narrowest class that is asked of it
+need     the conditions under which the remaining steps lead to the goals; at the end, the goals
+back     a step is relevant if a needed condition doesn't hold before it: its preconditions then replace that condition
+link     each change of a relevant step is a goal for a rule, and the step is the rule's step
+lift     each individual that no behaviour names becomes a role with the narrowest class that a condition requires
 
-Goal regression as R. Waldinger had it, "Achieving several goals simultaneously", Machine Intelligence 8 (1977), to lifted rules as
-Moose learns them: D. Z. Chen et al., AAAI 2026; but a rule is for one causal link, since rules for links make up all chains. What
-a condition is isn't looked at but for those that look for an individual or offer alternatives: of these the individual, or the
-alternative, that there was is asked for. The checker's reading of conditions is used, so that a new kind needs nothing here.
+Goal regression by R. Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977), and lifted rules as in
+Moose: D. Z. Chen et al., AAAI 2026. Here a rule is for one causal link, since chains of such rules cover all plans. Only conditions
+with a quantifier or alternatives need special treatment: they are replaced by the condition of the individual, or the alternative,
+that held. Conditions are evaluated by the checker, so that a new kind of condition needs no code here.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Done:
 
 
 class Course:
-    """The steps of a plan, executed one after the other on the checker's facts.
+    """The steps of a plan, executed one after another on the checker's facts.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Course:
         self.problem, self.rules, self.facts = problem, Rules(problem), Facts(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
-        """The individuals that behaviours name; all others, those in rest values included, become roles."""
+        """The individuals that behaviours name; all others, including rest values, become roles."""
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
         for number, (name, arguments) in enumerate(steps):
@@ -146,7 +146,7 @@ class Course:
     def rules_of(self) -> Iterator[Rule]:
         """Yield for each change of a step that a goal or a later step needed the rule that this step achieves it.
 
-        The facts are as in the beginning then.
+        The facts are those of the initial state afterwards.
         """
         later, facts = self.facts, Facts(self.problem, self.problem.initial)
         for done in self.done:
@@ -172,8 +172,9 @@ class Course:
     ) -> tuple[dict[Condition, None], dict[Condition, None]]:
         """Return the conditions before a step under which a condition holds after it, and whether the step contributes to it.
 
-        What is defined is replaced by what it rests on, as far as the step brought it about; what follows no more, by what it
-        followed from.
+        A defined situation is replaced by the facts from which it follows, as far as the step achieved them; one that no longer
+        follows,
+        by the facts from which it followed before.
         """
         need, served = dict[Condition, None](), dict[Condition, None]()
         tries = BINDINGS
@@ -181,7 +182,7 @@ class Course:
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
             """Return the conditions from which a fact follows, each with whether it holds before the step.
 
-            None if only on itself.
+            Return None if it follows only from itself.
             """
             nonlocal tries
             if self.rules.satisfied([c], {}, {}, facts) is not None:
@@ -216,7 +217,7 @@ class Course:
         return need, served
 
     def links(self, done: Done, served: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
-        """Yield for each needed change of a step the rule that the step achieves it, as a goal of its own."""
+        """Yield for each needed change of a step the rule with that change as its goal."""
         goals: dict[ValueCondition, None] = {}
         for c in served:
             if isinstance(c, ValueCondition) and c.situation in self.problem.domain.rules:
@@ -238,7 +239,7 @@ class Course:
                     yield rule
 
     def aimed(self, goal: ValueCondition, facts: Facts) -> ValueCondition:
-        """Return a goal for rules; for an amount only whether it becomes more or less, since equal amounts seldom recur."""
+        """Return a goal for rules; for an amount only the direction of its change, since equal amounts seldom recur."""
         if self.problem.domain.situations[goal.situation].quantity is None:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
@@ -305,7 +306,7 @@ class Course:
         asks: dict[Condition, None] = {}
         for c in need:
             if isinstance(c, EqualityCondition | Comparison):
-                continue  # different roles are different individuals; comparisons are the behaviour's
+                continue  # different roles are different individuals; the behaviour has the comparisons
             if isinstance(c, ValueCondition) and c.negated and (c.situation, c.arguments) in known:
                 continue
             if isinstance(c, ClassCondition) and not c.negated:
@@ -339,7 +340,7 @@ class Course:
     # ------------------------------------------------------------------------------------------------------------ order
 
     def orders(self) -> Iterator[Order]:
-        """Yield for every two goals achieved one after the other which came first."""
+        """Yield for every two goals achieved one after another which came first."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
                 yield Order.of(first, then, self.constants)
@@ -351,7 +352,7 @@ def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[t
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
             who = condition.variable
-            while who in of:  # another one of the same name
+            while who in of:  # another variable of the same name
                 who += "_"
             of[who] = condition.kind
             inner, of = opened([substituted(c, {condition.variable: who}) for c in condition.conditions], of)
@@ -377,7 +378,7 @@ def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
 
 
 def undo(facts: Facts, mark: int) -> None:
-    """Undo the changes since the log had a length."""
+    """Undo the changes since the log had the given length."""
     while len(facts.log) > mark:
         situation, key, old = facts.log[-1]
         facts.put(situation, key, old)
