@@ -183,9 +183,9 @@ class Attempt:
         return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
 
     def follow(
-        self, q: Array, speed: float = 1.0, enough: Callable[[], bool] | None = None, corners: int = ROUNDED
+        self, q: Array, speed: float = 1.0, stop: Callable[[], bool] | None = None, corners: int = ROUNDED
     ) -> None:
-        """Drive the arm along sampled postures at a share `speed` of its speed, or until `enough` returns true.
+        """Drive the arm along sampled postures at a share `speed` of its speed, or until `stop` returns true.
 
         The path begins at the present posture; its corners are rounded over `corners` samples.
         """
@@ -194,7 +194,7 @@ class Attempt:
             limits = replace(limits, hand_velocity=limits.hand_velocity * speed)
             positions, velocities = timed(self.hand.arm, smooth(q, corners), limits, self.world.rate)
         try:
-            self.world.follow(self.hand, positions, velocities, enough)
+            self.world.follow(self.hand, positions, velocities, stop)
         except SkillError as failure:
             if self.held is None or self.world.held(self.hand.hand.name) == self.held:
                 raise
@@ -203,7 +203,9 @@ class Attempt:
                 "slip or drop", named(self.held, *stopped.objects), "it was lost on the way", **stopped.measured
             ) from failure
 
-    def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None) -> int:
+    def move_to_any(
+        self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None
+    ) -> int:
         """Move along a free path to one of the goal poses, the first if possible; return its number.
 
         With `opening`, the fingers are assumed to be open by that many metres.
@@ -247,17 +249,17 @@ class Attempt:
         objects: tuple[str, ...],
         *ignored: str,
         speed: float = 1.0,
-        enough: Callable[[], bool] | None = None,
+        stop: Callable[[], bool] | None = None,
     ) -> None:
-        """Move along the straight line to a pose, or until `enough` returns true; raise `SkillError` if the line isn't free.
+        """Move along the straight line to a pose, or until `stop` returns true; raise `SkillError` if the line isn't free.
 
-        With `enough`, the line only has to be free at its beginning. Without it, the elbow may turn on the way.
+        With `stop`, the line only has to be free at its beginning. Without it, the elbow may turn on the way.
         """
         start = self.hand.pose
-        if enough is not None:
+        if stop is not None:
             poses = line(start, goal)
             fine = np.linspace(poses[0], poses[-1], FINER * (len(poses) - 1) + 1)
-            self.along(fine, objects, *ignored, speed=speed, enough=enough, partly=True)
+            self.along(fine, objects, *ignored, speed=speed, stop=stop, partly=True)
             return
         bent = (np.append(goal[:5], goal[5] + turn) for turn in sorted(SWIVELS, key=abs) if turn)
         self.along(line(start, goal), objects, *ignored, speed=speed, others=(line(start, end) for end in bent))
@@ -268,11 +270,11 @@ class Attempt:
         objects: tuple[str, ...],
         *ignored: str,
         speed: float = 1.0,
-        enough: Callable[[], bool] | None = None,
+        stop: Callable[[], bool] | None = None,
         partly: bool = False,
         others: Iterable[Array] = (),
     ) -> None:
-        """Move along the first of `poses` and `others` that is free, or until `enough` returns true.
+        """Move along the first of `poses` and `others` that is free, or until `stop` returns true.
 
         With `partly`, the free beginning of a path suffices, and the margin is reduced by the noise: contact ends the motion.
         `SkillError` is raised if no path is free.
@@ -288,7 +290,7 @@ class Attempt:
             if q is None:
                 blame = reacher.blame(poses)
                 raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)
-        self.follow(q, speed, enough)
+        self.follow(q, speed, stop)
 
     def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
         """Move straight up with the elbow free to turn, or around the obstacles if the line is blocked."""
@@ -299,7 +301,7 @@ class Attempt:
         except SkillError as failure:
             if failure.verdict.code not in (*REFUTED, "unreachable"):
                 raise
-            self.go([goal], objects, *ignored)
+            self.move_to_any([goal], objects, *ignored)
 
     # ------------------------------------------------------------------------------------------------- checks
 

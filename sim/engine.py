@@ -155,13 +155,13 @@ class Engine:
         self.clock.stepping += time.process_time() - begin - (self.clock.rendering - rendering)
 
     def follow(
-        self, hand: Manipulator, positions: Array, velocities: Array, enough: Callable[[], bool] | None = None
+        self, hand: Manipulator, positions: Array, velocities: Array, stop: Callable[[], bool] | None = None
     ) -> None:
-        """Drive an arm along timed postures, or until `enough` returns true; raise `SkillError` if it lags behind its command."""
+        """Drive an arm along timed postures, or until `stop` returns true; raise `SkillError` if it lags behind its command."""
         for i, (q, v) in enumerate(zip(positions, velocities, strict=True)):
             hand.command(q, v)
             self.run(1)
-            if enough is not None and i % 2 == 1 and enough():
+            if stop is not None and i % 2 == 1 and stop():
                 hand.command(hand.measured())
                 return
             if i % 6 == 5:

@@ -254,7 +254,9 @@ def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     goals, way, chosen = _choose(run, phase, later)  # fails, if at all, before the fingers move
     FINGERS[phase.fingers](run, phase)
     opening = run.spread if phase.fingers == "open" else None
-    best = chosen[run.attempt.go([goals[i] for i in chosen], run.things(), *run.free_of(phase), opening=opening)]
+    best = chosen[
+        run.attempt.move_to_any([goals[i] for i in chosen], run.things(), *run.free_of(phase), opening=opening)
+    ]
     run.way = way.pick(best)
     run.arrived(goals[best])
 
@@ -262,13 +264,13 @@ def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
 def _line(run: Run, phase: Phase) -> None:
     hand = run.attempt.hand
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
-    enough = until(run, phase)
+    stop = until(run, phase)
     speed = run.number(phase.speed)
-    if enough is not None:  # the guard ends the motion, and with noise the object may be farther away
+    if stop is not None:  # the guard ends the motion, and with noise the object may be farther away
         ahead = goal[:3] - hand.pose[:3]
         goal[:3] += 2 * run.world.noise * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
-    run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
-    if enough is None:
+    run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, stop=stop)
+    if stop is None:
         run.arrived(goal)
 
 
@@ -280,7 +282,7 @@ def _yielding(run: Run, phase: Phase) -> None:
 def _joint(run: Run, phase: Phase) -> None:
     """Move a joint along its path in stretches, each planned from the present positions of hand and joint."""
     mechanic, link = run.joint(phase.to)
-    goal, enough, attempt = run.number(phase.value, link), until(run, phase), run.attempt
+    goal, stop, attempt = run.number(phase.value, link), until(run, phase), run.attempt
     way = run.way
     if way is None:
         raise SkillError(
@@ -291,7 +293,7 @@ def _joint(run: Run, phase: Phase) -> None:
         if run.gripped:
             draw_back(run)
         value = mechanic.values()[link]
-        if enough is not None and enough():
+        if stop is not None and stop():
             break
         values = np.linspace(value, value + (goal - value) / left, 4)
         share = Ways(way.first, way.first + (way.last - way.first) / ANCHORS, way.swivel)
@@ -302,7 +304,7 @@ def _joint(run: Run, phase: Phase) -> None:
         spread = np.linspace(0, len(poses) - 1, 3 * len(poses) - 2)
         poses = np.stack([np.interp(spread, np.arange(len(poses)), part) for part in poses.T], -1)
         attempt.along(
-            poses, (link,), mechanic.mechanism.name, *mechanic.joints, speed=run.number(phase.speed), enough=enough
+            poses, (link,), mechanic.mechanism.name, *mechanic.joints, speed=run.number(phase.speed), stop=stop
         )
         if run.gripped and finger_force(run, run.gripped) <= 0:
             value = mechanic.values()[link]
@@ -321,7 +323,7 @@ def _home(run: Run, phase: Phase) -> None:
     """Move to the home pose, or near it if an opened link is there."""
     hand = run.attempt.hand
     home = pose_of(hand.arm, np.array(hand.hand.home))
-    run.attempt.go(
+    run.attempt.move_to_any(
         [home + np.array([*shift, 0.0, 0.0, 0.0]) for shift in ASIDE],
         (),
         opening=run.spread if phase.fingers == "open" else None,

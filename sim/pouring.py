@@ -64,7 +64,7 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
     except SkillError:
         chosen = attempt.choose([Stage(poses) for poses in ways], (target, source))
     start = ways[0]
-    best = attempt.go([start[i] for i in chosen], (target, source))
+    best = attempt.move_to_any([start[i] for i in chosen], (target, source))
     return attempt.check_arrival(start[chosen[best]], numbers)
 
 

@@ -140,8 +140,8 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     back = -ASIDE_BY * hand.frame()[0][:, 0]
     patience = YIELDS
     while True:
-        enough = (lambda: hand.meets(body)) if patience else None
-        run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
+        stop = (lambda: hand.meets(body)) if patience else None
+        run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, stop=stop)
         if not patience or not hand.meets(body):
             break
         patience -= 1

@@ -30,7 +30,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
     return with_current_reach(scene, remark)
 
 
-def doubt(scene: Scene, deadline: Deadline) -> None:
+def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
     """Report in one line if `confab validate` would find errors in a user's scene, if there is time for it."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.exceptions import Exit
 
-from confab.commands.given import blame_reach, doubt, json_file, load_scene, memory_for, plan_in
+from confab.commands.given import blame_reach, json_file, load_scene, memory_for, plan_in, warn_of_errors
 from confab.commands.options import (
     AS_JSON,
     GOALS,
@@ -127,7 +127,7 @@ def plan(
         show_result(result.json() if as_json else result if result.solved else str(result))
     if dearer := result.dearer():
         remark(dearer)
-    doubt(loaded, deadline)
+    warn_of_errors(loaded, deadline)
     blame_reach(loaded, result.outcome, deadline)
     raise Exit(EXIT[result.outcome.status.value])
 

@@ -117,7 +117,7 @@ class Belief:
 
     # ------------------------------------------------------------------------------------------------- doubts
 
-    def doubt(self, facts: Iterable[Static] = (), refutations: Iterable[Refutation] = ()) -> None:
+    def withdraw(self, facts: Iterable[Static] = (), refutations: Iterable[Refutation] = ()) -> None:
         """Doubt static facts, or the applicability of behaviours."""
         self.withdrawn.update(facts)
         self.refuted |= dict.fromkeys(refutations)

@@ -470,7 +470,7 @@ class _Run:
         refutations: Iterable[Refutation] = (),
     ) -> None:
         """Doubt static facts or the applicability of behaviours, and plan the step in progress again."""
-        self.belief.doubt(facts, refutations)
+        self.belief.withdraw(facts, refutations)
         self.agenda.sound = False
         self.request_replan(why)
 

@@ -31,13 +31,13 @@ class Caution:
     """The number of times that each static fact was relied on, and that it failed.
 
     >>> reach = ("canReach", ("hand", "shelf"))
-    >>> round(Caution({reach: (3, 2)}).doubt(reach), 2)
+    >>> round(Caution({reach: (3, 2)}).failure_probability(reach), 2)
     0.6
     """
 
     counts: Mapping[Static, tuple[int, int]] = field(default_factory=dict)
 
-    def doubt(self, fact: Static) -> float:
+    def failure_probability(self, fact: Static) -> float:
         """Return the probability that relying on a fact fails (Laplace's rule of succession)."""
         tried, failed = self.counts.get(fact, (0, 0))
         return (failed + 1) / (tried + 2)
@@ -61,8 +61,8 @@ class Caution:
     def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
         """Return the problem without the doubtful facts, the most doubtful first, as long as a plan is left."""
         end = limits.end()
-        doubtful = [fact for fact in self.counts if self.doubt(fact) > DOUBTFUL]
-        for fact in sorted(doubtful, key=lambda fact: (-self.doubt(fact), fact)):
+        doubtful = [fact for fact in self.counts if self.failure_probability(fact) > DOUBTFUL]
+        for fact in sorted(doubtful, key=lambda fact: (-self.failure_probability(fact), fact)):
             without = without_relations(problem, [fact])
             if planner(without, limits=limits.until(end)).status is Status.SOLVED:
                 problem = without
@@ -119,8 +119,8 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
             continue
         for other, e in same:
             if other.level < own.level and _seen(problem, other.name, one.facts):
-                who = dict(zip(e.arguments, (bound[term] for term in effect.arguments), strict=True))
-                arguments = tuple(who.get(parameter.name, "") for parameter in other.parameters)
+                renamed = dict(zip(e.arguments, (bound[term] for term in effect.arguments), strict=True))
+                arguments = tuple(renamed.get(parameter.name, "") for parameter in other.parameters)
                 yield replace(one, behavior=other.name, arguments=arguments)
 
 

@@ -347,15 +347,15 @@ class Subgoals:
         keys = self.table.holders[situation].get(value, ())
         return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
 
-    def spare(self, beside: Collection[str], level: int, number: int) -> Iterator[str]:
+    def spare(self, excluded: Collection[str], level: int, number: int) -> Iterator[str]:
         """Yield further values of the same symmetry classes, least used first."""
         for situation in self.program.changing(level):
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
                 continue
             for group in self.program.symmetry.groups(members):
-                if not set(group).isdisjoint(beside):
-                    others = (value for value in group if value not in beside)
+                if not set(group).isdisjoint(excluded):
+                    others = (value for value in group if value not in excluded)
                     yield from nsmallest(number, others, key=lambda value: self.burden(situation.name, value))
 
     def _others(self, situation: str, key: Key, avoid: str | None, level: int) -> tuple[str, ...]:
@@ -365,17 +365,17 @@ class Subgoals:
         values = self.candidates(situation, key, self.program.domain.situations[situation].range)
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
-    def one_of_each(self, kind: str, beside: Collection[str | None] = ()) -> list[str]:
+    def one_of_each(self, kind: str, excluded: Collection[str | None] = ()) -> list[str]:
         """Return the individuals of a class; of many, one of each symmetry class and state.
 
-        Of a symmetry class of an individual in `beside`, one more is returned, since a different individual may be needed.
+        Of a symmetry class of an individual in `excluded`, one more is returned, since a different individual may be needed.
         """
         members, symmetry = self.program.problem.classes.get(kind, ()), self.program.symmetry
         if len(members) <= FEW:
             return list(members)
         found = symmetry.unlike(members, (), self.table.now)
-        for group in sorted({symmetry.class_of.get(one, -1) for one in beside if one in found}):
-            found += islice((one for one in symmetry.members[group] if one not in beside and one not in found), 1)
+        for group in sorted({symmetry.class_of.get(one, -1) for one in excluded if one in found}):
+            found += islice((one for one in symmetry.members[group] if one not in excluded and one not in found), 1)
         return found
 
     def _boolean(self, situation: str) -> bool:
