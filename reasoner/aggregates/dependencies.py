@@ -1,4 +1,4 @@
-"""What an aggregate is worked out from, and where its number exists."""
+"""The dependencies of aggregates, and the level from which their numbers exist."""
 
 from __future__ import annotations
 

@@ -68,10 +68,10 @@ def kept(
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Tuples that may begin or cease to add to a total: those that agree with an effect on a symbol of an effect.
+    """Tuples that may start or stop contributing to a total: those consistent with an effect on some symbol.
 
-    `effect` has its variables renamed apart; `named` are the arguments of the symbol as the aggregate has them, `value` the
-    value (None of an amount); `before` tells whether a tuple agrees with the value before the effect or with the one after it.
+    `effect` has its variables renamed apart; `named` are the arguments of the symbol in the aggregate, `value` the
+    value (None for an amount); `before` says whether a tuple is consistent with the value before or after the effect.
     """
 
     effect: Effect
@@ -117,7 +117,7 @@ class _Keeping:
         return replace(self.own, variables=variables, amounts=(*self.own.amounts, *effects))
 
     def _candidates(self) -> Iterator[_Candidate]:
-        """Yield what may change the total: each effect with each symbol that the conditions or the number name."""
+        """Yield the effects that may change the total, each with each symbol in the conditions or the number."""
         for condition in (inner for c in self.conditions for inner in walk(c)):
             if isinstance(condition, ValueCondition):
                 for effect in (e for e in self.own.effects if e.situation == condition.situation):

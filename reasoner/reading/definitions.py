@@ -1,7 +1,7 @@
 """Classes defined by situations, compiled into conditions.
 
-"A full vessel is a vessel that carries some beverage" is true of a cup today and false tomorrow, so no reasoner may write down
-who is one before planning. Wherever a behaviour names such a class, its definition takes its place:
+"A full vessel is a vessel that carries some beverage" can become true and false, so the
+reasoner must not conclude its members before planning. In a behaviour, such a class is replaced by its definition:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
@@ -257,8 +257,8 @@ class Definitions:
     def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
         """Return the rules of the axioms about a value property: subproperties and chains.
 
-        A transitive one is followed from what it follows from otherwise, one link after the other; `more` tells whether there are
-        rules of another kind from which it does.
+        A transitive property is derived from its other rules, one link after another; `more` says whether there are
+        rules of another kind.
         """
         said = self.nodes.get(prop, {})
         ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]

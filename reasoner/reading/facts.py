@@ -29,7 +29,7 @@ def facts_of(
 ) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
     """Return the static relations, and the values that the scene states of each symbol."""
     relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
-    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # those that give a number, at the end of each row
+    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # relations with a number at the end of each row
     stated: dict[Symbol, set[str]] = defaultdict(set)
     for subject, predicate, value in rows:
         number = predicate in numbers
@@ -39,7 +39,7 @@ def facts_of(
             continue
         situation, boolean = properties[predicate]
         if situation in domain.rules:
-            continue  # it follows from what is stated of others
+            continue  # it follows from facts about others
         if boolean:
             stated[Symbol(situation, pair)].add(TRUE)
         else:
@@ -124,7 +124,7 @@ def initial_state(
         for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
             symbol = Symbol(situation.name, arguments)
             if situation.quantity and len(arguments) > 1 and symbol not in stated and not situation.default:
-                continue  # distances, prices: only what is stated is there
+                continue  # distances, prices: only stated ones exist
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
                 what = f"several values ({', '.join(values)})" if values else "no value"
@@ -136,7 +136,7 @@ def initial_state(
     ):
         kinds = domain.situations[symbol.situation].arguments
         if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
-            initial[symbol] = TRUE  # of others it isn't asked
+            initial[symbol] = TRUE  # other symbols aren't read
     return initial
 
 

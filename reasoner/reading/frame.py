@@ -59,7 +59,7 @@ class _Whole(Names):
 
 
 def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
-    """Return behaviours as they are written: with IRIs for names, and classes that situations define left as they are named."""
+    """Return behaviours with IRIs for names, and with the names of classes that situations define."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
@@ -96,8 +96,8 @@ def frame(
 ) -> Frame:
     """Return the behaviours and situation types as values, and the classes of some individuals.
 
-    `namesakes` are others that end like one of these, so that their names are those of the whole scene; `earlier` is the frame
-    of fewer individuals, whose behaviours hold as long as the new ones leave the names in them alone.
+    `namesakes` are other individuals with the same local name as one of these, so that names are those of the whole scene;
+    `earlier` is the frame of fewer individuals, whose behaviours stay valid unless a new individual changes a name in them.
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -178,7 +178,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
             if iri in changed:
                 who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
                 raise KnowledgeError(
-                    f"<{who}> changes {name}, which is defined by <{min(by)}>; take the effect out, or drop the definition",
+                    f"<{who}> changes {name}, which is defined by <{min(by)}>; remove the effect, or drop the definition",
                     who,
                 )
             if not situations[name].boolean:
@@ -194,8 +194,8 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
         rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
         if said and len(kinds) != 1:
             raise KnowledgeError(
-                f"<{iri}> holds of what is in a class, so that it is about one individual, and {len(kinds)} are said; "
-                "say by :hasSituationType which class has it"
+                f"<{iri}> holds for the members of a class, so it has one argument, and {len(kinds)} are stated; "
+                "state by :hasSituationType which class has it"
             )
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
@@ -222,7 +222,7 @@ def _aggregates(
     situations: Mapping[str, SituationType],
     rules: Mapping[str, Sequence[Rule]],
 ) -> dict[str, Aggregate]:
-    """Return the derived amounts, each behind those that it reads.
+    """Return the derived amounts in order of dependency.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def _on_their_levels(
     rules: Mapping[str, Sequence[Rule]],
     aggregates: Mapping[str, Aggregate],
 ) -> Iterator[SituationType]:
-    """Yield situation types; what is defined exists from the level on that has all that it is defined by."""
+    """Yield situation types; a defined one exists from the level on that has all situation types of its definition."""
     known = {s.name: s for s in situations}
     before = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
@@ -272,7 +272,7 @@ def _on_their_levels(
 
 
 def _definitions(schema: Schema, names: Names) -> Definitions:
-    """Return what defines classes and situation types, with the kinds of what the properties in it lead from and to."""
+    """Return the definitions of classes and situation types, with the classes of subjects and values of their properties."""
     properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
     owners: dict[str, list[str]] = defaultdict(list)
     for kind, situation in schema.owners:
@@ -347,7 +347,7 @@ def _situations(
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
         value_property = schema.values(iri, "valueProperty")
-        # A value property says so even where no individual that was read is one of its values.
+        # The value property determines this even if none of the individuals read is a value.
         boolean = not value_property and set(classes.get(name, ())) <= {TRUE, FALSE}
         if iri in schema.pairs:
             arguments, boolean = (*arguments, name), True
@@ -376,7 +376,7 @@ def _situations(
 
 
 def _perceived(schema: Parts, iri: str, exclusive: bool) -> Perceived | None:
-    """Return how a situation type is perceived; None if nothing perceives it."""
+    """Return how a situation type is perceived; None if it has no perceiver."""
     node = schema.nodes[iri]
     if not (perceivers := node.get(EMBODIMENT + "perceiver")):
         return None

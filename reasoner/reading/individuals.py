@@ -28,7 +28,7 @@ class Individuals:
     Attributes
     ----------
     triples : set of triples
-        All that is said of those in `seen`, and what was found backward of others, in the order of reading.
+        All facts about those in `seen`, and facts about others that were found backward, in the order of reading.
     seen : set of individuals
     """
 

@@ -1,7 +1,7 @@
 """Observed facts in the graph: a file of their own, beside the edited scene.
 
 Each fact is a situated object instance, an individual with object, situation type and value. It isn't the property assertion that
-the scene makes: a scene that says where a cup was, and a file that says where it was seen, don't contradict each other. A planning
+the scene makes: the place of a cup in the scene, and its observed place in a file, don't contradict each other. A planning
 call that starts from observations puts these values in place of the scene's.
 """
 

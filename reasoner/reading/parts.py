@@ -150,7 +150,7 @@ class Parts(NodeReader):
         return self.names.short(relation)
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition of a class, by what defines it."""
+        """Return the condition of a class, by its definition."""
         return self.definitions.condition(term, kind, negated)
 
     def measured(self, iri: str) -> Amount | Measure:

@@ -1,4 +1,4 @@
-"""From the knowledge graph to the values of `confab.reasoner.symbols`: what is there, what can be done, what holds, what is wanted.
+"""From the knowledge graph to the values of `confab.reasoner.symbols`: objects, behaviours, facts and goals.
 
 The graph is read in a few large queries; their rows become nodes (`confab.reasoner.reading.rows`), the nodes become conditions,
 effects and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`), and all of them a problem:
@@ -51,10 +51,10 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 
 @dataclass(frozen=True)
 class Reading:
-    """A scene as the planner takes it, with the table that leads from its names back to IRIs.
+    """A scene as a problem, with the table from its names back to IRIs.
 
-    `whole` tells whether all individuals of the scene are in it, or those only that its task can need
-    (`confab.reasoner.reading.relevance`); `schema` is what it was read by.
+    `whole` says whether it contains all individuals of the scene, or only those that its task can need
+    (`confab.reasoner.reading.relevance`); `schema` has the rows common to all individuals.
     """
 
     problem: Problem
@@ -87,7 +87,7 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
 
 
 def read_names(graph: KnowledgeGraph) -> Names:
-    """Return the short names of a whole scene, as `read` does, without what it says of them."""
+    """Return the short names of a whole scene, as `read` does, without reading their facts."""
     return names_of(read_schema(graph), _members(graph))
 
 

@@ -1,15 +1,15 @@
-"""Task recognition: which individuals of a large world the task at hand can need, read by few queries.
+"""Task recognition: finds the individuals of a large world that a task can need, by few queries.
 
-The slice is closed. Whatever a behaviour could do to a situated object of the slice, whatever that depends on, and whatever the
-behaviour changes besides is in the slice as well; so planning in it and planning in the whole world have the same answer
+The slice is closed: if a behaviour can change a situated object of the slice, the slice also contains all individuals in its
+conditions and its other effects. So planning in the slice and planning in the whole world have the same answer
 (the proof is in docs/quantification.md, the tests in tests/reasoner/test_recognition.py and test_closure.py). Two steps:
 
-1. `routes` looks at the behaviours alone. For each behaviour that can change a situated object, it finds how the other
-   terms of its preconditions and of all of its effects are reached from that object: forward over a value (the object is at
-   a place), over a static relation (a hand reaches the place), or backward from a value (what else is at the place). A term
-   that nothing leads to has to be looked for among all individuals of its class.
-2. `recognise` starts from what the goal names and follows the routes in the graph, a round of them per query, until nothing
-   new comes: the slice widens until nothing outside can help, so a task that has no plan in it has none.
+1. `routes` examines the behaviours alone. For each behaviour that can change a situated object, it finds routes from that object
+   to the other terms of its preconditions and effects: forward over a value (the place of the object), over a static
+   relation (a hand that reaches the place), or backward from a value (other objects at the place). For a term without a
+   route, all individuals of its class are needed.
+2. `recognise` starts from the individuals of the goal and follows the routes in the graph, one round per query, until no new
+   individual is found: then no individual outside the slice can help, so a task without a plan in the slice has no plan.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps 
 
 @dataclass
 class Routes:
-    """How to get from individuals that matter to others that matter, as IRIs.
+    """Routes from relevant individuals to others, as IRIs.
 
     `forward` are the properties followed from subject to object; `backward` those followed from object to subject, each with
-    the constants from which it is followed too (a constant is a value that a behaviour names, such as "nothing": half the
-    world may have it). `classes` are those all of whose individuals matter.
+    the constants from which it is followed too (a constant is a value that a behaviour names, such as "nothing", which many
+    symbols may have). `classes` are those all of whose individuals are relevant.
     """
 
     forward: set[str] = field(default_factory=set)
@@ -73,12 +73,12 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ----------
     graph : KnowledgeGraph
     goals : sequence of str
-        Goals that replace some of the task's, as in `confab.reasoner.reading.problem.with_goals`; what they name is read as well.
+        Goals that replace some of the task's, as in `confab.reasoner.reading.problem.with_goals`; their individuals are read, too.
 
     Returns
     -------
     Reading
-        As `confab.reasoner.reading.problem.read` gives, with fewer individuals. IDs number what was read.
+        As `confab.reasoner.reading.problem.read` gives, with fewer individuals. IDs number the individuals read.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 
 
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
-    """Return how to reach, from what the goal names, every individual that a step on it can involve or change.
+    """Return the routes from the individuals of a goal to all individuals that relevant steps can involve or change.
 
     A behaviour counts if it changes a situation type that counts, a rule if it defines one; the situation types in its conditions
     and effects then count too. A situation type that is looked up from some of its terms alone is also followed from an effect
@@ -146,7 +146,7 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
-"""Places among the terms of situation types from which symbols are looked up, each with the constants that may stand there."""
+"""Places among the terms of situation types from which symbols are looked up, each with the constants that may occur there."""
 
 
 class _Doing:
@@ -155,7 +155,7 @@ class _Doing:
     Attributes
     ----------
     situations : set of str
-        The situation types that it asks or changes.
+        The situation types in its conditions and effects.
     """
 
     def __init__(self, behavior: Behavior) -> None:
@@ -174,9 +174,9 @@ class _Doing:
         self.spanned = set[tuple[int, frozenset[str]]]()
 
     def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
-        """Add the steps to all individuals of a step that changes what is known, and to all that this step changes."""
+        """Add the routes to all individuals of a behaviour that changes a relevant symbol, and to all symbols that it changes."""
         if not self.spanned:
-            for scope in self.asks[1:]:  # what must not hold, or need not
+            for scope in self.asks[1:]:  # negated conditions, and alternatives
                 _span(scope, self.step, set(), known, found, looked_up)
             for _, (first, *groups), named in self.effects:
                 _span(first, self.step, named, known, found, looked_up)
@@ -190,13 +190,13 @@ class _Doing:
 
 
 def _terms_in(effect: Effect) -> set[str]:
-    """Return the terms of an effect: what it is about, and what it gives."""
+    """Return the terms of an effect: its arguments and its value."""
     given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
     return {*effect.arguments, *given} - {TRUE, FALSE}
 
 
 def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
-    """Yield each term of an effect from which what it makes true is looked up."""
+    """Yield each term of an effect from which its fact is looked up."""
     if isinstance(effect, AmountEffect) or effect.value == FALSE:
         return
     for at, term in enumerate(effect.arguments if effect.value == TRUE else (*effect.arguments, effect.value)):
@@ -214,7 +214,7 @@ class _Scope:
 
 
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
-    """Return the conjunctions in nested conditions: what must hold, and with it each alternative and each negated group."""
+    """Return the conjunctions in nested conditions: the positive one, and with it each alternative and each negated group."""
     leaves: list[Condition] = []
     groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []
     waiting = list(conditions)
@@ -263,9 +263,9 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 
 @dataclass(frozen=True)
 class _Step:
-    """One way from a term to another: the properties to follow, and what that costs.
+    """One route from a term to another: the properties to follow, and its cost.
 
-    `constants` may stand in the place of the source; `looks_up` is this place, unless the source alone determines the symbol.
+    `constants` may occur in place of the source; `looks_up` is this place, unless the source alone determines the symbol.
     """
 
     source: str
@@ -278,7 +278,7 @@ class _Step:
 
 
 def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
-    """Yield the steps that a positive condition allows: between any two of its terms, by what is stated of them.
+    """Yield the steps that a positive condition allows: between any two of its terms, by stated facts.
 
     Facts that are nodes of their own are always followed from their first argument.
     """
@@ -324,7 +324,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
 
 
 def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
-    """Return the constants that a term may stand for."""
+    """Return the constants that a term may denote."""
     kind = scope.kinds.get(term)
     return frozenset({term} if kind is None else known.classes.get(kind, ()))
 
@@ -336,7 +336,7 @@ class _Search(Individuals):
     """What recognition has read so far, and where it leads."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes from what was read first until nothing new comes, by rounds and then by one property path."""
+        """Follow the routes from the first individuals until no new ones are found, in rounds and then by one property path."""
         reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):
@@ -390,9 +390,9 @@ class _Search(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return what ends like an individual or class of a part of the scene, in any namespace that is known.
+    """Return the individuals and classes with the same local name as one of a part of the scene, in all known namespaces.
 
-    Each IRI that it can be is looked up by itself: no row is read of anything else. As in the whole scene, an individual counts
+    Each possible IRI is looked up separately, so that no other row is read. As in the whole scene, an individual counts
     if it has a class (a property that is declared as one has none), and a class if it has individuals that aren't nodes of the
     schema.
     """

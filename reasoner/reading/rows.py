@@ -46,7 +46,7 @@ class Schema:
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
     property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
     facts are nodes of their own, and `facts` has those without arguments;
-    `expressions` are the definitions of classes, `axioms` what is said of value properties, `swrl` the rules; `ontologies` the
+    `expressions` are the definitions of classes, `axioms` those about value properties, `swrl` the rules; `ontologies` the
     IRIs of the loaded files; `exclusive` are the situation types whose values physics gives to one individual at a time.
     """
 

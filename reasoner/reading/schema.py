@@ -12,7 +12,7 @@ from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nod
 from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
-"""What is said as text, which a store elsewhere doesn't write out."""
+"""Properties with texts, which endpoints return in full."""
 KINDS = (
     "SituationType",
     "Behavior",
@@ -51,15 +51,15 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
   UNION {{ {swrl.RULES} BIND("swrl" AS ?part) }}
 }}"""
-"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own.
+"""The rows that every planning call in a world needs, in one query; ``tuples`` says that some facts are nodes.
 
-No query of this module orders its rows: a store takes longer to order them than to find them, and what is made of them is
-ordered where that counts (`nodes_of`, `classes_of`, `initial_state`).
+No query of this module orders its rows: a store takes longer to order rows than to find them, and results are
+ordered where the order matters (`nodes_of`, `classes_of`, `initial_state`).
 """
 
 
 def read_schema(graph: KnowledgeGraph) -> Schema:
-    """Read what doesn't depend on how many individuals there are, in one query."""
+    """Read the rows that don't depend on the number of individuals, in one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
     for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
         if not count % 4096:

@@ -1,4 +1,4 @@
-"""A behaviour written as a SPARQL update, or a rule as a CONSTRUCT query, compiled into the individuals that say the same.
+"""A behaviour written as a SPARQL update, or a rule as a CONSTRUCT query, compiled into equivalent individuals.
 
 ==========================================  =====================================================================
 in the update                               as individuals
@@ -9,16 +9,16 @@ in the update                               as individuals
 ``?cup :fits ?slot``                        a `:RelationCondition`
 ``?shelf :COLOR (?cup :red)``               a situation type without a property of its own, or with several arguments
 ``FILTER(?a != ?b)``, ``IN``, ``VALUES``    `:EqualityCondition`, several in an `:AnyOf`
-``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` stand for numbers; a FILTER of them is a `:Comparison`
+``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` denote numbers; a FILTER of them is a `:Comparison`
 ``FILTER EXISTS { ?x a :Tube … }``          a `:Witness` that looks for ``?x``
-``FILTER NOT EXISTS { … }``                 what is inside, negated
+``FILTER NOT EXISTS { … }``                 the conditions inside, negated
 ``{ … } UNION { … }``, ``||``               an `:AnyOf`
-``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation `:when` its WHERE held
+``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation with its WHERE as `:when`
 ``CONSTRUCT { ?a :p ?b } WHERE { … }``      a `:Rule` with these conditions; a variable that isn't in the head, in a `:Witness`
 ``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of that rule, `:over` the variables that begin with their type
 ==========================================  =====================================================================
 
-All that is asked is asked of the situation before the behaviour, also by further operations; a variable means the same in all.
+All conditions are evaluated before the behaviour, including those of further operations; a variable is the same in all of them.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class UpdateCompiler:
             self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
 
     def write_rule(self, query: Update) -> None:
-        """Add what a CONSTRUCT query says: its head is what follows, its WHERE when it does, or what is aggregated."""
+        """Add a CONSTRUCT query: its head is the conclusion, its WHERE the conditions, or the aggregated tuples."""
         own, rule = constructed(query.text)
         self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
         self.nodes.links = {}
@@ -123,7 +123,7 @@ class UpdateCompiler:
         self.nodes.links = {key: values for key, values in self.nodes.links.items() if values}
 
     def total(self, rule: Construction, group: Group, within: set[str]) -> None:
-        """Add what an aggregate says: its amount, what it is aggregated over, and the number of each."""
+        """Add an aggregate: its amount, the variables it aggregates over, and the number of each tuple."""
         at = rule.head.subject.at
         if last_of(rule.head) != rule.name or not self.scope.vocabulary.numeric(self.scope.iri(rule.head.predicate)):
             raise UpdateError(
@@ -162,8 +162,8 @@ class UpdateCompiler:
                 )
             if (one.subject, one.predicate, one.object) not in said and not numeric:
                 raise UpdateError(
-                    f"{one.predicate} is deleted with a value that WHERE doesn't say it has",
-                    f"say so there, or leave out DELETE: what is inserted takes the place of what was {where}",
+                    f"{one.predicate} is deleted with a value that WHERE doesn't state",
+                    f"state it there, or leave out DELETE: the inserted value replaces the previous one {where}",
                     one.predicate.at,
                 )
         for one in operation.insert:

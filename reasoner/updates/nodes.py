@@ -1,4 +1,4 @@
-"""The nodes of one behaviour or rule while it is compiled: their properties, and where in the update each comes from."""
+"""The nodes of one behaviour or rule while it is compiled: their properties, and their positions in the update."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of an update: amounts that a variable stands for, calculations, and comparisons."""
+"""Numbers of an update: amounts denoted by variables, calculations, and comparisons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the variables of an update stand for: terms of the behaviour, numbers, and groups of patterns that introduce them."""
+"""The meaning of variables in an update: terms of the behaviour, or numbers; and the groups of patterns that introduce them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 @dataclass
 class Group:
-    """A group of patterns, without those that only say how its variables begin.
+    """A group of patterns, without those that only introduce variables.
 
-    `chosen` are variables that begin with their type; `determined` those that begin as the value of a situation, each with
-    its type (a word), or the situation type if it has none, and its place; `numbers` those that stand for a number, each with
+    `chosen` are variables introduced with their type; `determined` those introduced as the value of a situation, each with
+    its type (a word), or the situation type if it has none, and its place; `numbers` those that denote a number, each with
     the triple that gives it or the expression of its BIND.
     """
 

@@ -59,7 +59,7 @@ class Vocabulary:
     """The properties that an update can use, as IRIs.
 
     `properties` maps a value property to its situation type; `functional` are those of one value at a time; `bare` are
-    the situation types without a property, which stand for one themselves; `amounts` are the situation types, and `measures`
+    the situation types without a property, whose names are used instead; `amounts` are the situation types, and `measures`
     the relations, that give numbers.
     """
 

@@ -1,7 +1,7 @@
-"""The text of a SPARQL update or CONSTRUCT, parsed by rdflib, as a tree whose words know where they stand.
+"""The text of a SPARQL update or CONSTRUCT, parsed by rdflib, as a tree whose words have positions.
 
-rdflib's grammar forgets places. Of a copy of it, what parses a variable or a name yields a `Word` instead: the text as it was
-written, and its place. What else there is in the tree (groups, filters, unions) is rdflib's.
+rdflib's grammar doesn't record positions. In a copy of it, the parsers of variables and names yield a `Word` instead: the
+original text, and its position. The rest of the tree (groups, filters, unions) is rdflib's.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Operation:
 
 @dataclass(frozen=True)
 class Construction:
-    """``CONSTRUCT { head } WHERE { … }``; the aggregate of a SELECT inside has a function, its argument and what it groups by."""
+    """``CONSTRUCT { head } WHERE { … }``; an inner SELECT has a function, its argument and its grouping variables."""
 
     head: Triple
     where: Sequence[Any]

@@ -1,7 +1,7 @@
 """A behaviour written as the SPARQL update that `confab.reasoner.updates.compiling` reads as the same behaviour.
 
-Parameters come first, each with its type; then one condition a line. What the situation determines has its type behind the
-condition that determines it, unless every value of the situation will do.
+Parameters come first, each with its type; then one condition a line. The type of a determined variable follows the
+condition that determines it, unless every value of the situation is allowed.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
     """Return the operations: conditions besides the preconditions, and effects; the first has no condition.
 
-    Their order is that in which effects are made: only where nothing becomes false can it matter.
+    They are in the order of effects, which matters only if no effect makes a fact false.
     """
     found: list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]] = [((), [])]
     for effect in (e for e in behavior.effects if e.value != FALSE):

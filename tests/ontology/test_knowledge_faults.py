@@ -37,7 +37,7 @@ FEE = """
         ("# What follows.", CIRCLE, "theatre", "A.rule",
          "A is defined by B not being true, which is defined by A in turn", "take one of these conditions out of its rule"),
         (":PUSH.cart ; c:situationType :PARKED ; c:value :PUSH.room ; rdfs", ":PUSH.cart ; c:situationType :FULL ; rdfs",
-         "theatre", "PUSH.there", "changes FULL, which is defined by the class FullCart", "take the effect out"),
+         "theatre", "PUSH.there", "changes FULL, which is defined by the class FullCart", "remove the effect"),
         ("# What follows.", FREE, "theatre", "Stowed",
          "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
         ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
