@@ -21,7 +21,7 @@ import networkx
 from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
 from confab.planner.causal_links import FactChange, Kind, Need, Purpose, purposes
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import Facts, Rules, successor
+from confab.planner.validation import BehaviorReader, Facts, successor
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
@@ -246,7 +246,7 @@ class Situation:
 
     def __init__(self, problem: Problem, state: State) -> None:
         self.problem, self.state = problem, state
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.facts = Facts(problem, state, self.rules)
 
     def holds(self, leaf: Holds) -> bool:

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import Cell, Facts, Rules
+from confab.planner.validation import BehaviorReader, Cell, Facts
 from confab.reasoner.amounts import meets, written
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
@@ -140,7 +140,7 @@ class _Course:
     def __init__(self, problem: Problem, plan: Plan, level: int) -> None:
         self.problem, self.level = problem, level
         self.steps = list(on_level(plan.steps, level))
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.facts = _Noting(problem, problem.initial)
         self.written: dict[Cell, _Written] = {}
         self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have, or had before, a value

@@ -33,7 +33,7 @@ from confab.planner.certificate_checks import (
 )
 from confab.planner.certificates import Certificate
 from confab.planner.possibilities import Lowest, NoTimeLeftError, Range, Reading, WorkLimitError, variables
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
@@ -423,7 +423,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
             break
         path.append((before, one, end))
         end = before
-    facts, rules = Facts(problem, problem.initial), Rules(problem)
+    facts, rules = Facts(problem, problem.initial), BehaviorReader(problem)
     for before, one, after in reversed(path):
         view = CaseView(cases.claims, before, unknown=[])
         cases.effects(Reading(lowest, view), one)

@@ -15,7 +15,7 @@ from confab.planner.checked_conditions import Bindings
 from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
-from confab.planner.validation import Facts, Rules, successor, validate
+from confab.planner.validation import BehaviorReader, Facts, successor, validate
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]
@@ -63,7 +63,7 @@ def instead_of(
     place : Step, optional
         The step to be replaced, of the same level; if left out, the most similar step in whose place it is applicable.
     """
-    rules, before = Rules(problem), cost_of(problem, plan)
+    rules, before = BehaviorReader(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))
     places = [i for i, step in enumerate(course) if place is None or step.path == place.path]
     states = _states(problem, course)
@@ -160,7 +160,7 @@ def _similarity(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tup
 
 
 def _fewest_failures(
-    rules: Rules, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
+    rules: BehaviorReader, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
 ) -> Contrast:
     """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
     best: Contrast | None = None

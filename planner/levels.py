@@ -15,7 +15,7 @@ from itertools import combinations
 
 from confab.planner.checked_conditions import Bindings
 from confab.planner.plan import Broken, Left, Plan, Step
-from confab.planner.validation import Cell, Facts, Rules, stretches
+from confab.planner.validation import BehaviorReader, Cell, Facts, stretches
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
     AmountEffect,
@@ -50,7 +50,7 @@ class _Watch:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.facts = Facts(problem, problem.initial)
         self.views = {level: Facts(problem, _seen(problem, level)) for level in problem.domain.levels}
         self.left: dict[int, list[Broken]] = {}  # for each abandoned level, the violations so far
@@ -175,7 +175,11 @@ class _Watch:
 
 
 def failing_conditions(
-    rules: Rules, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
+    rules: BehaviorReader,
+    conditions: Sequence[Condition],
+    terms: Bindings,
+    kinds: Mapping[str, str],
+    views: Sequence[Facts],
 ) -> tuple[Bindings, tuple[Condition, ...]]:
     """Return the fewest conditions without which the others hold in one of some states, with individuals.
 

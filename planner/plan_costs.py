@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import Problem
 
 
@@ -19,7 +19,7 @@ def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
     behaviors = [problem.domain.behaviors[step.behavior] for step in primitives]
     if all(behavior.price is None for behavior in behaviors):
         return [behavior.cost for behavior in behaviors]
-    found, rules, facts = [], Rules(problem), Facts(problem, problem.initial)
+    found, rules, facts = [], BehaviorReader(problem), Facts(problem, problem.initial)
     for step, behavior in zip(primitives, behaviors, strict=True):
         price = rules.price(behavior, step.arguments, facts)
         found.append(behavior.cost if price is None else float(price))
@@ -33,7 +33,7 @@ def in_circles(problem: Problem, plan: Plan) -> int:
 
     Of nested circles only the outermost counts; steps that change more than they undo form no circle.
     """
-    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}
     now, states = 0, [0]  # a state is the exclusive or of its facts' hashes
     for step in plan.primitives:

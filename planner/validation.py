@@ -89,7 +89,7 @@ def carried_out(
     lifted : mapping of name to behaviour, optional
         The behaviours before effects on every member of a class are expanded; the individuals that these change are looked up, too.
     """
-    rules = Rules(problem, lookups, lifted)
+    rules = BehaviorReader(problem, lookups, lifted)
     check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
     if check.carried_out(plan.steps, 0, (), "the plan"):
         for fact, got in _unreached(problem, check.facts):
@@ -112,7 +112,7 @@ def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
 
 def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], state: State) -> dict[Symbol, str] | None:
     """Return the state after a behaviour, or None if its preconditions don't hold."""
-    rules = Rules(problem)
+    rules = BehaviorReader(problem)
     fits = rules.fits(behavior, tuple(arguments))
     changes = rules.changes(behavior, tuple(arguments), Facts(problem, state)) if fits else None
     if changes is None:
@@ -123,7 +123,7 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
 class _Check:
     """A plan during its execution on symbols: the present facts, and the faults."""
 
-    def __init__(self, problem: Problem, depth: int, rules: Rules) -> None:
+    def __init__(self, problem: Problem, depth: int, rules: BehaviorReader) -> None:
         self.problem = problem
         self.levels = problem.domain.levels
         self.rests = {name: kind.rest for name, kind in problem.domain.situations.items() if kind.rest is not None}
@@ -237,9 +237,9 @@ def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
 class Facts:
     """A state with a log of overwritten values, oldest first."""
 
-    def __init__(self, problem: Problem, state: State, rules: Rules | None = None) -> None:
+    def __init__(self, problem: Problem, state: State, rules: BehaviorReader | None = None) -> None:
         self.problem = problem
-        self.rules = rules or Rules(problem)
+        self.rules = rules or BehaviorReader(problem)
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
@@ -308,7 +308,7 @@ class Facts:
         return {cell: old for cell, old in before.items() if self._values[cell[0]][cell[1]] != old}
 
 
-class Rules:
+class BehaviorReader:
     """The preconditions and effects of one problem's behaviours, each read on demand.
 
     `lookups` and `lifted` are as for `carried_out`.
@@ -403,7 +403,7 @@ class Rules:
 class _Behavior:
     """The reading of a behaviour: positions of terms, preconditions, and effects with their conditions."""
 
-    def __init__(self, rules: Rules, behavior: Behavior) -> None:
+    def __init__(self, rules: BehaviorReader, behavior: Behavior) -> None:
         reading, bound = (
             ConditionReader(rules, [p.name for p in behavior.parameters]),
             {p.name for p in behavior.parameters},

@@ -12,7 +12,7 @@ from itertools import count
 
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Status
-from confab.planner.validation import Facts, Rules, validate
+from confab.planner.validation import BehaviorReader, Facts, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE, Problem, Symbol
 from worlds.writing import quantified
@@ -24,7 +24,7 @@ Successors = Callable[[Problem], Callable[[State], Iterable[tuple[float, State]]
 
 def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
     """Return the function from a state to its successors on the lowest level, as the checker reads behaviours."""
-    rules = Rules(problem)
+    rules = BehaviorReader(problem)
     steps = list(quantified(problem, problem.domain.levels[-1]))
 
     def successors(state: State) -> Iterable[tuple[float, State]]:

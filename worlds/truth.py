@@ -1,6 +1,6 @@
 """Reachable states, enumerated by a program that shares no code with the planner: the truth for random tables.
 
-It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.Rules`), and calls it only once
+It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.BehaviorReader`), and calls it only once
 for every
 combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which arrays
 of states descend.
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
 
 Codes = NDArray[np.uint64]
@@ -105,7 +105,7 @@ class StateSpace:
             for ordered in [replace(behavior, preconditions=tuple(sorted(behavior.preconditions, key=_breadth)))]
             for arguments in product(*(problem.classes.get(p.kind, ()) for p in behavior.parameters))
         ]
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.trees: list[Any] = [UNSEEN] * len(self.steps)
 
     def field(self, codes: Codes, symbol: int) -> NDArray[np.int64]:

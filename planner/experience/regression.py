@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 from confab.planner.hierarchical.operators import named
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import terms, walk
@@ -67,7 +67,7 @@ class Course:
     """
 
     def __init__(self, problem: Problem, steps: Sequence[Ground]) -> None:
-        self.problem, self.rules, self.facts = problem, Rules(problem), Facts(problem, problem.initial)
+        self.problem, self.rules, self.facts = problem, BehaviorReader(problem), Facts(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
         """The individuals that behaviours name; all others, including rest values, become roles."""

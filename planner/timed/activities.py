@@ -15,7 +15,7 @@ from typing import TypeAlias
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
-from confab.planner.validation import Cell, Facts, Rules
+from confab.planner.validation import BehaviorReader, Cell, Facts
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Behavior, Problem, Times
 
@@ -74,7 +74,7 @@ class Activity:
 class Noting(Facts):
     """Facts that record read accesses."""
 
-    def __init__(self, problem: Problem, rules: Rules) -> None:
+    def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
         self.reads: dict[Key, None] = {}
 
@@ -136,7 +136,7 @@ class _Course:
 
     def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
         self.problem, self.steps = problem, steps
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.facts = Noting(problem, self.rules)
         self.pieces: dict[str, Pieces] = {}
         self.resting = default_actors(problem)

@@ -15,7 +15,7 @@ from confab.planner.timed.network import Network
 from confab.planner.timed.order import Order
 from confab.planner.timed.pieces import duration_of, pieces_of
 from confab.planner.timed.schedules import Choices, TurnId
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.symbols import (
     ClassCondition,
@@ -43,7 +43,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
     every = _of_the_classes(problem, actors)
     if not any(every.values()):
         return Choices()
-    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     whole = _whole_steps(plan, order)
     of: dict[TurnId, tuple[int, ...]] = {}
     lasts: dict[tuple[TurnId, int], dict[int, int]] = {}
@@ -138,7 +138,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
 
 def _durations(
     problem: Problem,
-    rules: Rules,
+    rules: BehaviorReader,
     facts: Facts,
     order: Order,
     network: Network,

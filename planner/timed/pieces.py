@@ -17,7 +17,7 @@ from fractions import Fraction
 
 from confab.planner.checked_amounts import worth
 from confab.planner.checked_conditions import Arguments, ConditionReader, variables_of
-from confab.planner.validation import Facts, Rules
+from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
@@ -79,7 +79,7 @@ def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
     return tuple(variable for variable in behavior.variables if variable.name in named)
 
 
-def terms_at(rules: Rules, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
+def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
     """Return the individuals of the parameters of a behaviour's pieces when it begins."""
     behavior = pieces.whole
     if not pieces.fixed:
@@ -99,7 +99,7 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
         measured = (problem.times or Times()).measured
         return measured.get(behavior.name, SECOND)
     names = [term.name for term in (*behavior.parameters, *_fixed(behavior))]
-    reader = ConditionReader(Rules(problem), names)
+    reader = ConditionReader(BehaviorReader(problem), names)
     its = worth(stated, reader.key, problem.relations)
     seconds = its(facts.value, [*arguments, *list(reader.places)[len(arguments) :]])
     return None if seconds is None or seconds < 0 else seconds

@@ -15,7 +15,7 @@ from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.timed.plan import Slot, TimedPlan
-from confab.planner.validation import Cell, Facts, Fault, NewValue, Rules, validate
+from confab.planner.validation import BehaviorReader, Cell, Facts, Fault, NewValue, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
 from confab.reasoner.timing import only_during
@@ -56,7 +56,7 @@ class _Running:
 class _Watched(Facts):
     """Facts that record the cells, and the holders of values, that are read."""
 
-    def __init__(self, problem: Problem, rules: Rules) -> None:
+    def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
         self.cells: set[Cell] = set()
         self.values: set[tuple[str, str]] = set()
@@ -80,7 +80,7 @@ Effects = tuple[tuple[Cell, str], ...]
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
     """Return the changes of each step in sequence, and the step that changes each cell last."""
-    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     found, last = list[Effects](), dict[Cell, int]()
     for number, step in enumerate(steps):
         changes = rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or []
@@ -103,7 +103,7 @@ class _Clock:
         sequence: tuple[list[Effects], dict[Cell, int]] | None,
     ) -> None:
         self.problem, self.timed, self.separation, self.sequence = problem, timed, separation, sequence
-        self.rules = Rules(problem)
+        self.rules = BehaviorReader(problem)
         self.facts = _Watched(problem, self.rules)
         self.times = problem.times or Times()
         self.resting = default_actors(problem)

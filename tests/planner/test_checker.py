@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import Facts, Rules, stretches, successor, validate
+from confab.planner.validation import BehaviorReader, Facts, stretches, successor, validate
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.symbols import (
     FALSE,
@@ -176,16 +176,16 @@ def test_who_satisfies_conditions_is_told() -> None:
     problem = shelves()
     facts, kinds = Facts(problem, problem.initial), {"?c": "Cup", "?p": "Place"}
     conditions = [has("AT", "?c", "?p"), has("FULL", "?c", TRUE)]
-    assert Rules(problem).satisfied(conditions, {}, kinds, facts) == {"?c": "cup2", "?p": "low"}
-    assert Rules(problem).satisfied(conditions, {"?c": "cup1"}, kinds, facts) is None
-    assert Rules(problem).satisfied([ValueCondition("AT", ("?c",), "?p")], {"?c": "cup1"}, kinds, facts) == {
+    assert BehaviorReader(problem).satisfied(conditions, {}, kinds, facts) == {"?c": "cup2", "?p": "low"}
+    assert BehaviorReader(problem).satisfied(conditions, {"?c": "cup1"}, kinds, facts) is None
+    assert BehaviorReader(problem).satisfied([ValueCondition("AT", ("?c",), "?p")], {"?c": "cup1"}, kinds, facts) == {
         "?c": "cup1",
         "?p": "high",
     }
 
 
 def test_relations_are_found_by_what_stands_at_a_place() -> None:
-    rules = Rules(shelves())
+    rules = BehaviorReader(shelves())
     assert rules.related("above", 0) == {"high": [("high", "low")], "low": [("low", "floor")]}
     assert rules.related("above", 1) == {"low": [("high", "low")], "floor": [("low", "floor")]}
     assert rules.related("none", 0) == {}
@@ -242,7 +242,7 @@ def test_amounts_change_beside_values_and_a_price_is_worked_out() -> None:
     assert state is not None
     assert (state[Symbol("FILL", ("cup2",))], state[Symbol("FULL", ("cup2",))]) == ("1", FALSE)
     assert successor(problem, pour, ("cup3",), problem.initial) is None  # that would be less than nothing
-    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     assert rules.price(pour, ("cup2",), facts) == 3
     assert rules.price(pour, ("cup1",), facts) is None
     assert rules.price(replace(pour, name="FREE", price=None), ("cup2",), facts) is None
