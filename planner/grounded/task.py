@@ -20,6 +20,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from confab.planner.grounded.amounts import Amounts, Linear
 from confab.planner.grounded.derived import Derived
 from confab.planner.grounded.joins import Ints
@@ -47,6 +49,17 @@ class Grouped:
         """Return all lists."""
         items, starts = self.items.tolist(), self.starts.tolist()
         return [items[low:high] for low, high in itertools.pairwise(starts)]
+
+
+def grouped(owner: Ints, items: Ints, count: int) -> Grouped:
+    """Return the items of each owner in ascending order, each once."""
+    if len(owner):
+        order = np.lexsort((items, owner))
+        owner, items = owner[order], items[order]
+        new = np.ones(len(owner), bool)
+        new[1:] = (owner[1:] != owner[:-1]) | (items[1:] != items[:-1])
+        owner, items = owner[new], items[new]
+    return Grouped(np.searchsorted(owner, np.arange(count + 1)), items)
 
 
 @dataclass(frozen=True, eq=False)
