@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from time import process_time
 from typing import TypeAlias
 
-from benchmarks.execution import KINDS, Trial, after_intervention, random_intervention, rest_after, served
+from benchmarks.execution import KINDS, after_intervention, random_intervention, served
 from confab.planner.acting.repair import repair_or_replan
 from confab.planner.experience import advice
 from confab.planner.grounded.best_first import plan_level
@@ -33,6 +33,7 @@ from confab.planner.plan import Limits, Outcome
 from worlds.families import FAMILIES, family, random_table
 from worlds.hierarchies import hierarchy
 from worlds.lessons import taught
+from worlds.trials import Trial, rest_after
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = (4, 10, 16, 40)

@@ -10,7 +10,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from statistics import median
@@ -29,41 +29,19 @@ from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, disturbed, with_individual
 from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import compiled
-from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.plan_costs import cost_of
-from confab.planner.validation import successor
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 from confab.scene import Scene
+from worlds.trials import Trial, rest_after
 
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
 OUT = Path("confab-out/execution")
 SYMBOLIC, PHYSICAL = 1000, 50
 SYMBOLIC_ROBOTS, ROBOTS, EPISODES = 40, 3, 8
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A problem, a plan for it, and the situation before each primitive and in the end."""
-
-    problem: Problem
-    plan: Plan
-    states: tuple[State, ...]
-
-    @classmethod
-    def of(cls, problem: Problem) -> Trial:
-        """Plan, and go through the plan."""
-        found = hierarchical_plan(problem).plan
-        assert found is not None
-        states = [problem.initial]
-        for step in found.primitives:
-            after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, states[-1])
-            assert after is not None
-            states.append(after)
-        return cls(problem, found, tuple(states))
 
 
 def served(objects: int) -> Problem:
@@ -72,9 +50,6 @@ def served(objects: int) -> Problem:
         path = Path(folder) / f"served-{objects}.ttl"
         write_scene(path, "served", objects)
         return read(load(path)).problem
-
-
-# ------------------------------------------------------------------------------------------------------- interventions
 
 
 def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
@@ -131,9 +106,6 @@ def timed(intervention: Intervention, trial: Trial, position: int, inside: bool,
     if inside and intervention.of_world:
         return replace(intervention, at=second)
     return replace(intervention, after=trial.plan.primitives[position].path)
-
-
-# ------------------------------------------------------------------------------------------------------- the measurements
 
 
 def figure8() -> None:
@@ -286,19 +258,6 @@ def after_intervention(before: Problem, intervention: Intervention) -> Problem:
         goal=goal,
         initial=disturbed(before, before.initial, intervention) if intervention.of_world else before.initial,
     )
-
-
-def rest_after(plan: Plan, count: int) -> list[Step]:
-    """Return the rest of a plan after so many primitives."""
-    gone = {step.path for step in plan.primitives[:count]}
-
-    def left(steps: Sequence[Step]) -> list[Step]:
-        kept = [
-            replace(s, steps=tuple(left(s.steps))) if s.steps else s for s in steps if s.steps or s.path not in gone
-        ]
-        return [s for s in kept if s.steps or (s.path not in gone and s.level == plan.primitives[0].level)]
-
-    return left(plan.steps)
 
 
 def learning() -> None:

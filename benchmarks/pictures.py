@@ -13,7 +13,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import confab
-from benchmarks.browser import Browser
 from confab.history import history_html, new_folder, runs
 from confab.page.data import page_data
 from confab.page.frozen import write_page
@@ -21,6 +20,7 @@ from confab.planner.acting.episode import Event
 from confab.reasoner.files import write_whole
 from confab.running import Job, run
 from confab.serving import serving
+from worlds.browser import Browser
 
 SIZES = (1280, 420)
 """Widths of the window in pixels."""

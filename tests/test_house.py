@@ -223,6 +223,27 @@ def test_benchmarks_and_shared_worlds_import_no_tests() -> None:
     assert wrong == []
 
 
+def foreign_benchmarks(root: Path) -> list[str]:
+    """Return the imports of benchmarks by tests, except by the test of that benchmark, which has its name."""
+    found = []
+    for path in sorted((root / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "benchmarks":
+                module = node.module or ""
+                names = [module.partition(".")[2]] if "." in module else [alias.name for alias in node.names]
+                found += [f"{path.relative_to(root)} imports {name}" for name in names if path.stem != f"test_{name}"]
+    return found
+
+
+def test_a_benchmark_is_imported_by_its_own_test_only(tmp_path: Path) -> None:
+    assert foreign_benchmarks(ROOT) == []
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_load.py").write_text("from benchmarks.load import measured\n")
+    assert foreign_benchmarks(tmp_path) == []
+    (tmp_path / "tests" / "test_page.py").write_text("def f():\n    from benchmarks import load\n")
+    assert foreign_benchmarks(tmp_path) == ["tests/test_page.py imports load"]
+
+
 def run_elsewhere(code: str, directory: Path) -> object:
     """Run `code` in a fresh interpreter outside the repository; return the JSON it prints."""
     done = subprocess.run([sys.executable, "-c", code], cwd=directory, capture_output=True, text=True)

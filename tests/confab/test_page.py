@@ -15,7 +15,6 @@ import pytest
 from click.testing import CliRunner
 
 import confab
-from benchmarks.browser import CHROMIUM, Browser
 from confab.cli import app
 from confab.memory import Memory
 from confab.page.data import page_data
@@ -32,6 +31,7 @@ from confab.sim.picture import view_of
 from confab.sim.verdict import Verdict
 from confab.sim.verify import Rollout, StepReport
 from confab.table import Table
+from worlds.browser import CHROMIUM, Browser
 
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)")

@@ -9,7 +9,6 @@ from time import process_time
 import pytest
 
 import confab
-from benchmarks.following import scene
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.planner import plan as default_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -19,6 +18,7 @@ from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
 from worlds.agreement import cheapest
+from worlds.cups import scene
 from worlds.hierarchies import hierarchy
 
 LEFT = (700316, 700359, 700680, 701211, 701609)

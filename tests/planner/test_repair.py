@@ -8,7 +8,6 @@ from time import sleep
 
 import pytest
 
-from benchmarks.execution import Trial, rest_after
 from confab.planner.acting.repair import (
     CLOSE,
     changed_individuals,
@@ -27,6 +26,7 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, State, Symbol
 from worlds.families import family, tabletop
+from worlds.trials import Trial, rest_after
 
 
 @cache

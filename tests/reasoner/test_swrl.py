@@ -6,7 +6,6 @@ from random import Random
 
 import pytest
 
-from benchmarks.entailed import NAMES, compared, derived, first_problem, in_state
 from confab.planner.solve import Request, solve
 from confab.planner.validation import Facts, validate
 from confab.reasoner.graph.knowledge import KnowledgeError, load
@@ -15,6 +14,7 @@ from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
 from tests.planner import naive
+from worlds.derivations import NAMES, compared, derived, first_problem, in_state
 from worlds.entailed import CONCLUDED, DEFINED, PROPERTIES, domain, implies, random_state
 from worlds.owlapi import jars, jvm
 

@@ -8,6 +8,7 @@ import pybullet
 import pytest
 
 import confab
+from benchmarks import solids
 from confab.reasoner.embodiment.solid_checks import through_a_solid
 from confab.reasoner.embodiment.values import Embodiment, Link, Mechanism, Part
 from confab.reasoner.validation.validate import validate
@@ -117,3 +118,16 @@ def test_a_drawer_does_not_slide_through_a_shut_door() -> None:
             world.run(240)
             value = world.links["tray"].values()["tray"]
             assert (value > 0.1) == opened, value
+
+
+def test_mechanisms_that_have_been_made_wrong_are_refused_and_harmless_changes_are_not() -> None:
+    wrong = harmless = 0
+    for mutant in solids.mutants(seed=7):
+        if mutant.depth >= solids.WRONG:
+            assert mutant.refused, f"{mutant.scene}: {mutant.change}, {mutant.depth * 1000:.1f} mm"
+            wrong += 1
+        elif mutant.depth <= solids.HARMLESS:
+            assert not mutant.refused, f"{mutant.scene}: {mutant.change}"
+            harmless += 1
+        if wrong >= 10 and harmless >= 5:
+            break
