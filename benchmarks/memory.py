@@ -33,7 +33,8 @@ from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Less
 from confab.reasoner.memory.experience_file import load, save
 from confab.reasoner.names import Names
 from confab.reasoner.pddl.importing import imported
-from confab.reasoner.pddl.syntax import PddlError, parse_files
+from confab.reasoner.pddl.syntax import parse_files
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import Problem
 from worlds.lessons import backwards, problem, taught
 

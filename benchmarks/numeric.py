@@ -22,7 +22,8 @@ from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.language import DomainError
 from confab.reasoner.pddl.importing import imported
-from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.pddl.words import PddlError
 from worlds.numbers import jugs, rounds
 
 MODES = ("guarded", "optimal", "paper")

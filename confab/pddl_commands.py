@@ -18,8 +18,9 @@ from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
 from confab.reasoner.pddl.importing import imported
-from confab.reasoner.pddl.syntax import PddlError, parse_files
+from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import GroundBehavior, Problem
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]

@@ -322,7 +322,8 @@ class Judge:
         """Export a level and import it; as a problem of its own it has to be solvable if the level is."""
         from confab.reasoner.pddl.exporting import to_pddl
         from confab.reasoner.pddl.importing import imported
-        from confab.reasoner.pddl.syntax import PddlError, parse
+        from confab.reasoner.pddl.syntax import parse
+        from confab.reasoner.pddl.words import PddlError
 
         mode = f"export {level}"
         exported = self.call(mode, lambda: to_pddl(read.problem, level))

@@ -8,7 +8,7 @@ from itertools import product
 from math import prod
 from typing import TypeAlias
 
-from confab.reasoner.pddl.syntax import CHANGES, Typed, either
+from confab.reasoner.pddl.declarations import CHANGES, Typed, either
 from confab.reasoner.pddl.words import Form, Word
 
 Atom = tuple[str, ...]

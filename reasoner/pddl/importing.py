@@ -34,6 +34,7 @@ from math import prod
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
 from confab.reasoner.derivation import circles
+from confab.reasoner.pddl.declarations import COMPARISONS, Pddl, Typed
 from confab.reasoner.pddl.forms import (
     Atom,
     Effect,
@@ -49,9 +50,8 @@ from confab.reasoner.pddl.forms import (
     words_of,
 )
 from confab.reasoner.pddl.invariants import Invariants, Part
-from confab.reasoner.pddl.syntax import COMPARISONS, Pddl, PddlError, Typed, is_number
 from confab.reasoner.pddl.timing import Variables, happenings, snapped, timing
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.words import Form, PddlError, Word, is_number
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,

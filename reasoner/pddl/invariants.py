@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
+from confab.reasoner.pddl.declarations import Action, Pddl
 from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_of
-from confab.reasoner.pddl.syntax import Action, Pddl
 from confab.reasoner.pddl.words import Form
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}

@@ -17,14 +17,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
+from confab.reasoner.pddl.declarations import CHANGES, COMPARISONS, Action, Axiom, Pddl, Typed, either
 from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, Word, form_of, is_number
 
-MOST_BYTES = 32 * 2**20
-TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
-"""A variable begins at its '?', as in (aircraft?a), a type at its name, as in (?b -boat)."""
-COMPARISONS = ("<", "<=", "=", ">=", ">")
-CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 SECTIONS = {
     ":constraints": "trajectory constraints",
     ":process": "processes",
@@ -33,87 +29,6 @@ SECTIONS = {
     ":method": "HDDL methods",
     ":htn": "HDDL task networks",
 }
-
-
-class PddlError(ValueError):
-    """The PDDL can't be used; one line says file, line and column, what is wrong and what is expected."""
-
-
-@dataclass(frozen=True)
-class Typed:
-    """A name (of a type, an object or, with its question mark, a variable) and its type."""
-
-    name: str
-    type: str
-    place: Word
-
-
-@dataclass(frozen=True)
-class Action:
-    """An action as parsed; `precondition` and `effect` are forms whose words have been checked.
-
-    Those of a durative action are its conditions and effects as a whole (`confab.reasoner.pddl.durative`); `durative` has the
-    parts.
-    """
-
-    name: str
-    parameters: tuple[Typed, ...]
-    precondition: Form | None
-    effect: Form | None
-    place: Word
-    durative: Durative | None = None
-
-
-@dataclass(frozen=True)
-class Axiom:
-    """A derived predicate with variables and its checked condition."""
-
-    predicate: str
-    parameters: tuple[Typed, ...]
-    condition: Form
-
-
-@dataclass
-class Pddl:
-    """A domain with a problem, checked: every type, predicate, function, object and variable is declared, every arity right."""
-
-    domain: str = "domain"
-    problem: str = "problem"
-    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # and the types right above
-    predicates: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
-    functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
-    objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
-    actions: dict[str, Action] = field(default_factory=dict)
-    axioms: list[Axiom] = field(default_factory=list)
-    initial: list[tuple[str, ...]] = field(default_factory=list)
-    numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
-    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # facts that begin or end to hold
-    goal: Form | None = None
-    minimize: Form | None = None  # the metric
-
-    def above(self, name: str) -> Sequence[str]:
-        """Return a type and its supertypes, from the nearest to ``object``."""
-        found = {name: None}
-        layer = [name]
-        while layer:
-            layer = [kind for lower in layer for kind in self.types[lower] if kind not in found and kind != "object"]
-            found |= dict.fromkeys(layer)
-        return tuple(found) if name == "object" else (*found, "object")
-
-    def of_type(self, name: str) -> tuple[str, ...]:
-        """Return the objects of a type."""
-        kinds = {kind for kind in self.types if name in self.above(kind)}
-        return tuple(o for o, t in self.objects.items() if t in kinds)
-
-
-def either(kinds: Sequence[str]) -> str:
-    """Return the name of the type above some types.
-
-    >>> either(["person", "aircraft"])
-    'either aircraft person'
-    """
-    kinds = sorted(set(kinds))
-    return "object" if "object" in kinds else kinds[0] if len(kinds) == 1 else f"either {' '.join(kinds)}"
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
@@ -146,46 +61,9 @@ def parse(domain: str, problem: str, domain_file: str = "domain", problem_file: 
     (['a'], {'o': 'object'})
     """
     found = Pddl()
-    _Reader(domain_file, found).domain(_form(domain, domain_file))
-    _Reader(problem_file, found, {axiom.predicate for axiom in found.axioms}).problem(_form(problem, problem_file))
+    _Reader(domain_file, found).domain(form_of(domain, domain_file))
+    _Reader(problem_file, found, {axiom.predicate for axiom in found.axioms}).problem(form_of(problem, problem_file))
     return found
-
-
-def _form(text: str, file: str) -> Form:
-    """Return the only form in a text."""
-    stack: list[tuple[list[Word | Form], int, int]] = []
-    line, start = 1, 0
-    done: Form | None = None
-    for match in TOKEN.finditer(text):
-        token, column = match.group(), match.start() - start + 1
-        if token == "(":
-            if done is not None:
-                raise PddlError(f"{file}:{line}:{column}: text behind the last ')'")
-            stack.append(([], line, column))
-        elif token == ")":
-            if not stack:
-                raise PddlError(f"{file}:{line}:{column}: ')' without '('")
-            items, row, col = stack.pop()
-            form = Form(tuple(items), row, col)
-            if stack:
-                stack[-1][0].append(form)
-            else:
-                done = form
-        elif token[0] == ";" or token.isspace():
-            newlines = token.count("\n")
-            if newlines:
-                line += newlines
-                start = match.start() + token.rindex("\n") + 1
-        elif not stack:
-            raise PddlError(f"{file}:{line}:{column}: wanted '(define …', got '{token[:40]}'")
-        else:
-            stack[-1][0].append(Word(token.lower(), line, column))
-    if stack:
-        _, row, col = stack[-1]
-        raise PddlError(f"{file}:{row}:{col}: this '(' is never closed")
-    if done is None:
-        raise PddlError(f"{file}:1:1: wanted '(define …', the file is empty")
-    return done
 
 
 @dataclass
@@ -615,8 +493,3 @@ class _Reader:
             raise self.fail(item, "wanted (at TIME (predicate …)) or (at TIME (not (predicate …))), the time from 0 on")
         self.stated(inner, "stated")
         self.pddl.timed.append((seconds, self.atom(inner, {}), true))
-
-
-def is_number(item: Word | Form) -> bool:
-    """Return whether a word is a number."""
-    return isinstance(item, Word) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None

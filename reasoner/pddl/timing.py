@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import Protocol
 
 from confab.reasoner.amounts import Expression
+from confab.reasoner.pddl.declarations import Action, Pddl
 from confab.reasoner.pddl.durative import Durative
 from confab.reasoner.pddl.forms import Effect, NumericEffect, conjuncts, effects_of, numeric_of, words_of
-from confab.reasoner.pddl.syntax import Action, Pddl
 from confab.reasoner.pddl.words import Form, Word
 from confab.reasoner.symbols import (
     FALSE,

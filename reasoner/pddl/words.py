@@ -1,8 +1,13 @@
-"""The words and lists that a PDDL text consists of, each with its place."""
+"""A text of PDDL as nested lists of words, each with its place."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+
+MOST_BYTES = 32 * 2**20
+TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
+"""A variable begins at its '?', as in (aircraft?a), a type at its name, as in (?b -boat)."""
 
 
 @dataclass(frozen=True)
@@ -26,3 +31,49 @@ class Form:
     def head(self) -> str:
         """The first word; empty if there is none."""
         return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
+
+
+class PddlError(ValueError):
+    """The PDDL can't be used; one line says file, line and column, what is wrong and what is expected."""
+
+
+def form_of(text: str, file: str) -> Form:
+    """Return the only form in a text."""
+    stack: list[tuple[list[Word | Form], int, int]] = []
+    line, start = 1, 0
+    done: Form | None = None
+    for match in TOKEN.finditer(text):
+        token, column = match.group(), match.start() - start + 1
+        if token == "(":
+            if done is not None:
+                raise PddlError(f"{file}:{line}:{column}: text behind the last ')'")
+            stack.append(([], line, column))
+        elif token == ")":
+            if not stack:
+                raise PddlError(f"{file}:{line}:{column}: ')' without '('")
+            items, row, col = stack.pop()
+            form = Form(tuple(items), row, col)
+            if stack:
+                stack[-1][0].append(form)
+            else:
+                done = form
+        elif token[0] == ";" or token.isspace():
+            newlines = token.count("\n")
+            if newlines:
+                line += newlines
+                start = match.start() + token.rindex("\n") + 1
+        elif not stack:
+            raise PddlError(f"{file}:{line}:{column}: wanted '(define …', got '{token[:40]}'")
+        else:
+            stack[-1][0].append(Word(token.lower(), line, column))
+    if stack:
+        _, row, col = stack[-1]
+        raise PddlError(f"{file}:{row}:{col}: this '(' is never closed")
+    if done is None:
+        raise PddlError(f"{file}:1:1: wanted '(define …', the file is empty")
+    return done
+
+
+def is_number(item: Word | Form) -> bool:
+    """Return whether a word is a number."""
+    return isinstance(item, Word) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None

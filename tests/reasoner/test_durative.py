@@ -14,8 +14,9 @@ from confab.planner.timed.plan import TimedPlan
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import Imported, imported
-from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import Span
 from confab.reasoner.timing import only_during
 

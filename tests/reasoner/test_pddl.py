@@ -21,8 +21,9 @@ from confab.reasoner.amounts import Measure
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
 from confab.reasoner.pddl.importing import Imported, imported
-from confab.reasoner.pddl.syntax import PddlError, parse, parse_files
+from confab.reasoner.pddl.syntax import parse, parse_files
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem
 from confab.reasoner.validation.validate import validate

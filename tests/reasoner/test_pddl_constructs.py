@@ -13,8 +13,9 @@ from confab.reasoner.amounts import Measure
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
-from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.reading.problem import read
 from confab.reasoner.validation.validate import validate
 from tests.reasoner.test_pddl import assert_same_behaviour, same

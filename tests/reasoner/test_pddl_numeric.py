@@ -11,8 +11,9 @@ from confab.planner.solve import Request, solve
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.exporting import plan_of, to_pddl
 from confab.reasoner.pddl.importing import Imported, imported
-from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem
 
