@@ -273,7 +273,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     for symbol, value in sorted(problem.initial.items()):
         perceived = problem.domain.situations[symbol.situation].perceived
         if perceived is not None and perceived.exclusive:
-            continue  # an error: `confab.reasoner.validation.situations`
+            continue  # an error: `confab.reasoner.validation.contradictions`
         if len(symbol.arguments) == 1 and asks.get((symbol.situation, value)):
             holders[symbol.situation, value].append(symbol.arguments[0])
     for (situation, value), individuals in holders.items():

@@ -1,4 +1,4 @@
-"""Rules on conditions that exclude each other, and on conditions that are always true or always false."""
+"""Rules on conditions that exclude each other or never change, and on states that physics does not allow."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from confab.reasoner.amounts import COMPARING, Amount
 from confab.reasoner.language import groups
+from confab.reasoner.possible import against_physics
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
     FALSE,
@@ -234,3 +235,23 @@ def _below(kind: str, other: str, problem: Problem) -> bool:
         waiting += (more := {*problem.parents.get(waiting.pop(), ())} - found)
         found |= more
     return other in found
+
+
+def impossible_situations(case: Case) -> Iterator[Fault]:
+    """Find impossible initial situations, and goals that can't hold together."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    found = set()
+    for fault in against_physics(problem, problem.initial):
+        found.add(fault.what)
+        yield names.iri(fault.symbol.arguments[0]), fault.what, fault.why, fault.remedy
+    levels = problem.domain.levels
+    for fault in against_physics(problem, problem.goal_on(levels[-1]) if levels else problem.goal):
+        if fault.what not in found:
+            yield (
+                names.iri(fault.symbol.arguments[0]),
+                f"the goals can't hold together: {fault.what}",
+                fault.why,
+                "want another value of one of them",
+            )

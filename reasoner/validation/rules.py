@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, situations, terms
+from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, terms
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
@@ -21,7 +21,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "unreachable": behaviors.unreachable_behaviors,
     "value-gap": behaviors.gaps_of_values,
     "crowded": behaviors.crowded_places,
-    "impossible-situation": situations.impossible_situations,
+    "impossible-situation": contradictions.impossible_situations,
     "not-exclusive": values_not_kept_exclusive,
     "definition-without-effect": definitions.definitions_without_effect,
     "axiom-not-watched": definitions.axioms_not_watched,

@@ -37,9 +37,9 @@ from confab.reasoner.names import local_name
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.updates.compiling import Fault
 from confab.reasoner.validation.case import Case
+from confab.reasoner.validation.contradictions import impossible_situations
 from confab.reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
 from confab.reasoner.validation.rules import REMARKS, RULES, WARNINGS
-from confab.reasoner.validation.situations import impossible_situations
 from confab.reasoner.validation.terms import misread
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
