@@ -29,7 +29,7 @@ from confab.planner.hierarchical.search_budget import (
     SearchBudget,
     scopes,
 )
-from confab.planner.hierarchical.unsolvability import PAIRS, TEST, impossible, looked_at, proved
+from confab.planner.hierarchical.unsolvability import FIRST_TESTS, PAIRS, TEST, impossible, looked_at, proved
 from confab.planner.plan import Reason
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.symbols import Condition
@@ -67,7 +67,6 @@ class Agenda:
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
-    _doubted: bool = False
     _lowest: Task | Reason | None = None
     _looked: int = 0
     _tested: int = 1
@@ -167,7 +166,7 @@ class Agenda:
         """Achieve one of the sleeping goals with a larger budget, or on a lower level; return whether that succeeded."""
         call = self.call
         if not self.solvable:
-            self._check_cheaply()
+            self.check_unsolvable()
         if call.advice is not None and self.singly(call.program.levels[0], BY_RULES):
             return True
         for level in call.program.levels:
@@ -281,36 +280,42 @@ class Agenda:
 
     # ------------------------------------------------------------------------------------------------------------ proofs
 
-    def _check_cheaply(self) -> None:
-        """Raise `UnsolvableError` if a cheap test shows that there is no plan."""
-        if not self._doubted:
-            self._doubted = True
-            if proof := impossible(self.call.problem, deadline=self.call.space.deadline):
-                raise proof
-
     def check_unsolvable(self) -> None:
-        """Raise `UnsolvableError` if there is no plan and the lowest level is small enough to examine its states cheaply."""
+        """Raise `UnsolvableError` if a proof is found by about as much work as the searches have taken."""
         call = self.call
-        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
-            self._prove()
+        if not self.solvable:
+            self._certify()
+            if FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
+                self._examine()
 
     def _prove(self) -> None:
-        """Raise `UnsolvableError` if the lowest level shows that there is no plan.
+        """Raise `UnsolvableError` if a proof is found, the lowest level grounded for it."""
+        self._certify()
+        self._examine()
 
-        What the steps are expected to find is searched first, with at most the work of one small scope.
-        """
+    def _certify(self) -> None:
+        """Raise `UnsolvableError` if there is a certificate; it is looked for again when the effort has doubled."""
         call = self.call
-        if call.advice is not None and call.advice.expects and call.space.worked < WIDER.work:
-            return
-        tests = min(call.space.effort // TEST, PAIRS)
-        if tests >= 2 * self._tested:
+        tests = max(FIRST_TESTS, min(call.space.effort // TEST, PAIRS))
+        if tests >= 2 * self._tested and not self._expects_a_plan():
             self._tested = tests
             if proof := impossible(call.problem, tests, call.space.deadline):
                 raise proof
+
+    def _examine(self) -> None:
+        """Raise `UnsolvableError` if the relaxed lowest level, or all its states, show that there is no plan."""
+        call = self.call
+        if self._expects_a_plan():
+            return
         if self._lowest is None:
             self._lowest = proved(call.problem, call.program.levels[-1], call.space.deadline)
         if not isinstance(self._lowest, Reason):
             self._looked = looked_at(self._lowest, call.space, self._looked)
+
+    def _expects_a_plan(self) -> bool:
+        """Return whether advice promises a plan, and the searches have taken less work than one small scope."""
+        advice = self.call.advice
+        return advice is not None and advice.expects and self.call.space.worked < WIDER.work
 
 
 # ------------------------------------------------------------------------------------------------------- order of goals

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """Work of examining all states that is allowed before any search, in states times relaxed operators."""
-AT_ONCE, PAIRS = 20_000, 500_000
-"""Maximum number of tests of conditions that count as cheap; and maximum number for a certificate after searches have failed."""
-TEST = 2
-"""Effort of a test, about in microseconds."""
+FIRST_TESTS, AT_ONCE, PAIRS = 2_000, 20_000, 500_000
+"""Maximum number of tests of conditions for a certificate: before a search, in the paper's mode, and after searches have failed."""
+TEST = 8
+"""Work of a test, about in microseconds."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """Maximum size of a join of relaxed reachability (some 200 MB), and of the changes of a level that is grounded (600 MB)."""
 
