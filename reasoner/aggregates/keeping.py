@@ -144,8 +144,8 @@ class _Keeping:
             return _Candidate(effect, named, value, before)
         own = zip(effect.arguments, named, strict=True)
         named = tuple(name if self.after.fixed(argument) else sought for argument, name in own)
-        if isinstance(effect, ValueEffect) and not self.after.fixed(effect.value):
-            value = None
+        if before or (isinstance(effect, ValueEffect) and not self.after.fixed(effect.value)):
+            value = None  # it depends on the individual that the effect is about
         return _Candidate(replace(effect, each=None, when=()), named, value, before)
 
     def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:

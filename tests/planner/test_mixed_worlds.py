@@ -109,3 +109,10 @@ def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path)
 @pytest.mark.parametrize("seed", [202_002_347, 202_002_963, 202_003_161, 202_004_228])
 def test_no_level_is_left_to_bring_the_beginning_to_rest_where_levels_are_strict(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed, 0.0), tmp_path, every=True).judged().complaints
+
+
+def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
+    """An effect on all of a class takes values away that a condition of the count seeks: no mode refuses the world."""
+    its = Judge(mixed(301_000_072, 0.0), tmp_path, every=True).judged()
+    assert not its.complaints
+    assert "refused" not in {its.status[mode] for mode in ("guarded", "optimal", "paper")}
