@@ -1,4 +1,4 @@
-"""Certificates of "unsolvable": how many answers carry one, of which kind, and how long checking takes beside planning.
+"""Certificates of "unsolvable": their number and kind, and the time of checking compared with planning.
 
 CERTIFICATES_FROM and CERTIFICATES_COUNT choose other worlds.
 """

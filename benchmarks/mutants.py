@@ -56,7 +56,7 @@ TESTS: dict[str, tuple[str, ...]] = {
 }
 """The fast tests of each module, those that detect most faults first."""
 SAME = ("Eq_Is", "Eq_IsNot")
-"""Changes that are no faults: names are interned, so that equal ones are mostly identical."""
+"""Changes without effect: names are interned, so that equal ones are mostly identical."""
 Fault = tuple[str, int]
 """An operator of cosmic-ray, and at which of the places that it fits."""
 

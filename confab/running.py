@@ -130,7 +130,7 @@ def run(job: Job) -> int:
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
     """Return the first plan that physics doesn't refute, with the refutations found and the verdict of physics.
 
-    What motion planning refutes is known to the next plan, and is saved if there is one.
+    Refutations by motion planning apply to the next plan, and are saved if there is one.
     """
     report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):

@@ -1,4 +1,4 @@
-"""What remains to be done: the steps, the goals that are postponed, and why the steps are to be checked again."""
+"""The agenda of an episode: remaining steps, postponed goals, and requests to check the steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often an episode tries again: the limits, and what was tried."""
+"""Retries in an episode: their limits, and the attempts so far."""
 
 from __future__ import annotations
 

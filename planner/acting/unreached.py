@@ -1,4 +1,4 @@
-"""Why a goal is not reached: what blocks it, what was discovered, and which failure is to blame."""
+"""Reasons for unreached goals: blocking objects, discoveries, and failures."""
 
 from __future__ import annotations
 
