@@ -1,15 +1,15 @@
-"""Planning with experience, which may lead but not spoil.
+"""Planning with experience: rules propose steps, and can cost only a bounded share of the effort.
 
 =========  ====================================================================================================
-guarded    rules lead for those kinds of goals that they have reached, and as often as not
-leading    rules lead whatever their record is
-strict     rules don't lead; their record is kept all the same, wherever an episode is learned
+guarded    rules are used for kinds of goals that they have achieved at least as often as not
+leading    rules are used regardless of their record
+strict     rules aren't used; their record is still updated when an episode is learned
 =========  ====================================================================================================
 
-Rules act inside of goals in series and of refinements, on every level, before either is searched
+Rules are used for goals and for refinements, on every level, before these are searched
 (`confab.planner.experience.following`).
-That there is no plan is for search to prove. Where rules don't lead, planning is as without memory: memory that isn't trusted, has
-reached no such goals yet, or knows none of them.
+Only the search can prove that there is no plan. Planning is as without memory if the memory isn't trusted, has no rules for the
+goals, or hasn't achieved such goals yet.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from confab.reasoner.symbols import Problem
 
 @dataclass
 class Memory:
-    """Experience as the planner takes it.
+    """Experience in the form that the planner uses.
 
     Parameters
     ----------
     experience : Experience
     trusted : bool
-        Whether it may lead.
+        Whether its rules may be used.
     """
 
     experience: Experience
@@ -51,25 +51,25 @@ class Memory:
 
     @cached_property
     def orders(self) -> list[Order]:
-        """The orders that hold."""
+        """The orders that held in nearly all cases."""
         return usable(self.experience)
 
     @cached_property
     def totals(self) -> Counts:
-        """What was counted."""
+        """The counts of all replicas together."""
         return self.experience.totals()
 
     @cached_property
     def judge(self) -> Judge:
-        """What says how cogent a rule is."""
+        """The scorer of rules."""
         return Judge(self.experience)
 
     def record(self, rule: Rule) -> Tally:
-        """Return how often rules for such goals of a task reached them, and how often not."""
+        """Return how often rules achieved goals of this kind, and how often not."""
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
 
     def helps(self, rule: Rule) -> bool:
-        """Whether rules for such goals have reached some, and as often as not."""
+        """Whether rules have achieved goals of this kind at least as often as not."""
         return self.record(rule).chosen >= max(1, self.record(rule).failed)
 
     def harms(self, rule: Rule) -> bool:
@@ -77,7 +77,7 @@ class Memory:
         return self.record(rule).chosen < self.record(rule).failed
 
     def leads(self, problem: Problem, mode: str) -> bool:
-        """Whether rules may lead: those for some open goal, if that is what they have reached before, or what is asked."""
+        """Whether rules may be used: some open goal has rules with a good record, or the mode requires it."""
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
         return (
             mode != "strict"
@@ -93,7 +93,7 @@ class Memory:
     def guide(
         self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
     ) -> Guide:
-        """Return rules bound to a call, with what says which of them is cogent, and whom to take; `joins` as for `Guide`."""
+        """Return the rules bound to a call, with scores for rules and for individuals in roles; `joins` as for `Guide`."""
         view = cache(lambda: View(call.program, call.table, call.goal))
 
         def score(c: Candidate) -> float:
@@ -111,7 +111,7 @@ class Memory:
         return Guide(call, [*rules, *also], self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
-        """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
+        """Return the compiled problem, with the methods that succeeded more often than not as the first refinements."""
         methods = {name: list(known) for name, known in using.methods.items()}
         for name, one in sorted(self.experience.said.items()):
             if isinstance(one, Method) and name not in self.experience.disabled and self._fits(one, using):
@@ -123,7 +123,7 @@ class Memory:
         return replace(using, methods=methods)
 
     def _fits(self, method: Method, using: Compiled) -> bool:
-        """Whether a domain has the behaviours of a method, with as many roles."""
+        """Whether a domain has the behaviours of a method, with the same numbers of roles."""
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)
         if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:
@@ -155,14 +155,14 @@ def plan(
     problem : Problem
     memory : Memory, optional
     mode : str
-        ``strict``, ``guarded`` or ``leading``: how far experience may lead.
+        ``strict``, ``guarded`` or ``leading``: the influence of experience.
     limits, using, improve, leave_levels
         As for `confab.planner.hierarchical.planner.plan`.
 
     Returns
     -------
     Outcome
-        `search` counts the steps of rules that were tried as expansions.
+        `search` counts the steps tried by rules as expansions.
     """
     if memory is None or not memory.leads(problem, mode):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)

@@ -1,10 +1,10 @@
-"""What an episode teaches: rules, the order of goals, methods, and how good what was known before proved.
+"""Lessons from an episode: rules, orders of goals, methods, and a record of the rules known before.
 
-steps      of a plan, each with its refinement
-before     what is known already is tried first: which goals it reaches by itself is its record, for each kind of goal
+steps      the steps of a plan, each with its refinement
+before     known rules are tried first: the goals that they achieve without search are their record, per kind of goal
 regress    the plan becomes rules (`confab.planner.experience.regression`)
-replay     where rules apply, that which the plan did was chosen and the others passed over, with the facts of each
-orders     a teacher plans for the same goals in other orders, too: only what is the same in all of them must be so
+replay     where rules apply, the plan's step counts as chosen and the others as passed over, with the facts of each
+orders     teaching also plans the goals in other orders: only orders common to all plans are learned
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from confab.reasoner.memory.experience import (
 from confab.reasoner.symbols import Problem, Symbol
 
 SINGLE, OTHERS = 6, 2
-"""So many goals are taught one by one, and so many other orders of all."""
+"""Number of goals taught one by one, and number of other orders of all goals."""
 SHORT = Limits(expansions=20_000, seconds=20.0)
-"""Of planning one lesson."""
+"""Limits of planning one lesson."""
 CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
-"""What one case adds."""
+"""Counts of one case."""
 
 
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:
@@ -54,7 +54,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
     experience : Experience
     problem : Problem
     plan : Plan, optional
-        Made if left out.
+        Planned if left out.
     """
     using = compiled(problem)
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
@@ -67,7 +67,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
             lesson += shows(variant, found, using)
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
-    lesson.personal.clear()  # whom a planner took is no preference
+    lesson.personal.clear()  # choices of the planner are no preferences
     experience.learn(shown(experience, lesson, problem, using))
     return plan
 
@@ -91,23 +91,23 @@ def live(
     failed: tuple[int, ...] | None = None,
     vain: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
 ) -> None:
-    """Learn from a plan that was carried out.
+    """Learn from an executed plan.
 
     Parameters
     ----------
     experience : Experience
     problem : Problem
-        Its initial state is where the plan began.
+        Its initial state is the state before the plan.
     plan : Plan
     failed : path of a step, optional
-        It failed; what comes after it wasn't tried.
+        The step that failed; later steps weren't tried.
     vain : iterable of (problem, step, path)
-        Other steps of the most abstract level that failed, each with the state in which it was begun, and what of it failed.
+        Other steps of the most abstract level that failed, each with its problem, and the path of its failed sub-step.
 
     Raises
     ------
     LearningError
-        A step's preconditions don't hold where it is done; nothing is learned then.
+        A step's preconditions don't hold in the state before it; the experience is unchanged.
     """
     using = compiled(problem)
     lesson = tried(experience, problem, using) if failed is None and plan.steps else Lesson()
@@ -125,7 +125,7 @@ def grounds(steps: Sequence[Step]) -> list[Ground]:
 
 
 def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Change]]:
-    """Return whom a behaviour binds now, and what it changes.
+    """Return the individuals of a behaviour's variables in the present state, and its changes.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Chang
 
 
 def on_one_level(steps: Sequence[Step]) -> list[Step]:
-    """Return steps, in the place of those above the lowest level their refinement: they don't see all that it changes."""
+    """Return steps with those above the lowest level replaced by their refinements, which change symbols unseen above."""
     found, lowest = list(steps), max((step.level for step in steps), default=0)
     while any(step.level < lowest for step in found):
         found = [inner for step in found for inner in (step.steps if step.level < lowest else (step,))]
@@ -148,7 +148,7 @@ def on_one_level(steps: Sequence[Step]) -> list[Step]:
 
 
 def carry_out(call: Call, step: Step) -> None:
-    """Do a step by its refinement, which changes what the step doesn't see."""
+    """Apply a step by its refinement, including changes that the step's level doesn't see."""
     for inner in step.steps:
         carry_out(call, inner)
     if not step.steps:
@@ -156,7 +156,7 @@ def carry_out(call: Call, step: Step) -> None:
 
 
 def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
-    """Return a lesson with what it shows on its own problem, where nothing was known before: that is all that it has shown."""
+    """Return a lesson with its record on its own problem if there were no rules before."""
     if not rules_in(experience):
         alone = Experience("alone")
         alone.learn(lesson)
@@ -165,14 +165,14 @@ def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compi
 
 
 def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
-    """Return how good what is known proves on a problem: which of its goals it reaches by itself."""
+    """Return the record of the known rules on a problem: the goals that they achieve without search."""
     memory = Memory(experience)
     call = Call(problem, memory.warmed(using), None, SHORT.expansions)
     guide = memory.guide(call)
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)
-    check("learning")  # without time for its rules nothing is shown
+    check("learning")  # without time for its rules there is no record
     for cell in open_:
         kinds = {rule.goals for rule in guide.rules.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
@@ -196,7 +196,7 @@ def learned(
     failed: tuple[int, ...] | None = None,
     rules: Sequence[Rule] = (),
 ) -> Lesson:
-    """Return what a plan teaches: its rules and orders, its methods, and what it chose and passed over."""
+    """Return the lesson of a plan: rules, orders, methods, choices and rejections."""
     steps = list(plan.steps)
     at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
     if at is not None:
@@ -217,7 +217,7 @@ def shows(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
 
 
 def refined(call: Call, steps: Iterable[Step]) -> Lesson:
-    """Do steps, and return how each was refined: the method, who was taken for it, and the rules."""
+    """Apply steps, and return the refinement of each: the method, the individuals of its roles, and the rules."""
     lesson = Lesson()
     for step in steps:
         check("learning")
@@ -240,7 +240,7 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
 
 
 def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fact, Tally]]:
-    """Yield who was taken for the open roles of a method, and who was passed over that the next level would have let do it."""
+    """Yield the individuals in the open roles of a method as chosen, and those that the next level also allowed as passed over."""
     own = fillers(method, roles, call.problem)
     yield from ((method, fact, CHOSEN) for fact in own)
     for place, role in enumerate(method.open, method.roles) if own else ():
@@ -251,7 +251,7 @@ def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fa
 
 
 def possible(call: Call, method: Method, roles: Roles) -> bool:
-    """Return whether the steps of a method could be done now, however they are refined."""
+    """Return whether the steps of a method are applicable now, whatever their refinements."""
     mark, left = len(call.table.trail), len(method.steps)
     for name, arguments in call.refiner.methods.filled(method, roles):
         done = call.space.forward[name](*arguments)
@@ -264,7 +264,7 @@ def possible(call: Call, method: Method, roles: Roles) -> bool:
 
 
 def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
-    """Return steps of a level, done since a mark, as a way from the state there to what they should leave."""
+    """Return the steps of a level since a mark as a course from the state at the mark to the facts that they had to leave."""
     before, state = call.table.before(mark), call.table.state()
     goal = {}
     for cell, first in before.items():
@@ -279,7 +279,7 @@ def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done:
 
 
 def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
-    """Return a step's refinement over roles, and the individuals in these, None where the table told."""
+    """Return a step's refinement over roles, and their individuals; None where the table determines them."""
     method = methods.lifted(step.behavior, grounds(step.steps), own)
     who = dict(zip(range(len(own)), own, strict=True))
     for (_, places), inner in zip(method.steps, step.steps, strict=True):
@@ -291,7 +291,7 @@ def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Metho
 def chosen(
     rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
 ) -> Lesson:
-    """Return what a plan chose where what is known, and some rules, applied: what it did of that, and what it passed over."""
+    """Return the choices and rejections of a plan among the applicable instances of known rules and of the given ones."""
     call = Call(problem, using, None, SHORT.expansions)
     guide = Memory(experience).guide(call, also=rules)
     view = View(using.program, call.table, call.goal)
@@ -312,12 +312,12 @@ def chosen(
 
 
 def judged(view: View, c: Candidate, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
-    """Yield what is counted of a rule that was followed, and of what held of who was in its roles."""
+    """Yield the counts of a rule instance: for the rule, and for the facts about the individuals in its roles."""
     return ((c.rule, fact, tally) for fact in (ITSELF, *view.facts(c.rule, c.roles)))
 
 
 def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate]) -> Lesson:
-    """Return what is counted where these were chosen and those passed over."""
+    """Return the counts for some chosen and some passed-over instances."""
     lesson = Lesson()
     for c in {c.rule.name: c for c in done}.values():
         lesson.counted += judged(view, c, CHOSEN)
@@ -345,9 +345,9 @@ def in_vain(
     using: Compiled,
     before: Sequence[Step] = (),
 ) -> Lesson:
-    """Return what a step teaches of which the sub-step with a path failed.
+    """Return the lesson of a step whose sub-step with the given path failed.
 
-    The rules that would have chosen it, with its facts, and whom its refinement had taken.
+    It counts a failure of the rules that would have chosen the step, with its facts, and of the individuals in its refinement.
     """
     call = Call(problem, using, None, SHORT.expansions)
     guide = Memory(experience).guide(call)
@@ -367,7 +367,7 @@ def in_vain(
         method, roles = method_of(call.refiner.methods, step, (*step.arguments, *done[0]))
         who = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
         lesson.personal += who
-        lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # others might have done it in the same way
+        lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # other individuals might have succeeded
         for earlier in step.steps[:number]:
             with suppress(LearningError):
                 carry_out(call, earlier)
