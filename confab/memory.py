@@ -233,11 +233,11 @@ class Memory:
         from confab.planner.experience.lessons import live
 
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
-        vain = list(in_vain(problem, episode))
+        failures = list(failed_steps(problem, episode))
         whole = not episode.interventions and not episode.failures
         with suppress(LearningError):  # the executed steps aren't applicable in the initial observation
-            if whole or vain:
-                live(self.experience, begun, episode.done if whole else Plan(()), vain=vain)
+            if whole or failures:
+                live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
 
     def save(self, target: str | Path) -> Path:
         """Write the memory as Turtle atomically, and return the path; to an endpoint, only this replica's own counters.
@@ -431,7 +431,7 @@ def undisturbed(target: str | Path) -> AbstractContextManager[None]:
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
-def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
+def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
     """Yield the behaviours of the most abstract level that failed in an episode, each with the state and the failed conditions."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:

@@ -89,7 +89,7 @@ def live(
     problem: Problem,
     plan: Plan,
     failed: tuple[int, ...] | None = None,
-    vain: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
+    failures: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
 ) -> None:
     """Learn from an executed plan.
 
@@ -101,7 +101,7 @@ def live(
     plan : Plan
     failed : path of a step, optional
         The step that failed; later steps weren't tried.
-    vain : iterable of (problem, step, path)
+    failures : iterable of (problem, step, path)
         Other steps of the most abstract level that failed, each with its problem, and the path of its failed sub-step.
 
     Raises
@@ -114,8 +114,8 @@ def live(
     if plan.steps:
         lesson += learned(experience, problem, plan, using, failed)
         lesson = shown(experience, lesson, problem, using) if failed is None else lesson
-    for there, step, path in vain:
-        lesson += in_vain(experience, there, step, path[1:], using)
+    for there, step, path in failures:
+        lesson += lesson_of_failure(experience, there, step, path[1:], using)
     experience.learn(lesson)
 
 
@@ -200,7 +200,7 @@ def learned(
     steps = list(plan.steps)
     at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
     if at is not None:
-        return in_vain(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
+        return lesson_of_failure(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
     lesson = shows(problem, plan, using)
     own = [rule for rule in lesson.said if isinstance(rule, Rule)]
     lesson += chosen([*rules, *own], experience, problem, steps, using)
@@ -337,7 +337,7 @@ def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate])
     return lesson
 
 
-def in_vain(
+def lesson_of_failure(
     experience: Experience,
     problem: Problem,
     step: Step,

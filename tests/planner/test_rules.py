@@ -265,7 +265,7 @@ def test_a_hand_that_failed_at_a_place_is_not_taken_for_it_again_and_the_way_of_
     assert made is not None
     top = next(step for step in made.steps if step.behavior == "B1_MOVE")
     put = next(step for step in top.walk() if step.behavior == "B3_REACH_HAND_LOCATION")
-    live(experience, within, Plan(()), vain=[(within, top, put.path)])
+    live(experience, within, Plan(()), failures=[(within, top, put.path)])
     hand, place = put.arguments
     again = plan(within, Memory(experience)).plan
     assert again is not None and validate(within, again) == []
