@@ -84,8 +84,10 @@ def __getattr__(name: str) -> object:
         if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` calls this first
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
         from confab.hints import MODULE
-        from confab.reasoner.names import wrong_name
+        from confab.reasoner.names import GUESSING, wrong_name
 
+        if "confab.guessing" not in GUESSING:
+            GUESSING.append("confab.guessing")
         wrong_name("the module confab", name, _sys.modules[__name__], MODULE)
     from importlib import import_module
 

@@ -16,7 +16,7 @@ from confab.accepting import sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
-from confab.reasoner.names import Names, nearest, right_names
+from confab.reasoner.names import GUESSING, Names, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.reading.problem import Reading, read, read_names
 from confab.reasoner.symbols import Behavior, Fact, Problem
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.mirror import Mirror
     from confab.reasoner.graph.query_process import QueryLimits
 
+GUESSING.append("confab.guessing")
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import right_names
 
 if TYPE_CHECKING:
     import pandas
@@ -22,6 +23,7 @@ STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-cs
 """Forms of the SPARQL 1.1 recommendations, with pyoxigraph's names for them."""
 
 
+@right_names("a table")
 @dataclass(frozen=True)
 class Table(Sequence[tuple[str | None, ...]]):
     """Rows with named columns, for iteration, indexing, display and conversion into a DataFrame.

@@ -25,7 +25,7 @@ PLAN = {
     "steps": "actions action_list sequence get_steps children nodes",
     "primitives": "leaves low_level atoms primitive_actions",
     "at_level(LEVEL)": "level levels by_level flatten flat",
-    "length": "size n_steps count depth makespan",
+    "length": "size n_steps count depth",
     "walk()": "iter traverse all_steps visit",
     "to_networkx()": "graph networkx to_graph nx digraph tree",
     "to_dot()": "dot graphviz to_graphviz draw plot",
@@ -34,7 +34,7 @@ PLAN = {
 }
 """Attributes of a plan, and other names under which users look for them."""
 STEP = {
-    "behavior": "name action operator action_name behaviour label",
+    "behavior": "name action operator action_name behaviour",
     "arguments": "args parameters params objects actual_parameters",
     "steps": "children substeps sub_steps refinement actions",
     "bindings": "variables binding",

@@ -74,7 +74,13 @@ def _ontology_name(iri: str) -> str:
     return local_name(iri.partition("#")[0] if "#" in iri else iri.rpartition("/")[0])
 
 
-def right_names(kind: str, module: str, table: str) -> Callable[[C], C]:
+TYPED = 0.85
+"""Similarity from which on a wrong name counts as a right one with a slip."""
+GUESSING: list[str] = []
+"""Modules whose function `guessed` finds the name that a wrong name of a thing means; the layer that knows all things adds one."""
+
+
+def right_names(kind: str, module: str = "", table: str = "") -> Callable[[C], C]:
     """Return a class decorator: the error for a missing attribute names the attribute with that function.
 
     Parameters
@@ -87,7 +93,7 @@ def right_names(kind: str, module: str, table: str) -> Callable[[C], C]:
 
     def decorated(cls: C) -> C:
         def lacking(self: object, name: str) -> NoReturn:
-            hints = {} if name.startswith("_") else getattr(import_module(module), table)
+            hints = {} if name.startswith("_") or not module else getattr(import_module(module), table)
             wrong_name(kind, name, type(self), hints)
 
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
@@ -111,7 +117,9 @@ def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) ->
     """
     text = f"{kind} has no '{name}'"
     if not name.startswith("_"):
+        known = [each for each in dir(there) if not each.startswith("_")]
         meant = next((right for right, wrong in hints.items() if name in wrong.split()), "")
-        similar = nearest(name, [each for each in dir(there) if not each.startswith("_")])
-        text += f"; use {meant}" if meant else similar
+        if not meant and not get_close_matches(name, known, n=1, cutoff=TYPED):
+            meant = next((import_module(each).guessed(kind.split()[-1], name) for each in GUESSING), "")
+        text += f"; use {meant}" if meant else nearest(name, known)
     raise AttributeError(text)
