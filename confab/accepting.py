@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Protocol, SupportsIndex, TypeAlias, overload
 
 from confab import ontology
 from confab.interchange import read_plan
@@ -27,8 +27,26 @@ class HasPlan(Protocol):
 
 AnyPlan: TypeAlias = "Plan | HasPlan | str | Path"
 """A plan, an object with a plan, or the file that ``confab plan --json`` wrote."""
-Facts: TypeAlias = "str | Iterable[str]"
-"""One fact or several, each like ``cup2 LOCATION location8``."""
+Facts: TypeAlias = "str | Iterable[str] | Mapping[str, str]"
+"""One fact or several, each like ``cup2 LOCATION location8``, as a text, as its words, or as symbols with their values."""
+
+
+class Stated(list[str]):
+    """Facts as texts; also the value of each by the words before it, ``facts["cup1 LOCATION"]``."""
+
+    @overload
+    def __getitem__(self, index: SupportsIndex | str) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[str]: ...
+
+    def __getitem__(self, index: SupportsIndex | str | slice) -> str | list[str]:
+        """Return the fact of a position, some facts, or the value of what is named."""
+        if not isinstance(index, str):
+            return super().__getitem__(index)
+        values = dict(fact.rsplit(" ", 1) for fact in self)
+        if index not in values:
+            raise KeyError(f"no fact about '{index}'{nearest(index, values)}")
+        return values[index]
 
 
 def plan_of(given: AnyPlan, problem: Problem) -> Plan:
@@ -75,7 +93,7 @@ def possible() -> Iterator[None]:
 
 
 def several(given: Facts) -> list[str]:
-    """Return a list of texts, given one or several.
+    """Return facts as a list of texts, given one or several, the words of one, or a mapping of symbols to values.
 
     Raises
     ------
@@ -84,14 +102,20 @@ def several(given: Facts) -> list[str]:
 
     Examples
     --------
-    >>> several("cup2 LOCATION location8"), several(("a", "b"))
-    (['cup2 LOCATION location8'], ['a', 'b'])
+    >>> several("cup2 LOCATION = location8"), several(("cup2", "LOCATION", "location8"))
+    (['cup2 LOCATION location8'], ['cup2 LOCATION location8'])
+    >>> several({"cup2 LOCATION": "location8"}), several(["cup2 LOCATION location8", "cup1 LOCATION location7"])
+    (['cup2 LOCATION location8'], ['cup2 LOCATION location8', 'cup1 LOCATION location7'])
     """
+    if isinstance(given, Mapping):
+        given = [f"{symbol} {value}" for symbol, value in given.items()]
     texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     for text in texts:
         if not isinstance(text, str):
             raise KnowledgeError(f"wanted a text like 'cup2 LOCATION location8', or several; got {text!r}")
-    return texts
+    if len(texts) > 2 and not any(" " in text for text in texts):
+        texts = [" ".join(texts)]
+    return [text.replace(" = ", " ") for text in texts]
 
 
 def number(name: str, given: object, wanted: str = "a number") -> None:
@@ -108,7 +132,7 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
         raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")
 
 
-def sparql_of(given: str) -> str:
+def sparql_of(given: str | Path) -> str:
     """Return a query: the text itself, or the content of the file or shipped query of that name.
 
     Raises
@@ -121,6 +145,8 @@ def sparql_of(given: str) -> str:
     >>> sparql_of("where-is-everything").splitlines()[-1]
     'SELECT ?object ?place WHERE { ?object k:location ?place } ORDER BY ?object'
     """
+    if isinstance(given, Path):
+        given = str(given)
     if not isinstance(given, str):
         raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a ready query; got {given!r}")
     if any(sign in given for sign in "{}?\n"):

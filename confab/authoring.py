@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import pyoxigraph as ox
@@ -95,6 +96,11 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
     """
     from confab.reasoner.validation.validate import validate as check
 
+    for file in files:
+        if not isinstance(file, str | Path):
+            path = getattr(getattr(file, "knowledge", None), "path", None)
+            own = f"; this scene's is {str(path)!r}" if path is not None else ""
+            raise KnowledgeError(f"got {type(file).__name__}; validate takes files or names of shipped scenes{own}")
     columns = ("severity", "place", "rule", "what", "why", "do")
     rows = (
         (f.severity, f"{Path(f.file).name}:{f.line}" if f.line else Path(f.file).name, f.rule, f.what, f.why, f.remedy)
@@ -103,8 +109,10 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
     return Table(columns, tuple(rows))
 
 
-def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> Scene:
-    """Write a scene for trials as an ordinary ontology file, and return it, loaded (docs/quantification.md has the families).
+def generate(
+    family: str, path: str | Path | None = None, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0
+) -> Scene:
+    """Return a scene for trials, and write it as an ontology file if a path is given (docs/quantification.md has the families).
 
     Raises
     ------
@@ -113,14 +121,17 @@ def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, cl
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     generate("served", folder + "/table.ttl", objects=10).plan().plan.length[1]
+    >>> generate("served", objects=10).plan().plan.length[1]
     11
     """
     from confab.reasoner.generate import write_scene
-    from confab.scene import load
+    from confab.scene import load, load_text
 
+    if path is None:
+        with TemporaryDirectory() as folder:
+            file = Path(folder, f"{family}.ttl")
+            write_scene(file, family, objects, hands, clutter, seed)
+            return load_text(file.read_bytes())
     write_scene(turtle_path(path), family, objects, hands, clutter, seed)
     return load(path)
 

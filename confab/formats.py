@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypedDict
 
 from confab.planner.certificates import CertificateJson
-from confab.sim.verify import RolloutJson
+from confab.sim.verdict import RolloutJson
 
 
 class _Step(TypedDict):

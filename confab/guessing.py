@@ -7,7 +7,7 @@ what it leads to (``result.outcome.search``), then all others (``scene.with_fact
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from difflib import SequenceMatcher
 from functools import cache
@@ -49,13 +49,13 @@ validate lint check shacl consistent
 facts fact state init initial values now
 goals goal task tasks objective
 objects object individuals individual instances things entities
-behaviors behavior behaviours behaviour actions operators skills schema schemas preconditions effects
+behaviors behavior behaviours behaviour action actions operator operators skills schema schemas preconditions effects
 situations predicates fluents situation
 arguments args params parameters objects
 steps actions children subplan subplans sub refinement decomposition sequence list
 primitives leaves low
 cost metric price
-seconds time runtime duration elapsed
+seconds time timeout runtime duration elapsed
 search expanded expansions statistics stats nodes generated
 reason why because unsolvable failure error explain justify
 report html page visualise visualize visualization render plot
@@ -87,7 +87,9 @@ label words text sentence
 __version__ version
 """
 """Words with one meaning, a line each."""
-FILLERS = frozenset({"get", "to", "as", "is", "has", "all", "n", "of", "the", "for", "in", "make", "create", "new", "my", "with"})
+FILLERS = frozenset(
+    {"get", "to", "as", "is", "has", "all", "n", "of", "the", "for", "in", "make", "create", "new", "my", "with"}
+)
 OF_ANY = frozenset({"plan", "planning", "search"})
 """Words that say little beside others: the length of a plan is its length."""
 ENOUGH, FAR = 0.55, 0.1
@@ -153,7 +155,10 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
     """Return how well a name does what some words ask for, from 0 to 1."""
     has, said = words_of(name), set(re.findall(r"[a-z]+", doc.lower()))
     met = [max(alike(word, one) for one in has) for word in wanted]
-    told = [max(known, 0.6 * max((alike(word, one) for one in said), default=0.0)) for word, known in zip(wanted, met, strict=True)]
+    told = [
+        max(known, 0.6 * max((alike(word, one) for one in said), default=0.0))
+        for word, known in zip(wanted, met, strict=True)
+    ]
     extra = sum(max(alike(word, one) for word in wanted) == 0 for one in has)
     return sum(told) / len(told) - 0.12 * extra
 
@@ -161,8 +166,8 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 def guessed(kind: str, name: str) -> str:
     """Return the name that does what a wrong name of a thing asks for, or an empty text.
 
-    >>> guessed("result", "planning_time"), guessed("scene", "save_film"), guessed("plan", "xyzzy")
-    ('seconds', 'verify', '')
+    >>> guessed("result", "planning_time"), guessed("plan", "save"), guessed("plan", "xyzzy")
+    ('seconds', 'result.save', '')
     """
     wanted = words_of(name)
     wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in OF_ANY) or wanted
@@ -172,3 +177,14 @@ def guessed(kind: str, name: str) -> str:
             worth = score(wanted, known, doc) - FAR * far
             best = max(best, (worth, before + known), key=lambda one: one[0])
     return best[1]
+
+
+def chosen(name: str, known: Iterable[str]) -> str:
+    """Return which of some names a wrong one means, or an empty text.
+
+    >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
+    ('time_limit', '')
+    """
+    worth = {each: score(words_of(name), each, "") for each in known}
+    best = max(worth, key=lambda each: worth[each], default="")
+    return best if worth.get(best, 0.0) >= ENOUGH else ""

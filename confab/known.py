@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 
 import pyoxigraph as ox
 
-from confab.accepting import sparql_of
+from confab.accepting import Facts, Stated, several, sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
-from confab.reasoner.names import GUESSING, Names, nearest, right_names
+from confab.reasoner.names import GUESSING, Named, Names, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.reading.problem import Reading, read, read_names
 from confab.reasoner.symbols import Behavior, Fact, Problem
@@ -118,7 +118,8 @@ class Known:
         kinds = {name: [kind for kind, members in problem.classes.items() if name in members] for name in names}
         above = {name: {sup for kind in of for sup in problem.parents.get(kind, ())} for name, of in kinds.items()}
         own = {name: " ".join(k for k in of if k not in above[name] and "|" not in k) for name, of in kinds.items()}
-        return dict(sorted(own.items(), key=lambda pair: pair[1]))
+        found = sorted(own.items(), key=lambda pair: pair[1])
+        return Named("object", found, "those of a class are in problem.classes")
 
     @property
     def behaviors(self) -> dict[str, Behavior]:
@@ -131,23 +132,24 @@ class Known:
         ['B1_MOVE', 'B1_POUR']
         """
         self.settle()
-        return dict(self.problem.domain.behaviors)
+        return Named("behaviour", self.problem.domain.behaviors)
 
     @property
-    def facts(self) -> list[str]:
+    def facts(self) -> Stated:
         """The initial facts, in the form that `with_fact` takes.
 
         Examples
         --------
         >>> import confab
-        >>> confab.load("beverage-serving").facts[:2]
-        ['bottle1 BEVERAGE beverage1', 'bottle1 LOCATION location4']
+        >>> facts = confab.load("beverage-serving").facts
+        >>> facts[:2], facts["cup1 LOCATION"]
+        (['bottle1 BEVERAGE beverage1', 'bottle1 LOCATION location4'], 'location2')
         """
         self.settle()
-        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.initial.items())
+        return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.initial.items()))
 
     @property
-    def goals(self) -> list[str]:
+    def goals(self) -> Stated:
         """The goals, in the form that `with_goal` and `plan` take.
 
         Examples
@@ -157,10 +159,10 @@ class Known:
         ['bottle1 LOCATION location4', 'bottle2 LOCATION location3']
         """
         self.settle()
-        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items())
+        return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items()))
 
-    def with_fact(self: S, *facts: str) -> S:
-        """Return a scene with some facts replaced; this scene stays as it is.
+    def with_fact(self: S, *facts: Facts) -> S:
+        """Return a scene with some facts replaced, each a text, or given by its words; this scene stays as it is.
 
         Raises
         ------
@@ -177,7 +179,7 @@ class Known:
 
         return self._restated(with_facts, facts)
 
-    def with_goal(self: S, *goals: str) -> S:
+    def with_goal(self: S, *goals: Facts) -> S:
         """Return a scene with some goals replaced; this scene stays as it is.
 
         Raises
@@ -196,10 +198,12 @@ class Known:
         return self._restated(with_goals, goals)
 
     def _restated(
-        self: S, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: Iterable[str]
+        self: S, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: Sequence[Facts]
     ) -> S:
         self.settle()
-        copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, fact)) for fact in facts])
+        single = all(isinstance(fact, str) for fact in facts)
+        texts = several(cast("Facts", facts)) if single else [text for fact in facts for text in several(fact)]
+        copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, text)) for text in texts])
         infer(copy)
         return type(self)(copy, dict(self.seconds))
 
@@ -257,7 +261,7 @@ class Known:
             self._edited = False
             infer(self.knowledge)
 
-    def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
+    def query(self, sparql: str | Path, limits: QueryLimits | None = None) -> Table:
         """Return the result of a SPARQL 1.1 query as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
 
         The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).

@@ -54,7 +54,7 @@ SHOWN = 3
 """Maximum number of preferences of a method that are listed."""
 
 
-@right_names("a memory", "confab.hints", "MEMORY")
+@right_names("a memory", "confab.hints", "MEMORY", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
 @dataclass
 class Memory:
     """A confabulation memory.

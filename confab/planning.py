@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -290,6 +290,22 @@ class Result:
             reason = self.outcome.reason.text if self.outcome.reason else ""
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
         return self.outcome.plan
+
+    def __bool__(self) -> bool:
+        """Return whether there is a plan."""
+        return self.solved
+
+    def __iter__(self) -> Iterator[Step]:
+        """Yield the steps of the plan's first level."""
+        return iter(self.plan)
+
+    def __len__(self) -> int:
+        """Return the number of steps of the plan's first level."""
+        return len(self.plan)
+
+    def __getitem__(self, index: int) -> Step:
+        """Return a step of the plan's first level."""
+        return self.plan[index]
 
     def in_order(self, *ids: int) -> Plan:
         """Return the plan with its steps of the first level in another order, for example that of a demonstration.

@@ -20,6 +20,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.graph.knowledge import load as load_graph
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
+from confab.reasoner.names import right_names
 from confab.reasoner.symbols import FALSE, Fact
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from confab.why import Account
 
 
+@right_names("a scene", "confab.hints", "SCENE")
 class Scene(Known):
     """A scene of the ontology with all its imports.
 
@@ -263,13 +265,14 @@ class Scene(Known):
         return styled(tag("p", repr(self)), table(["wanted", "now"], rows) if rows else None)
 
 
-def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | None = None) -> Scene:
+def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene: str | None = None) -> Scene:
     """Load a scene: a shipped name, a file of RDF or several, a graph of rdflib, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
     ----------
-    source : str, Path, rdflib.Graph, or sequence of str or Path
-        Of several files, the scene is the first that no other imports. A graph is copied; what it imports are shipped ontologies.
+    source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
+        Of several files, the scene is the first that no other imports. A scene is returned as it is.
+        A graph is copied; what it imports are shipped ontologies.
     scene : str, optional
         IRI of the scene in an endpoint that holds several.
 
@@ -289,6 +292,8 @@ def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | 
         from confab.reasoner.graph.stores import connect
 
         return Scene(connect(source, scene), {"load": perf_counter() - begin})
+    if isinstance(source, Scene):
+        return source
     graph = _read(source)
     try:
         infer(graph)

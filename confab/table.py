@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import html
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, SupportsIndex, TypeAlias, overload
 
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.names import right_names
+from confab.reasoner.names import nearest, right_names
 
 if TYPE_CHECKING:
     import pandas
@@ -21,6 +21,38 @@ Term: TypeAlias = "NamedNode | BlankNode | Literal | Triple"
 """An RDF term as the store answers it."""
 STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
 """Forms of the SPARQL 1.1 recommendations, with pyoxigraph's names for them."""
+
+
+class Row(tuple[str | None, ...]):
+    """A row of a table: a tuple whose cells also have the names of their columns."""
+
+    _fields: tuple[str, ...]
+
+    def __new__(cls, cells: Iterable[str | None], names: tuple[str, ...]) -> Row:
+        """Make a row of cells and their names."""
+        made = super().__new__(cls, cells)
+        made._fields = names
+        return made
+
+    def __getnewargs__(self) -> tuple[tuple[str | None, ...], tuple[str, ...]]:
+        """Return what a copy is made of."""
+        return tuple(self), self._fields
+
+    @overload
+    def __getitem__(self, index: SupportsIndex | str) -> str | None: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[str | None, ...]: ...
+
+    def __getitem__(self, index: SupportsIndex | str | slice) -> str | tuple[str | None, ...] | None:
+        """Return the cell of a position or of a column, or some cells."""
+        return super().__getitem__(column(self._fields, index) if isinstance(index, str) else index)
+
+
+def column(names: tuple[str, ...], name: str) -> int:
+    """Return the position of a column; raise a `KeyError` that says which there are."""
+    if name.lstrip("?") not in names:
+        raise KeyError(f"no column '{name}'{nearest(name, names)} (columns: {', '.join(names)})")
+    return names.index(name.lstrip("?"))
 
 
 @right_names("a table")
@@ -35,8 +67,8 @@ class Table(Sequence[tuple[str | None, ...]]):
     --------
     >>> import confab
     >>> table = confab.load("beverage-serving").query("SELECT ?b ?level WHERE { ?b c:level ?level } ORDER BY ?level ?b")
-    >>> table[0], table.values()[0]
-    (('B1_MOVE', '1'), ('B1_MOVE', 1))
+    >>> table[0], table[0]["level"], table["b"][:2], table.values()[0]
+    (('B1_MOVE', '1'), '1', ['B1_MOVE', 'B1_POUR'], ('B1_MOVE', 1))
     >>> table.iris()[0][0]
     'https://w3id.org/confab/tabletop#B1_MOVE'
     """
@@ -46,9 +78,20 @@ class Table(Sequence[tuple[str | None, ...]]):
     terms: tuple[tuple[Term | None, ...], ...] = ()
     truth: bool | None = None
 
-    def __getitem__(self, index: int) -> tuple[str | None, ...]:  # type: ignore[override]
-        """Return one row."""
-        return self.rows[index]
+    @overload
+    def __getitem__(self, index: int) -> Row: ...
+    @overload
+    def __getitem__(self, index: str) -> list[str | None]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Row]: ...
+
+    def __getitem__(self, index: int | str | slice) -> Row | list[str | None] | list[Row]:
+        """Return one row, some, or the cells of a column."""
+        if isinstance(index, str):
+            return [row[column(self.columns, index)] for row in self.rows]
+        if isinstance(index, slice):
+            return [Row(row, self.columns) for row in self.rows[index]]
+        return Row(self.rows[index], self.columns)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -58,9 +101,9 @@ class Table(Sequence[tuple[str | None, ...]]):
         """Return the truth of an ASK query; for other queries, whether there is a row."""
         return bool(self.rows) if self.truth is None else self.truth
 
-    def __iter__(self) -> Iterator[tuple[str | None, ...]]:
+    def __iter__(self) -> Iterator[Row]:
         """Yield the rows."""
-        return iter(self.rows)
+        return (Row(row, self.columns) for row in self.rows)
 
     def values(self) -> list[tuple[object, ...]]:
         """Return the rows with numbers, truth values and dates as Python values."""

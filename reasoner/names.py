@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
+from functools import wraps
 from importlib import import_module
+from inspect import getattr_static, signature
+from types import FunctionType
 from typing import NoReturn, TypeVar
 
 C = TypeVar("C", bound=type)
+R = TypeVar("R")
+V = TypeVar("V")
 
 
 class Names:
@@ -54,6 +59,22 @@ class Names:
         return name in self._iris
 
 
+class Named(dict[str, V]):
+    """A mapping whose error for a missing name has the most similar one."""
+
+    def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:
+        super().__init__(content)
+        self.kind, self.hint = kind, hint
+
+    def __missing__(self, name: object) -> NoReturn:
+        """Raise the error."""
+        raise KeyError(f"no {self.kind} '{name}'{nearest(str(name), self)}" + (f"; {self.hint}" if self.hint else ""))
+
+    def __reduce__(self) -> tuple[type[dict[str, V]], tuple[dict[str, V]]]:
+        """Return what a copy is made of: a mapping without the hint."""
+        return dict, (dict(self),)
+
+
 def local_name(iri: str) -> str:
     """Return the part of an IRI after its last ``#``, ``/`` or ``:``."""
     iri = iri.rstrip("#/:")
@@ -77,11 +98,11 @@ def _ontology_name(iri: str) -> str:
 TYPED = 0.85
 """Similarity from which on a wrong name counts as a right one with a slip."""
 GUESSING: list[str] = []
-"""Modules whose function `guessed` finds the name that a wrong name of a thing means; the layer that knows all things adds one."""
+"""Modules that find what a wrong name means: `guessed` of a thing's names, `chosen` of some names; the top layer adds one."""
 
 
-def right_names(kind: str, module: str = "", table: str = "") -> Callable[[C], C]:
-    """Return a class decorator: the error for a missing attribute names the attribute with that function.
+def right_names(kind: str, module: str = "", table: str = "", made: str = "") -> Callable[[C], C]:
+    """Return a class decorator: the error for a missing attribute, or an unknown argument, names the right one.
 
     Parameters
     ----------
@@ -89,6 +110,8 @@ def right_names(kind: str, module: str = "", table: str = "") -> Callable[[C], C
         What lacks it, e.g. ``a scene``.
     module, table : str
         Where the mapping of a right name to the words that mean it stands; it is imported when a name is wrong.
+    made : str, optional
+        The call that makes one; the error of a constructor without its arguments names it.
     """
 
     def decorated(cls: C) -> C:
@@ -97,9 +120,42 @@ def right_names(kind: str, module: str = "", table: str = "") -> Callable[[C], C
             wrong_name(kind, name, type(self), hints)
 
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
+        if made:
+            begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class
+
+            @wraps(begin)
+            def made_by(self: object, *given: object, **named: object) -> None:
+                if not given and not named:
+                    raise TypeError(f"{kind} isn't made without arguments; use {made}")
+                begin(self, *given, **named)
+
+            type.__setattr__(cls, "__init__", made_by)
+        for name in dir(cls):
+            function = getattr_static(cls, name)
+            if not name.startswith("_") and isinstance(function, FunctionType):
+                setattr(cls, name, _checked(function))
         return cls
 
     return decorated
+
+
+def _checked(function: Callable[..., R]) -> Callable[..., R]:
+    """Return a method whose error for an unknown argument names the arguments that it takes."""
+    parameters = [*signature(function).parameters.values()][1:]
+    takes = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
+    if not takes or any(each.kind is each.VAR_KEYWORD for each in parameters):
+        return function
+
+    @wraps(function)
+    def checked(*given: object, **named: object) -> R:
+        for name in named:
+            if name not in takes:
+                meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
+                hint = f"; did you mean '{meant}'?" if meant else f"; it takes {', '.join(takes)}"
+                raise TypeError(f"{function.__name__}() takes no '{name}'{hint}")
+        return function(*given, **named)
+
+    return checked
 
 
 def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) -> NoReturn:

@@ -48,6 +48,25 @@ class VerdictJson(_Verdict, _While):
     """A verdict; `while` has the facts during which a motion was found to be impossible."""
 
 
+class StepReportJson(VerdictJson):
+    """The verdict on a primitive, with its path and its ID."""
+
+    path: list[int]
+    id: int
+
+
+class RolloutJson(TypedDict):
+    """One execution of a plan in physics."""
+
+    seed: int
+    ok: bool
+    steps: list[StepReportJson]
+    poured: list[float]
+    cpu_seconds: float
+    simulated_seconds: float
+    believed: list[str]
+
+
 @dataclass(frozen=True)
 class Verdict:
     """The result of a step in the world. `measured` has numbers by name; the name ends with the unit.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypedDict
 
 from confab.planner.validation import successor
 from confab.reasoner.embodiment.values import Embodiment
@@ -13,30 +12,11 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State
 from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
 from confab.sim.staging import Perturbation
-from confab.sim.verdict import Verdict, VerdictJson
+from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
 """Maximum number of looks with noisy perception before a difference from the expected state counts."""
-
-
-class StepReportJson(VerdictJson):
-    """The verdict on a primitive, with its path and its ID."""
-
-    path: list[int]
-    id: int
-
-
-class RolloutJson(TypedDict):
-    """One execution of a plan in physics."""
-
-    seed: int
-    ok: bool
-    steps: list[StepReportJson]
-    poured: list[float]
-    cpu_seconds: float
-    simulated_seconds: float
-    believed: list[str]
 
 
 @dataclass(frozen=True)

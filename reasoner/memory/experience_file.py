@@ -77,6 +77,12 @@ class Lines:
         return [q.triple for q in ox.parse(self.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
 
 
+def no_such_file(path: Path) -> KnowledgeError:
+    """Return the error for a memory file that isn't there."""
+    several = "; several goals are a list: goals=[…, …]" if str(path).count(" ") > 1 else ""
+    return KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one{several}")
+
+
 def lines(text: str) -> Lines:
     """Split the text of a memory file into its parts."""
     links, facts, rest, at = [], {}, list[str](), 0
@@ -193,7 +199,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one") from None
+        raise no_such_file(path) from None
     except (OSError, UnicodeDecodeError) as error:
         raise KnowledgeError(f"{path}: no memory: it can't be read as text ({error})") from error
     return parse(lines(text), str(path), names)

@@ -16,7 +16,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.memory.experience_file import Lines, lines
+from confab.reasoner.memory.experience_file import Lines, lines, no_such_file
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import Names
 from confab.reasoner.nesting import MOST_NESTED, nested
@@ -125,7 +125,7 @@ def memory_lines(path: Path) -> Lines:
         The file is missing or can't be read as text.
     """
     if not path.is_file():
-        raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
+        raise no_such_file(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
         if nested(text.encode()) > MOST_NESTED:

@@ -78,6 +78,53 @@ CALLS: dict[str, Callable[[confab.Scene, confab.Result], object]] = {
 }
 
 
+LATER: dict[str, Callable[[confab.Scene, confab.Result], object]] = {
+    "goals as a mapping": lambda scene, result: scene.plan({"cup2 LOCATION": "location8"}).solved,
+    "a goal by its words": lambda scene, result: scene.plan(goal=("cup2", "LOCATION", "location8")).solved,
+    "a fact by its words": lambda scene, result: scene.with_fact("cup1", "LOCATION", "location7").facts[
+        "cup1 LOCATION"
+    ],
+    "a fact with a sign": lambda scene, result: scene.with_fact("cup1 LOCATION = location7").facts["cup1 LOCATION"],
+    "steps of a result": lambda scene, result: (
+        [*result] == [*result.plan] and result[0] == result.plan[0] and len(result)
+    ),
+    "whether there is a result": lambda scene, result: result and not scene.plan([GOAL, "cup1 LOCATION location8"]),
+    "a scene that is loaded": lambda scene, result: confab.load(scene) is scene,
+    "a query in a file": lambda scene, result: scene.query(ontology.ROOT / "questions" / "where-is-everything.rq"),
+    "a cell by its name": lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")[0]["o"],
+    "a column by its name": lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")["?o"],
+    "a DataFrame of a table": lambda scene, result: (
+        [*pytest.importorskip("pandas").DataFrame(scene.query("SELECT ?o { ?o k:location ?l }"))] == ["o"]
+    ),
+    "a scene for trials without a file": lambda scene, result: confab.generate("served").plan().solved,
+}
+SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
+    "two goals in place": (lambda scene, result: scene.plan(GOAL, "cup1 LOCATION location7"), "goals=["),
+    "a timeout": (lambda scene, result: scene.plan(timeout=3), "did you mean 'time_limit'"),  # type: ignore[call-arg]
+    "a seed": (lambda scene, result: scene.plan(seed=3), "it takes goals, memory, mode"),  # type: ignore[call-arg]
+    "a memory of nothing": (lambda scene, result: confab.Memory(), "use confab.Memory.of"),  # type: ignore[call-arg]
+    "a class among objects": (lambda scene, result: scene.objects["Cup"], "problem.classes"),
+    "a scene to validate": (lambda scene, result: confab.validate(scene), "names of shipped scenes"),  # type: ignore[arg-type]
+    "a wrong column": (lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")["ob"], "columns: o"),
+}
+
+
+@pytest.mark.parametrize("call", LATER.values(), ids=LATER)
+def test_a_further_first_call_works(
+    scene: confab.Scene, result: confab.Result, call: Callable[[confab.Scene, confab.Result], object]
+) -> None:
+    assert call(scene, result)
+
+
+@pytest.mark.parametrize(("call", "hint"), SAID.values(), ids=SAID)
+def test_a_first_call_that_fails_says_what_does_it(
+    scene: confab.Scene, result: confab.Result, call: Callable[[confab.Scene, confab.Result], object], hint: str
+) -> None:
+    with pytest.raises((KnowledgeError, TypeError, KeyError)) as told:
+        call(scene, result)
+    assert hint in str(told.value)
+
+
 def test_thirty_first_calls_are_written_down() -> None:
     assert len(CALLS) == 30
 

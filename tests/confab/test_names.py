@@ -10,6 +10,7 @@ import sys
 import pytest
 
 import confab
+from confab.guessing import guessed
 from confab.hints import MODULE, RESULT, SCENE
 from confab.planner.plan import Plan
 from confab.reasoner.symbols import Fact
@@ -53,6 +54,30 @@ def test_a_misspelt_name_says_the_most_similar_one(scene: confab.Scene) -> None:
     with pytest.raises(AttributeError, match=r"did you mean 'load'"):
         getattr(confab, "laod")  # noqa: B009
     assert not hasattr(scene, "_repr_latex_")
+
+
+GUESSED = {
+    "scene": "replan:plan plan_for:plan remove_fact:with_fact initial_facts:facts get_fact:facts "
+    "behavior:behaviors schema:behaviors relations:problem.relations to_turtle:graph validate:confab.validate why:explain "
+    "report:plan().report monte_carlo:verify "
+    "map:picture namespaces:iri step_through:execute learn:memory.learn",
+    "result": "makespan:timed schedule:timed plan_length:plan.length expanded:outcome.search planning_time:seconds "
+    "is_optimal:outcome.bound visualise:report policy:plan",
+    "plan": "num_steps:length save:result.save cost:result.cost makespan:result.timed subplans:steps",
+    "step": "args:arguments operator:behavior objects:arguments label:result.labels",
+    "execution": "interventions:episode.interventions timeline:episode.events n_replans:episode.replans",
+    "table": "to_csv:csv to_dict:records df:dataframe head:rows",
+    "confab": "load_domain:confab.load read_ttl:confab.load Problem:confab.load "
+    "list_domains:confab.scenes families:confab.generate",
+}
+"""Names that stand in no table, and what each is understood as."""
+
+
+@pytest.mark.parametrize("kind", GUESSED)
+def test_a_name_in_no_table_is_understood_by_its_words(kind: str) -> None:
+    pairs = [pair.split(":") for pair in GUESSED[kind].split()]
+    assert {name: guessed(kind, name) for name, _ in pairs} == dict(pairs)
+    assert guessed(kind, "xyzzy") == ""
 
 
 def test_a_scene_made_of_a_name_says_what_loads_it() -> None:
