@@ -108,6 +108,8 @@ def run(job: Job) -> int:
         replan = partial(Scene.plan, goals=job.goals, memory=remembered, mode=job.mode)
         scene, result, report = persuaded(scene, result, job, replan)
     show(result if report is None else report)
+    if dearer := result.dearer():
+        remark(dearer)
     for line in unreached(scene) if result.outcome.plan is None and bodies and physics else ():
         tell(line)
     good = result.outcome.plan is not None and (report is None or report.verified) and (physics or not bodies)
