@@ -88,12 +88,14 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         if match[1] == "at":
             when["at"] = _seconds(match[2])
         else:
-            named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")  # the path of a step of the first level is its number
+            # The path of a step of the first level is its number.
+            named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")
             path = named.split(".") if named == match[2] else [named]
             when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, path))
     except ValueError as error:
         raise KnowledgeError(
-            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2 or a step's name like L1#2 for after, seconds from 0 on for at"
+            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2 or a name like L1#2 "
+            "for after, seconds from 0 on for at"
         ) from error
     verb, _, rest = match[3].partition(" ")
     words = rest.split()

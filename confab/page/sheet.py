@@ -25,6 +25,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Problem, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution
+    from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
 """Maximum number of rows that can be changed; the page states the number of the others, which `with_fact` changes."""
@@ -172,7 +173,7 @@ class Sheet:
     def scene_data(self) -> PageData:
         """The page of a scene before planning, with its controls and queries."""
         data = page_data(self.scene)
-        data["turnable"], data["queries"] = self.turnable(), ready_queries()
+        data["turnable"], data["queries"] = self.turnable(), ready_queries(self.scene.knowledge)
         return data
 
     def answer(self, by: Turned) -> PageData:
@@ -206,14 +207,17 @@ def _called(method: str, facts: Sequence[str]) -> str:
     return f".{method}({', '.join(map(repr, facts))})" if facts else ""
 
 
-def ready_queries() -> list[ReadyQuery]:
-    """Return the queries that ship with Confab and apply to the scene itself, by name."""
+def ready_queries(graph: KnowledgeGraph) -> list[ReadyQuery]:
+    """Return the queries that ship with Confab and ask the scene itself, by name; those about other domains are left out."""
+    from confab.reasoner.graph.query_process import unknown_prefixes
+
     found: list[ReadyQuery] = []
     for path in sorted((ontology.ROOT / "questions").glob("*.rq")):
         lines = path.read_text(encoding="utf-8").splitlines()
         question = next((line.partition(":")[2].strip() for line in lines if line.startswith("# Question:")), path.stem)
         text = "\n".join(line for line in lines if not line.startswith("#"))
-        found.append({"name": path.stem, "question": question, "text": text.strip()})
+        if not unknown_prefixes(graph, text):
+            found.append({"name": path.stem, "question": question, "text": text.strip()})
     return found
 
 

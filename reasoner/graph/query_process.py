@@ -282,8 +282,7 @@ def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
     """Return the error of a query in one line, with the text at its position and the name of an unknown prefix."""
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
-    used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]
-    if unknown := next((prefix for prefix in used if prefix not in known and prefix != "_"), None):
+    if unknown := next(iter(unknown_prefixes(graph, query)), None):
         hint = "known are " + ", ".join(f"{prefix}:" for prefix in sorted(known))
         return f"{error}; no prefix '{unknown}:' is known{nearest(unknown, known, hint)}"
     if place := PLACE.search(error):
@@ -292,6 +291,13 @@ def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
         rest = lines[line - 1][column - 1 :].strip() if line <= len(lines) else ""
         return f"{error}; there stands '{rest[:20]}'" if rest else f"{error}; there the query ends"
     return error
+
+
+def unknown_prefixes(graph: KnowledgeGraph, query: str) -> list[str]:
+    """Return the prefixes in a query that neither it nor the scene declares."""
+    known = {*graph.spoken, *DECLARED.findall(query), "_"}
+    used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]
+    return [prefix for prefix in used if prefix not in known]
 
 
 def core_names(graph: KnowledgeGraph, query: str) -> str:

@@ -23,7 +23,7 @@ from confab.page.ground import ground_of
 from confab.page.markup import script
 from confab.page.notebook import SHOWN
 from confab.page.schema import PageData
-from confab.page.sheet import Sheet, Turned, turned_from
+from confab.page.sheet import Sheet, Turned, ready_queries, turned_from
 from confab.page.timeline import of_episode, of_plan, of_rollout
 from confab.planner.plan import Plan
 from confab.serving import Server, serving
@@ -216,6 +216,14 @@ def test_goals_are_turned_and_dropped_and_what_cannot_be_says_why(scene: confab.
     assert sheet.answer({"goals": {"cup1 LOCATION": "location5"}})["headline"].startswith("unsolvable")
     assert "location5" in sheet.answer({"facts": {"cup1 LOCATION": "locaton5"}})["problem"]
     assert "there is no cup9" in sheet.answer({"facts": {"cup9 LOCATION": "location5"}})["problem"]
+
+
+def test_ready_questions_are_those_that_the_scene_has_words_for(scene: confab.Scene) -> None:
+    there, elsewhere = (
+        {one["name"] for one in ready_queries(s.knowledge)} for s in (scene, confab.load("towers-small"))
+    )
+    assert there - elsewhere >= {"where-is-everything", "what-can-be-poured"}
+    assert "what-is-wanted" in there & elsewhere
 
 
 def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene: confab.Scene) -> None:
