@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
@@ -38,9 +39,14 @@ needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Deb
 FACTS: Turned = {"facts": {"cup1 LOCATION": "location7"}}
 
 
+@cache
+def shipped(name: str = "beverage-serving") -> confab.Scene:
+    return confab.load(name)
+
+
 @pytest.fixture(scope="module")
 def scene() -> confab.Scene:
-    return confab.load("beverage-serving")
+    return shipped()
 
 
 @pytest.fixture(scope="module")
@@ -70,10 +76,8 @@ def pages(scene: confab.Scene, serving_plan: confab.Result, failed: confab.Repor
         "episode": page_data(scene, execution=scene.execute(interventions=FIGURE_8)),
         "none": page_data(scene, scene.plan(["cup1 LOCATION location7", "cup2 LOCATION location7"])),
     }
-    for name in ("towers-small", "house-small"):
-        result = confab.load(name).plan()
-        made[name] = page_data(result.scene, result)
-    return made
+    result = shipped("house-small").plan()
+    return {**made, "house-small": page_data(result.scene, result), "towers-small": page_data(shipped("towers-small"))}
 
 
 # ------------------------------------------------------------------------------------------------------------ the data
@@ -105,7 +109,8 @@ def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, Pa
 
 
 def test_every_kind_of_run_says_how_it_ended(pages: dict[str, PageData]) -> None:
-    assert (pages["towers-small"]["good"], pages["towers-small"]["status"]) == (True, "a plan, checked")
+    assert (pages["plan"]["good"], pages["plan"]["status"]) == (True, "a plan, checked")
+    assert (pages["towers-small"]["good"], pages["towers-small"]["status"]) == (None, "not planned yet")
     assert (pages["episode"]["good"], pages["episode"]["status"]) == (True, "reached")
     told = [f"it {what} that cup 2 is at location 8" for what in ("happens", "is wanted")]
     assert [mark["text"] for mark in pages["episode"]["marks"]][:2] == told
@@ -138,7 +143,7 @@ def test_the_map_has_furniture_connections_or_order(pages: dict[str, PageData], 
 
 @pytest.mark.parametrize("name", ["beverage-serving", "two-tables", "kitchen-corner"])
 def test_the_map_is_seen_from_where_the_film_is_taken(name: str) -> None:
-    scene = confab.load(name)
+    scene = shipped(name)
     ground = ground_of(scene.problem, scene.embodiment)
     assert ground is not None
     camera = view_of(scene.embodiment)
@@ -154,7 +159,7 @@ def test_the_map_is_seen_from_where_the_film_is_taken(name: str) -> None:
 
 
 def test_a_place_in_a_drawer_is_on_the_map_where_the_drawer_is() -> None:
-    scene = confab.load("kitchen-corner")
+    scene = shipped("kitchen-corner")
     ground = ground_of(scene.problem, scene.embodiment)
     assert ground is not None
     spots = list(ground.spots.values())
@@ -173,7 +178,7 @@ def test_time_is_told_once_and_whole(serving_plan: confab.Result, failed: confab
 
 @pytest.mark.parametrize("name", ["laboratory-small", "couriers-small"])
 def test_a_schedule_has_a_lane_for_each_actor_with_slack(name: str) -> None:
-    result = confab.load(name).plan(minimise="makespan")
+    result = shipped(name).plan(minimise="makespan")
     data, timed = page_data(result.scene, result), result.timed
     assert timed is not None
     assert (data["unit"], data["tiles"][0]["text"]) == ("s", f"{float(timed.makespan):.3g} s")
@@ -219,9 +224,7 @@ def test_goals_are_turned_and_dropped_and_what_cannot_be_says_why(scene: confab.
 
 
 def test_ready_questions_are_those_that_the_scene_has_words_for(scene: confab.Scene) -> None:
-    there, elsewhere = (
-        {one["name"] for one in ready_queries(s.knowledge)} for s in (scene, confab.load("towers-small"))
-    )
+    there, elsewhere = ({one["name"] for one in ready_queries(s.knowledge)} for s in (scene, shipped("towers-small")))
     assert there - elsewhere >= {"where-is-everything", "what-can-be-poured"}
     assert "what-is-wanted" in there & elsewhere
 
@@ -235,7 +238,7 @@ def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene
 
 @pytest.mark.parametrize("name", ["house-small", "canal-small"])
 def test_any_world_can_be_turned(name: str) -> None:
-    sheet = Sheet(confab.load(name))
+    sheet = Sheet(shipped(name))
     turnable = sheet.turnable()
     for row in turnable["rows"]:
         values = [value for value, _ in turnable["values"][row["values"]]]
@@ -276,7 +279,7 @@ def test_notebooks_show_values_without_a_script(
 def test_without_anywidget_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(confab.KnowledgeError, match=r"needs anywidget.*pip install anywidget"):
-        confab.load("two-cups").board()
+        shipped("two-cups").board()
 
 
 @pytest.mark.skipif(find_spec("anywidget") is None, reason="needs anywidget (the extra notebook)")
@@ -302,7 +305,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Server]:
-    with serving(confab.load("beverage-serving"), 0) as server:
+    with serving(shipped(), 0) as server:
         yield server
 
 
@@ -380,7 +383,7 @@ def test_a_fact_is_turned_and_a_query_asked_on_the_served_page(browser: Browser,
 
 @needs_browser
 def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
-    scene = confab.load("beverage-serving")
+    scene = shipped()
     with serving(scene, 0) as server:
         said: list[str] = []
 
@@ -439,7 +442,7 @@ MEETING = """(() => { const words = [...document.querySelectorAll('.map text:not
 @needs_browser
 @pytest.mark.parametrize("name", ["beverage-serving", "cereal-serving", "kitchen-corner", "house-small", "two-tables"])
 def test_no_name_on_a_map_lies_on_another_and_none_is_lost(browser: Browser, name: str, tmp_path: Path) -> None:
-    data = page_data(confab.load(name))
+    data = page_data(shipped(name))
     address = write_page(tmp_path / "page.html", data).as_uri()
     for width in (1280, 420):
         browser.open(address, width)
