@@ -40,7 +40,7 @@ class Stated(list[str]):
     def __getitem__(self, index: slice) -> list[str]: ...
 
     def __getitem__(self, index: SupportsIndex | str | slice) -> str | list[str]:
-        """Return the fact of a position, some facts, or the value of what is named."""
+        """Return the fact of a position, some facts, or the value of a symbol."""
         if not isinstance(index, str):
             return super().__getitem__(index)
         values = dict(fact.rsplit(" ", 1) for fact in self)

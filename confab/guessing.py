@@ -1,7 +1,7 @@
 """The name that does what a wrong name asks for, found by its words among the public names and their descriptions.
 
-A wrong name is parted into words; words of one meaning count as equal. Looked at are the names of the thing itself, then those of
-what it leads to (``result.outcome.search``), then all others (``scene.with_fact``).
+A wrong name is split into words; words of one meaning are equal. The candidates are the names of the object itself, then those of
+the objects that it leads to (``result.outcome.search``), then all others (``scene.with_fact``).
 """
 
 from __future__ import annotations

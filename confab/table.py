@@ -35,7 +35,7 @@ class Row(tuple[str | None, ...]):
         return made
 
     def __getnewargs__(self) -> tuple[tuple[str | None, ...], tuple[str, ...]]:
-        """Return what a copy is made of."""
+        """Return the parts of a copy."""
         return tuple(self), self._fields
 
     @overload

@@ -71,7 +71,7 @@ class Named(dict[str, V]):
         raise KeyError(f"no {self.kind} '{name}'{nearest(str(name), self)}" + (f"; {self.hint}" if self.hint else ""))
 
     def __reduce__(self) -> tuple[type[dict[str, V]], tuple[dict[str, V]]]:
-        """Return what a copy is made of: a mapping without the hint."""
+        """Return the parts of a copy: a mapping without the hint."""
         return dict, (dict(self),)
 
 
