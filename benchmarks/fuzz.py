@@ -140,14 +140,13 @@ def _recorded() -> list[Result]:
     from rdflib.plugins.sparql.algebra import translateQuery
     from rdflib.plugins.sparql.parser import parseQuery
 
-    from confab import engines
-    from confab.scene import Scene
+    from confab import engines, planning
 
     results: list[Result] = []
-    plan = Scene.plan
+    plan = planning.plan_by
 
-    def noted(scene: Scene, *arguments: Any, **options: Any) -> Result:
-        results.append(plan(scene, *arguments, **options))
+    def noted(*arguments: Any) -> Result:
+        results.append(plan(*arguments))
         return results[-1]
 
     @functools.cache
@@ -158,7 +157,7 @@ def _recorded() -> list[Result]:
         return translated(text, base, tuple((prefixes or {}).items()))
 
     for place, name, new in (
-        (Scene, "plan", noted),
+        (planning, "plan_by", noted),
         (sparql, "parseQuery", str),
         (sparql, "translateQuery", translated_once),
         (engines, "iter_modules", functools.cache(lambda: tuple(iter_modules()))),

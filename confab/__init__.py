@@ -84,11 +84,11 @@ def __getattr__(name: str) -> object:
         if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` calls this first
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
         from confab.hints import MODULE
-        from confab.reasoner.names import GUESSING, wrong_name
+        from confab.reasoner.names import GUESSING, WrongNameError
 
         if "confab.guessing" not in GUESSING:
             GUESSING.append("confab.guessing")
-        wrong_name("the module confab", name, _sys.modules[__name__], MODULE)
+        raise WrongNameError("the module confab", name, _sys.modules[__name__], lambda: MODULE)
     from importlib import import_module
 
     return getattr(import_module(_HOMES[name]), name)

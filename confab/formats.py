@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TypedDict
 
 from confab.planner.certificates import CertificateJson
-from confab.sim.verdict import RolloutJson
 
 
 class _Step(TypedDict):
@@ -200,30 +199,6 @@ class EpisodeJson(TypedDict):
     initial: list[SeenJson]
     course: list[SeenJson]
     seconds: dict[str, float]
-
-
-class SuccessJson(TypedDict):
-    """The number of verified rollouts, the interval of the rate, and the mean share of a serving that arrived."""
-
-    verified: int
-    of: int
-    interval: list[float]
-    poured: float | None
-
-
-class SeenRolloutJson(RolloutJson):
-    """A rollout, with the final observed values of the goals' symbols."""
-
-    seen: list[str]
-
-
-class ReportJson(TypedDict):
-    """The verification of a plan in physics."""
-
-    status: str
-    success: SuccessJson
-    trusted: dict[str, int]
-    rollouts: list[SeenRolloutJson]
 
 
 class BecauseJson(TypedDict):

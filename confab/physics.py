@@ -21,14 +21,38 @@ from confab.sim.engine import Engine
 from confab.sim.rollouts import Done, Trial, wilson
 from confab.sim.rollouts import rollouts as roll_out
 from confab.sim.staging import Perturbation
+from confab.sim.verdict import RolloutJson
 from confab.sim.verify import Rollout, expectations
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 from confab.table import Table
 
 if TYPE_CHECKING:
-    from confab.formats import ReportJson
     from confab.known import Known
     from confab.show import PlanTree
+
+
+class SuccessJson(TypedDict):
+    """The number of verified rollouts, the interval of the rate, and the mean share of a serving that arrived."""
+
+    verified: int
+    of: int
+    interval: list[float]
+    poured: float | None
+
+
+class SeenRolloutJson(RolloutJson):
+    """A rollout, with the final observed values of the goals' symbols."""
+
+    seen: list[str]
+
+
+class ReportJson(TypedDict):
+    """The verification of a plan in physics."""
+
+    status: str
+    success: SuccessJson
+    trusted: dict[str, int]
+    rollouts: list[SeenRolloutJson]
 
 
 @right_names("a report", "confab.hints", "REPORT")

@@ -139,8 +139,9 @@ def told(out: Path, text: str) -> None:
 
 def show_result(what: Any) -> None:
     """Print JSON data, a line of text, a table, or what rich can show, to stdout; a table in a pipe is separated by tabs."""
-    if hasattr(what, "tsv") and not sys.stdout.isatty():
-        print(what.tsv(), end="")
+    tsv = getattr(type(what), "tsv", None)  # of the class: a wrong name of an object is searched in all modules
+    if tsv is not None and not sys.stdout.isatty():
+        print(tsv(what), end="")
     elif isinstance(what, dict | list):
         print(json.dumps(what, indent=1, ensure_ascii=False))
     elif isinstance(what, str):

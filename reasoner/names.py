@@ -114,10 +114,13 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
         The call that makes one; the error of a constructor without its arguments names it.
     """
 
+    def hints() -> Mapping[str, str]:
+        found: Mapping[str, str] = getattr(import_module(module), table) if module else {}
+        return found
+
     def decorated(cls: C) -> C:
         def lacking(self: object, name: str) -> NoReturn:
-            hints = {} if name.startswith("_") or not module else getattr(import_module(module), table)
-            wrong_name(kind, name, type(self), hints)
+            raise WrongNameError(kind, name, type(self), hints)
 
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
         if made:
@@ -132,7 +135,8 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
             type.__setattr__(cls, "__init__", made_by)
         for name in dir(cls):
             function = getattr_static(cls, name)
-            if not name.startswith("_") and isinstance(function, FunctionType):
+            own = isinstance(function, FunctionType) and function.__module__.startswith("confab.")
+            if own and not name.startswith("_"):
                 setattr(cls, name, _checked(function))
         return cls
 
@@ -158,8 +162,10 @@ def _checked(function: Callable[..., R]) -> Callable[..., R]:
     return checked
 
 
-def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) -> NoReturn:
-    """Raise the error for a missing name: with the name of the same function, or the most similar name.
+class WrongNameError(AttributeError):
+    """The error for a missing name: with the name of the same function, or the most similar name.
+
+    The text is made when it is read: libraries ask objects for names that these don't have.
 
     Parameters
     ----------
@@ -168,14 +174,26 @@ def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) ->
     name : str
     there : object
         Its public names are those that `dir` lists.
-    hints : mapping of str to str
-        A right name to the words that mean it.
+    hints : callable
+        Returns the mapping of a right name to the words that mean it.
     """
-    text = f"{kind} has no '{name}'"
-    if not name.startswith("_"):
+
+    def __init__(self, kind: str, name: str, there: object, hints: Callable[[], Mapping[str, str]]) -> None:
+        super().__init__(f"{kind} has no '{name}'")
+        self._wrong, self._there, self._hints = (kind, name), there, hints
+
+    def __str__(self) -> str:
+        """Return the text with the right name."""
+        (kind, name), there = self._wrong, self._there
+        text = f"{kind} has no '{name}'"
+        if name.startswith("_"):
+            return text
         known = [each for each in dir(there) if not each.startswith("_")]
-        meant = next((right for right, wrong in hints.items() if name in wrong.split()), "")
+        meant = next((right for right, wrong in self._hints().items() if name in wrong.split()), "")
         if not meant and not get_close_matches(name, known, n=1, cutoff=TYPED):
             meant = next((import_module(each).guessed(kind.split()[-1], name) for each in GUESSING), "")
-        text += f"; use {meant}" if meant else nearest(name, known)
-    raise AttributeError(text)
+        return text + (f"; use {meant}" if meant else nearest(name, known))
+
+    def __reduce__(self) -> tuple[type[AttributeError], tuple[str]]:
+        """Return the parts of a copy: an error with the text."""
+        return AttributeError, (str(self),)

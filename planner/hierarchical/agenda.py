@@ -166,6 +166,7 @@ class Agenda:
         """Achieve one of the sleeping goals with a larger budget, or on a lower level; return whether that succeeded."""
         call = self.call
         if not self.solvable:
+            self._certify()
             self.check_unsolvable()
         if call.advice is not None and self.singly(call.program.levels[0], BY_RULES):
             return True
@@ -284,7 +285,8 @@ class Agenda:
         """Raise `UnsolvableError` if a proof is found by about as much work as the searches have taken."""
         call = self.call
         if not self.solvable:
-            self._certify()
+            if call.space.effort >= TEST * FIRST_TESTS:
+                self._certify()
             if FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
                 self._examine()
 

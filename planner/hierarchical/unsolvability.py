@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """Work of examining all states that is allowed before any search, in states times relaxed operators."""
-FIRST_TESTS, AT_ONCE, PAIRS = 2_000, 20_000, 500_000
+FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of tests of conditions for a certificate: before a search, in the paper's mode, and after searches have failed."""
 TEST = 8
 """Work of a test, about in microseconds."""

@@ -125,7 +125,7 @@ def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_
     ("kind", "effect", "what", "remedy"),
     [
         (", owl:TransitiveProperty", "", "since no property implies near", "rdfs:subPropertyOf near"),
-        (", owl:TransitiveProperty", " . ?cart :near ?prop", "since behaviours change NEAR", "let behaviours change another"),
+        (", owl:TransitiveProperty", " . ?cart :near ?prop", "since behaviours change NEAR", "let behaviours change a subproperty"),
         (FUNCTIONAL, "", "since near is functional", "drop owl:FunctionalProperty of near"),
     ],
 )  # fmt: skip
