@@ -80,7 +80,7 @@ def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
     assert rollout.failure is None
     assert rollout.poured == (1.0, 1.0)
-    assert max(report.verdict.measured.get("poured", 0.0) for report in rollout.steps) < 1.5
+    assert max(report.verdict.measured.get("poured", 0.0) for report in rollout.steps) < 2.0  # no second serving
     assert dict(rollout.state) == dict(one.expected[-1])
 
 
