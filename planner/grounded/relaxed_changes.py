@@ -70,19 +70,23 @@ class RelaxedChanges:
                 by_place[place].append((difference, sign))
         often = Counter((owner[relaxed], move.place) for relaxed, found in moves.items() for move in found)
 
-        def may(relaxed: int, found: Sequence[Move], difference: Linear, sign: str) -> bool:
-            alone = [move for move in found if often[owner[relaxed], move.place] == 1]
+        def may(found: Sequence[Move], alone: Sequence[Move], difference: Linear, sign: str) -> bool:
             amount, push = settled(alone, difference), pushes(found, difference)
             if amount is not None:
                 return COMPARING[sign](Fraction(amount), Fraction(0))
             return push is None or push > 0 or (push != 0 and sign == "=")
 
-        pairs = [
-            (relaxed, self.reached.amounts.bits[key])
-            for relaxed, found in moves.items()
-            for key in dict.fromkeys(key for move in found for key in by_place.get(move.place, ()))
-            if may(relaxed, found, *key)
-        ]
+        known: dict[tuple[object, ...], list[int]] = {}
+        pairs: list[tuple[int, int]] = []
+        for relaxed, found in moves.items():
+            alone = [often[owner[relaxed], move.place] == 1 for move in found]
+            alike = tuple((move.place, move.operation, move.by, only) for move, only in zip(found, alone, strict=True))
+            if alike not in known:
+                self.reached.check_time()
+                asked = dict.fromkeys(key for move in found for key in by_place.get(move.place, ()))
+                by_themselves = [move for move, only in zip(found, alone, strict=True) if only]
+                known[alike] = [self.reached.amounts.bits[key] for key in asked if may(found, by_themselves, *key)]
+            pairs.extend((relaxed, bit) for bit in known[alike])
         both = np.array(pairs, np.int64).reshape(-1, 2)
         return both[:, 0], both[:, 1]
 
