@@ -25,7 +25,7 @@ from confab.page.schema import FORMAT, PageData, StepData
 from confab.page.timeline import Bar, Timeline, of_episode, of_plan, of_rollout, of_schedule
 from confab.planner.causal_links import purposes
 from confab.planner.plan import Plan, Step
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, text
 from confab.reasoner.names import local_name
 from confab.reasoner.symbols import Problem
 
@@ -152,7 +152,9 @@ def timeline_data(
         "steps": _steps(timeline, labels, notes, reasons),
         "notes": [],
     }
-    ground = ground_of(timeline.problem, embodiment_of(scene))
+    shapes = scene.knowledge.select("SELECT ?thing ?shape { ?thing :shape ?shape } ORDER BY ?thing ?shape")
+    named = [(scene.names.short(text(thing)), text(shape)) for thing, shape in shapes]
+    ground = ground_of(timeline.problem, embodiment_of(scene), named)
     if ground is not None and ground.spots:
         data["map"] = map_of(ground, timeline, labels)
     elif ground is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import cos, hypot, sin
 
@@ -15,6 +15,8 @@ from confab.reasoner.symbols import Problem
 Point = tuple[float, float]
 MOST_SPOTS = 400
 """Maximum number of places of a map."""
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+"""A coordinate in well-known text."""
 STRETCH = 1.7
 """Horizontal stretch of a layout of connected places, since pages and names are wide."""
 
@@ -42,14 +44,21 @@ class Ground:
     note: str = ""
 
 
-def ground_of(problem: Problem, embodiment: Embodiment | None) -> Ground | None:
+def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()) -> Ground | None:
     """Return the background of the map: by coordinates, else by connections, else in order; None if there are no places.
 
     With more than `MOST_SPOTS` places it has none, and its note says so.
+
+    Parameters
+    ----------
+    problem : Problem
+    embodiment : Embodiment, optional
+    shapes : iterable of pairs of an individual and its shape
+        Points and polygons as well-known text, in metres, y up (`c:shape`).
     """
     if embodiment is not None and embodiment.places:
         return _furnished(embodiment)
-    return _connected(problem) or _in_order(problem)
+    return _drawn(shapes) or _connected(problem) or _in_order(problem)
 
 
 def _too_many(number: int) -> Ground:
@@ -94,6 +103,27 @@ def _furnished(embodiment: Embodiment) -> Ground:
         robots=tuple((robot.name, seen(*robot.position[:2])) for robot in embodiment.robots),
         note="to scale, seen from the side of the camera that films",
     )
+
+
+def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
+    """Return stated polygons and points, or None if there are none; an individual with a polygon alone stands in its middle."""
+    spots: dict[str, Point] = {}
+    areas: list[Area] = []
+    for name, text in shapes:
+        kind, numbers = text.split("(")[0].strip().upper(), [float(number) for number in NUMBER.findall(text)]
+        points = tuple((x, -y) for x, y in zip(numbers[::2], numbers[1::2], strict=False))
+        if kind == "POINT" and len(points) == 1:
+            spots[name] = points[0]
+        elif kind == "POLYGON" and len(points) > 2:
+            areas.append(Area(name, points[:-1] if points[0] == points[-1] else points))
+    for area in areas:
+        right, down = zip(*area.corners, strict=True)
+        spots.setdefault(area.name, (sum(right) / len(right), sum(down) / len(down)))
+    if not spots:
+        return None
+    if len(spots) > MOST_SPOTS:
+        return _too_many(len(spots))
+    return Ground(spots, tuple(areas), note="to scale")
 
 
 def _connected(problem: Problem) -> Ground | None:

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
     """Return the map of a ground, with the places of objects in time."""
     return {
-        "areas": [{"label": labels.name(area.name), "corners": list(area.corners)} for area in ground.areas],
+        "areas": [
+            {"id": area.name, "label": labels.name(area.name), "corners": list(area.corners)} for area in ground.areas
+        ],
         "ways": list(ground.ways),
         "places": [{"id": name, "label": labels.name(name), "at": at} for name, at in ground.spots.items()],
         "robots": [{"id": name, "label": labels.name(name), "at": at} for name, at in ground.robots],

@@ -59,6 +59,7 @@ class Thing(TypedDict):
 class AreaData(TypedDict):
     """A polygon of the map."""
 
+    id: str
     label: str
     corners: list[tuple[float, float]]
 

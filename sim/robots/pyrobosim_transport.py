@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, product
 from pathlib import Path
 from typing import Any
@@ -161,8 +161,20 @@ class Pyrobosim:
         return None if here is None else str(here.name)
 
     def scene_model(self) -> Model:
-        """Return the model with the ways between rooms: the longest between any two of their places, in metres."""
-        return {**self.model(), **dict(self._ways())}
+        """Return the model with shapes, and with the ways between rooms: the longest between any two of their places, in metres."""
+        shapes = self._shapes()
+        shaped = {name: {**fields, "shape": shapes.get(name, [])} for name, fields in self.model().items()}
+        return {**shaped, **dict(self._ways())}
+
+    def _shapes(self) -> dict[str, list[str]]:
+        """Return the polygon of each room, and a point in each room, hallway and spot, as well-known text."""
+        world = self.world
+        spots = (spot for location in world.locations for spot in location.children)
+        solid = [(each.name, each.polygon) for each in chain(world.rooms, world.hallways, spots)]
+        shapes = {name: [_text("POINT ({})", polygon.representative_point().coords)] for name, polygon in solid}
+        for room in world.rooms:
+            shapes[room.name].append(_text("POLYGON (({}))", room.polygon.exterior.coords))
+        return shapes
 
     def _ways(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
         world = self.world
@@ -191,3 +203,8 @@ class Pyrobosim:
 
 def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
     return abs(one[0] - other[0]) + abs(one[1] - other[1])
+
+
+def _text(form: str, points: Iterable[tuple[float, float]]) -> str:
+    """Return points as well-known text, with centimetres."""
+    return form.format(", ".join(f"{round(x, 2) + 0.0:g} {round(y, 2) + 0.0:g}" for x, y in points))

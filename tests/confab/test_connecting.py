@@ -76,6 +76,11 @@ def test_a_robot_is_planned_for_and_driven_by_what_turtle_says_of_its_interface(
     assert robot.called == len(done.episode.events)
 
 
+def test_the_shapes_of_a_world_model_are_on_the_map(rover: Scene) -> None:
+    shapes = [one for (one,) in rover.query("SELECT ?shape { :hall c:shape ?shape } ORDER BY ?shape").values()]
+    assert shapes == ["POINT (1 2)", "POLYGON ((0 0, 4 0, 4 3, 0 3, 0 0))"]
+
+
 def test_a_robot_that_keeps_to_the_protocol_passes_every_check(rover: Scene) -> None:
     with acting(rover, fine) as (world, _):
         found = check_world(world, rover.problem)

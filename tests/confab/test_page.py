@@ -166,6 +166,23 @@ def test_a_place_in_a_drawer_is_on_the_map_where_the_drawer_is() -> None:
     assert min(abs(complex(*a) - complex(*b)) for i, a in enumerate(spots) for b in spots[:i]) > 0.05
 
 
+def test_a_scene_without_geometry_is_mapped_by_the_shapes_that_it_states() -> None:
+    data = page_data(shipped("rooms-waste"))["map"]
+    assert data["metric"]
+    assert [area["label"] for area in data["areas"]] == ["closet", "dining", "kitchen", "office", "trash"]
+    spots = {place["label"]: place["at"] for place in data["places"]}
+    assert spots["desk desktop"] == (3.6, 2.3)  # y of the page runs down
+    assert len(spots) == 20
+
+
+def test_a_polygon_alone_is_a_place_too_and_other_shapes_are_left_out() -> None:
+    shapes = [("den", "POLYGON ((0 0, 4 0, 4 2, 0 2))"), ("hall", "LINESTRING (0 0, 1 1)"), ("door", "point(.5 1e0)")]
+    ground = ground_of(shipped("rooms-waste").problem, None, shapes)
+    assert ground is not None
+    assert ground.spots == {"den": (2.0, -1.0), "door": (0.5, -1.0)}
+    assert [area.name for area in ground.areas] == ["den"]
+
+
 def test_time_is_told_once_and_whole(serving_plan: confab.Result, failed: confab.Report) -> None:
     problem, plan = serving_plan.problem, serving_plan.plan
     for timeline in (of_plan(problem, plan), of_rollout(problem, plan, failed.rollouts[0])):

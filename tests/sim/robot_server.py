@@ -35,7 +35,7 @@ class Robot:
             for b in ("hall", "den")
         }
         model: dict[str, Any] = {
-            "hall": {"kind": "room"},
+            "hall": {"kind": "room", "shape": ["POLYGON ((0 0, 4 0, 4 3, 0 3, 0 0))", "POINT (1 2)"]},
             "den": {"kind": "room"},
             "door": {"kind": "hallway", "open": self.open["door"], "locked": False, "rooms": ["hall", "den"]},
             "rover": {"kind": "robot", "at": self.at, "room": self.room, "battery": 77.7},

@@ -50,6 +50,7 @@ class Plot {
     for (const area of map.areas) {
       const corners = area.corners.map(to);
       svg.append(drawn("path", { class: "area", d: `M${corners.map((corner) => corner.map(figure).join(" ")).join("L")}Z` }, drawn("title", {}, area.label)));
+      if (spots.has(area.id)) continue; // its place bears the name
       const [x, y] = [Math.min(...corners.map(([one]) => one)), Math.min(...corners.map(([, one]) => one))];
       labels.push({ words: area.label, kind: "area-name", x: x + 4, y: y + 12, size: 0, anchors: [[0, 0, "start"]], optional: true });
     }
