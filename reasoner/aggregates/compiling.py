@@ -7,13 +7,10 @@ from dataclasses import replace
 from itertools import chain, islice
 
 from confab.reasoner.aggregates.extrema import extrema_replaced
-from confab.reasoner.aggregates.keeping import kept
+from confab.reasoner.aggregates.keeping import MOST_CONDITIONS, kept
 from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Domain, spread
-
-MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts: a second to bind for search."""
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:

@@ -17,6 +17,7 @@ from confab.reasoner.afterwards import Afterwards, Conjunction, Formula, TooMany
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
 from confab.reasoner.language import DomainError, is_variable, mentions, walk
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     Aggregate,
     AmountEffect,
@@ -30,6 +31,9 @@ from confab.reasoner.symbols import (
     made_of,
     substituted,
 )
+
+MOST_CONDITIONS = 5_000
+"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts: a second to bind for search."""
 
 
 def kept(
@@ -106,7 +110,12 @@ class _Keeping:
 
     def behavior(self) -> Behavior:
         """Return the behaviour with these effects."""
-        effects = [effect for i in range(len(self.candidates)) for effect in self.effects(i)]
+        effects, many = list[AmountEffect](), 0
+        for effect in (effect for i in range(len(self.candidates)) for effect in self.effects(i)):
+            effects.append(effect)
+            many += sum(1 for condition in effect.when for _ in walk(condition))
+            if many > MOST_CONDITIONS:
+                raise TooManyCasesError
         known = self.own.kinds
         used = {
             t for e in effects for t in (*e.arguments, *terms_of(e.amount), *(m for c in e.when for m in mentions(c)))
@@ -188,6 +197,7 @@ class _Keeping:
             else:
                 guard.append(self._put(tuple_, candidate.value, effect.value))
         for whole, each, more in self._completed(tuple_, effect.each):
+            check("deriving amounts")
             others = [negation(self.agrees(other, whole)) for other in self.candidates[:number]]
             yield from self._differences(whole, each, [*guard, *more, *others])
 

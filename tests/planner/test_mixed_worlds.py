@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import process_time
 
 import pytest
 
 from confab.planner.plan import Plan, Step
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.reading.problem import read
 from confab.scene import load
 from tests.planner.naive import complete, results
@@ -116,3 +118,12 @@ def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
     its = Judge(mixed(301_000_072, 0.0), tmp_path, every=True).judged()
     assert not its.complaints
     assert "refused" not in {its.status[mode] for mode in ("guarded", "optimal", "paper")}
+
+
+@pytest.mark.parametrize("seed", [320_002_517, 320_002_585])
+def test_a_count_that_takes_too_many_conditions_is_refused_at_once(seed: int, tmp_path: Path) -> None:
+    (tmp_path / "world.ttl").write_text(scene(mixed(seed)))
+    world, begin = load(str(tmp_path / "world.ttl")), process_time()
+    with pytest.raises(KnowledgeError, match="by too many effects at once; use fewer effects"):
+        world.plan()
+    assert process_time() - begin < 3.0
