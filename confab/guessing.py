@@ -38,62 +38,93 @@ WAYS: Mapping[str, Mapping[str, str]] = {
 }
 """The attribute, or the call, that leads from a thing to another one."""
 MEANINGS = """
-load open read parse import file ontology problem domain scene ttl
-scenes examples datasets catalog list available domains
-families generate random
-plan solve policy planner planning replan find
+load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
+scenes examples datasets catalog list available builtin samples
+families generate random synthetic
+plan solve policy planner planning replan find compute start predict motion
 query ask sparql select
-verify simulate simulation simulator physics rollout monte carlo test
-execute run act perform dispatch apply step through
-validate lint check shacl consistent
-facts fact state init initial values now
-goals goal task tasks objective
+verify simulate simulation simulator physics physically rollout roll dry monte carlo test
+execute run act perform dispatch apply step through carry drive real move
+validate lint check shacl consistent consistency errors error warnings warning problems
+facts fact state initial init values now current belief situation world
+goals goal task tasks objective desired target wanted
 objects object individuals individual instances things entities
 behaviors behavior behaviours behaviour action actions operator operators skills schema schemas preconditions effects
-situations predicates fluents situation
-arguments args params parameters objects
-steps actions children subplan subplans sub refinement decomposition sequence list
-primitives leaves low
-cost metric price
-seconds time timeout runtime duration elapsed
+situations predicates fluents situation variables
+arguments args params parameters operands objects
+steps actions children kids subplan subplans sub substeps refinement decomposition sequence list trajectory
+primitives primitive leaves low atomic flatten flat
+cost metric price total objective reward
+seconds time timeout runtime duration elapsed wall cpu clock
 search expanded expansions statistics stats nodes generated
-reason why because unsolvable failure error explain justify
-report html page visualise visualize visualization render plot
-picture draw show plot render image png map visualise visualize
+reason why because unsolvable failure failed error explain justify
+report html page visualise visualize visualization render plot browser gantt chart
+picture draw show plot render image png map visualise visualize screenshot svg
 video film movie gif mp4 animation
-graph triples rdf turtle ttl serialize serialise save add
+graph triples rdf rdflib turtle ttl n3 jsonld serialize serialise save add
+networkx graph nx digraph tree
 save store write dump persist
+export pddl
 json dict
-dataframe df pandas to_dataframe
+dataframe df pandas csv excel frame
 records dict dicts
 rows head values tail
 length levels num number count size depth shape
-solved success succeeded ok solvable done found
-outcome status
+level depth layer height
+solved success succeeded ok solvable done found feasible
+outcome status termination
 bound optimal lower
 timed schedule makespan duration timeline gantt
 certificate proof
 events timeline observations history log trace
 replans repairs changes replanning
 failures failure errors faults
-memory experience learn learned train fit forget
+faults valid invalid violations correct
+memory experience learn learned train fit forget knowledge
 advice rules rule weights
-embodiment robot robots arms body
+embodiment robot robots arms body urdf hardware gripper kinematics joints links
 iri uri namespace namespaces prefixes base
-with_fact fact set assert tell put remove without change
-with_goal goal set
+names prefixes prefix namespaces namespace manager
+with_fact fact set assert tell put remove without change update insert assume modify transform clone
+with_goal goal set replace
 rate accuracy probability score
-label words text sentence
+label words text sentence name title
+id index identifier uuid
+affordances possible applicable available afford legal can do
+serve server endpoint api rest http web host
+board widget edit editor interactive gui ui
+show print pretty display
 __version__ version
 """
 """Words with one meaning, a line each."""
 FILLERS = frozenset(
-    {"get", "to", "as", "is", "has", "all", "n", "of", "the", "for", "in", "make", "create", "new", "my", "with"}
+    {
+        "get",
+        "to",
+        "as",
+        "is",
+        "has",
+        "all",
+        "n",
+        "of",
+        "the",
+        "for",
+        "in",
+        "create",
+        "new",
+        "my",
+        "with",
+        "from",
+        "what",
+        "on",
+    }
 )
 OF_ANY = frozenset({"plan", "planning", "search"})
 """Words that say little beside others: the length of a plan is its length."""
-ENOUGH, FAR = 0.55, 0.1
+ENOUGH, FAR = 0.5, 0.1
 """Least score of a name that is told; by how much a name counts less for each step that leads to it."""
+MOST, NEAR = 3, 0.3
+"""Maximum number of names that are told, and by how much the others may count less than the first."""
 
 
 @cache
@@ -160,23 +191,25 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
         for word, known in zip(wanted, met, strict=True)
     ]
     extra = sum(max(alike(word, one) for word in wanted) == 0 for one in has)
-    return sum(told) / len(told) - 0.12 * extra
+    return 0.5 * max(told) + 0.5 * sum(told) / len(told) - 0.08 * extra
 
 
 def guessed(kind: str, name: str) -> str:
-    """Return the name that does what a wrong name of a thing asks for, or an empty text.
+    """Return the names that may do what a wrong name of a thing asks for, the best first, or an empty text.
 
-    >>> guessed("result", "planning_time"), guessed("plan", "save"), guessed("plan", "xyzzy")
-    ('seconds', 'result.save', '')
+    >>> guessed("result", "planning_time"), guessed("plan", "xyzzy")
+    ('seconds', '')
     """
     wanted = words_of(name)
     wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in OF_ANY) or wanted
-    best = (ENOUGH, "")
-    for there, before, far in places(kind):
-        for known, doc in sorted(described(there).items(), key=lambda one: (len(one[0]), one[0])):
-            worth = score(wanted, known, doc) - FAR * far
-            best = max(best, (worth, before + known), key=lambda one: one[0])
-    return best[1]
+    worth = {
+        before + known: score(wanted, known, doc) - FAR * far
+        for there, before, far in reversed([*places(kind)])
+        for known, doc in described(there).items()
+    }
+    ranked = sorted(worth, key=lambda each: (-worth[each], len(each), each))[:MOST]
+    told = [each for each in ranked if worth[each] >= max(ENOUGH, worth[ranked[0]] - NEAR)]
+    return ", or ".join(filter(None, (", ".join(told[:-1]), *told[-1:])))
 
 
 def chosen(name: str, known: Iterable[str]) -> str:

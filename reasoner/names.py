@@ -97,6 +97,8 @@ def _ontology_name(iri: str) -> str:
 
 TYPED = 0.85
 """Similarity from which on a wrong name counts as a right one with a slip."""
+FEW_NAMES = 30
+"""Maximum number of names that are all told where none is like a wrong one."""
 GUESSING: list[str] = []
 """Modules that find what a wrong name means: `guessed` of a thing's names, `chosen` of some names; the top layer adds one."""
 
@@ -188,11 +190,14 @@ class WrongNameError(AttributeError):
         text = f"{kind} has no '{name}'"
         if name.startswith("_"):
             return text
-        known = [each for each in dir(there) if not each.startswith("_")]
+        every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
+        known = sorted(each for each in every if not each.startswith("_"))
         meant = next((right for right, wrong in self._hints().items() if name in wrong.split()), "")
         if not meant and not get_close_matches(name, known, n=1, cutoff=TYPED):
             meant = next((import_module(each).guessed(kind.split()[-1], name) for each in GUESSING), "")
-        return text + (f"; use {meant}" if meant else nearest(name, known))
+        if meant:
+            return f"{text}; use {meant}"
+        return text + nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
 
     def __reduce__(self) -> tuple[type[AttributeError], tuple[str]]:
         """Return the parts of a copy: an error with the text."""

@@ -76,7 +76,9 @@ GUESSED = {
 @pytest.mark.parametrize("kind", GUESSED)
 def test_a_name_in_no_table_is_understood_by_its_words(kind: str) -> None:
     pairs = [pair.split(":") for pair in GUESSED[kind].split()]
-    assert {name: guessed(kind, name) for name, _ in pairs} == dict(pairs)
+    told = {name: guessed(kind, name).replace(" or ", " ").split(", ") for name, _ in pairs}
+    assert [(name, told[name]) for name, right in pairs if right not in [one.strip() for one in told[name]]] == []
+    assert max(map(len, told.values())) <= 3
     assert guessed(kind, "xyzzy") == ""
 
 
