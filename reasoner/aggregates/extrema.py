@@ -19,6 +19,7 @@ from confab.reasoner.symbols import (
     Domain,
     Effect,
     Parameter,
+    Timing,
     ValueEffect,
     Witness,
     substituted,
@@ -111,7 +112,7 @@ def extrema_replaced(domain: Domain) -> Domain:
     Raises
     ------
     DomainError
-        An effect, a price or a sum reads one. The message names both.
+        An effect, a price, a duration or a sum reads one. The message names both.
     """
     aggregates = domain.aggregates
     if all(one.kept for one in aggregates.values()):
@@ -129,6 +130,15 @@ def extrema_replaced(domain: Domain) -> Domain:
                 "and goals can name; use a variable for the individual that has it"
             )
 
+    def timed(behavior: Behavior) -> Timing | None:
+        timing = behavior.timing
+        if timing is None:
+            return None
+        if timing.duration is not None:
+            _refuse(f"the duration of {behavior.name}", timing.duration)
+        asked = tuple((span, _with_extremum(condition, aggregates)) for span, condition in timing.conditions)
+        return replace(timing, conditions=asked, effects=tuple((s, effect(behavior, e)) for s, e in timing.effects))
+
     behaviors = {}
     for name, one in domain.behaviors.items():
         if one.price is not None:
@@ -138,6 +148,7 @@ def extrema_replaced(domain: Domain) -> Domain:
             preconditions=with_extrema(one.preconditions, aggregates),
             effects=tuple(e for e in (effect(one, e) for e in one.effects) if isinstance(e, ValueEffect)),
             amounts=tuple(e for e in (effect(one, e) for e in one.amounts) if isinstance(e, AmountEffect)),
+            timing=timed(one),
         )
     rules = {
         name: tuple(replace(rule, conditions=with_extrema(rule.conditions, aggregates)) for rule in its)

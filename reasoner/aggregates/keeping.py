@@ -26,6 +26,7 @@ from confab.reasoner.symbols import (
     Effect,
     Parameter,
     SituationType,
+    Timing,
     ValueCondition,
     ValueEffect,
     made_of,
@@ -123,7 +124,22 @@ class _Keeping:
         each = {e.each.name for e in effects if e.each is not None}
         more = sorted(t for t in used - each if is_variable(t) and t not in known)
         variables = (*self.own.variables, *(Parameter(name, self.after.kinds[name]) for name in more))
-        return replace(self.own, variables=variables, amounts=(*self.own.amounts, *effects))
+        amounts = (*self.own.amounts, *effects)
+        return replace(self.own, variables=variables, amounts=amounts, timing=self._timed(effects))
+
+    def _timed(self, effects: Sequence[AmountEffect]) -> Timing | None:
+        """Return the behaviour's timing, in which the total changes when the facts change that determine it."""
+        timing = self.own.timing
+        if timing is None or not effects:
+            return timing
+        read = read_by(self.aggregate)
+        spans = dict.fromkeys(span for span, effect in timing.effects if effect.situation in read)
+        if len(spans) > 1:
+            raise DomainError(
+                f"{self.own.name} changes the facts that determine {self.aggregate.situation} at several times "
+                f"({', '.join(span.value for span in spans)}); let these effects take place at one time, or use two behaviours"
+            )
+        return replace(timing, effects=(*timing.effects, *((span, effect) for span in spans for effect in effects)))
 
     def _candidates(self) -> Iterator[_Candidate]:
         """Yield the effects that may change the total, each with each symbol in the conditions or the number."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
@@ -116,3 +117,57 @@ def test_a_plan_that_leaves_a_level_keeps_its_stretches_in_time(tmp_path: Path) 
     assert found is not None
     timed = in_time(problem, found, 1.0)
     assert timed.plan is not None, timed.reason
+
+
+SHELVES = '''
+@prefix : <https://example.org/shelves#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/shelves> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Arm a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Shelf a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place ; c:hasSituationType :STOCK .
+:Book a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at .
+:Place rdfs:subClassOf :AT . :Arm rdfs:subClassOf :AT .
+:at a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Book ; rdfs:range :AT .
+:STOCK a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :stock .
+:stock a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Shelf ; rdfs:range xsd:integer .
+:places a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Shelf ; rdfs:range xsd:integer .
+:STOCK.rule a owl:NamedIndividual, c:Rule ; c:construct """CONSTRUCT { ?shelf :stock ?n } WHERE {
+   SELECT ?shelf (COUNT(?book) AS ?n) WHERE { ?shelf a :Shelf . ?book a :Book ; :at ?shelf } GROUP BY ?shelf }""" .
+:TAKE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:actor :TAKE.arm ;
+  c:duration "PT2S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?book :at ?from } INSERT { ?book :at ?arm }
+  WHERE { ?book a :Book . ?arm a :Arm . ?from a :Place . ?book :at ?from FILTER NOT EXISTS { ?other a :Book ; :at ?arm } }""" .
+:PUT a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:actor :PUT.arm ;
+  c:duration "PT3S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?book :at ?arm } INSERT { ?book :at ?shelf }
+  WHERE { ?book a :Book . ?arm a :Arm . ?shelf a :Shelf . ?book :at ?arm . ?shelf :stock ?n ;
+    :places ?most FILTER(?n < ?most) }""" .
+:TAKE.arm a owl:NamedIndividual . :PUT.arm a owl:NamedIndividual .
+:arm1 a :Arm, owl:NamedIndividual . :arm2 a :Arm, owl:NamedIndividual .
+:table a :Place, owl:NamedIndividual . :s1 a :Shelf, owl:NamedIndividual ; :places 2 .
+:s2 a :Shelf, owl:NamedIndividual ; :places 2 .
+:b1 a :Book, owl:NamedIndividual ; :at :table .
+:b2 a :Book, owl:NamedIndividual ; :at :table .
+:b3 a :Book, owl:NamedIndividual ; :at :s1 .
+:b4 a :Book, owl:NamedIndividual ; :at :s1 .
+[] a owl:AllDifferent ; owl:distinctMembers ( :arm1 :arm2 :table :s1 :s2 :b1 :b2 :b3 :b4 ) .
+'''
+"""Two arms put books on shelves: how many are on a shelf follows from where the books are."""
+
+
+def test_a_count_follows_the_facts_in_time_too(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(SHELVES)
+    scene = confab.load(tmp_path / "shelves.ttl")
+    result = scene.plan(["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan")
+    assert result.solved
+    assert result.timed is not None
+    assert [result.timed.serial, result.timed.makespan, result.timed.bound] == [
+        Fraction(20),
+        Fraction(10),
+        Fraction(10),
+    ]
