@@ -16,7 +16,7 @@ from confab.sim.robots.transports import TRANSPORTS
 if TYPE_CHECKING:
     from confab.known import Known
 
-FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml"
+FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml or rover:http://localhost:8080"
 
 
 def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[InterfaceWorld, RetryPolicy]:
@@ -42,9 +42,7 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     interface = read_interface(scene.knowledge.store, scene.names.short, name)
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     if lacking := [behavior.name for behavior in lowest if behavior.name not in interface.calls]:
-        raise KnowledgeError(
-            f"no action of {name} carries {', '.join(lacking)} out; state e:carriesOut of one of its actions"
-        )
+        raise KnowledgeError(f"{name} has no action for {', '.join(lacking)}; state e:carriesOut of one of its actions")
     world = InterfaceWorld(interface, reached(interface, where, seed), problem)
     retry_policy = RetryPolicy()
     return world, replace(

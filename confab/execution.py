@@ -317,11 +317,13 @@ class Execution:
         return episode_json(self.episode)
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return remarks on each step, by its path: surprises, and changes of the plan."""
+        """Return remarks on each step of `plan`, by its path: failures, surprises, and changes of the plan."""
+        same = {step.path: (step.behavior, step.arguments) for step in self.plan.walk()}
         notes = {
             event.step.path: "✗ " + (event.code or "; ".join(str(s.symbol) for s in event.surprises))
             for event in self.episode.events
-            if not event.ok or event.surprises
+            if (not event.ok or event.surprises)
+            and same.get(event.step.path) == (event.step.behavior, event.step.arguments)
         }
         for replan in self.episode.replans:
             text = f"↻ {replan.kind} (−{replan.dropped} +{replan.added}): {replan.because}"
@@ -536,6 +538,10 @@ def execute(
         world, stated = connected(scene, problem, world, seed)
         retry_policy = stated if retry_policy == RetryPolicy() else retry_policy
     if not isinstance(world, str):
+        if wanted and not (hasattr(world, "disturb") and hasattr(world, "announce")):
+            raise KnowledgeError(
+                "interventions can take place in simulated worlds only, which have disturb and announce"
+            )
         with possible():
             return Execution(scene, act(problem, world, plan, wanted, planner, retry_policy, observer, True, caution))
     if world != "pybullet":

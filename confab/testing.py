@@ -6,7 +6,7 @@ Each check reports its finding with numbers. The primitives of a plan are really
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Thread
 from time import perf_counter, sleep
@@ -26,6 +26,9 @@ SOON = 1.0
 
 STOPPED_WITHIN = 10.0
 """Seconds within which `execute` should return after `stop`."""
+
+ATTEMPTS = 5
+"""Maximum number of attempts at a primitive that fails."""
 
 BEGUN = 0.05
 """Seconds after which a primitive counts as begun, and is stopped."""
@@ -96,11 +99,13 @@ def check_world(
     checks: list[Check] = []
     try:
         first = _observed(guarded, problem, checks)
+        if any(symbol.situation not in problem.domain.situations for symbol in first):
+            return Conformance(tuple(checks))
         if steps is None:
             now = {**problem.initial, **first}
             plan = hierarchical_plan(replace(problem, initial=now), limits=Limits(seconds=20.0)).plan
             steps = plan.primitives if plan is not None else ()
-        checks.append(_refusal(guarded, first))
+        checks.append(_refusal(guarded, first, steps[0].arguments if steps else ()))
         rest = _stopped(guarded, problem, steps, stopped_within, checks)
         _executed(guarded, problem, rest, checks)
     except WorldError as error:
@@ -148,9 +153,9 @@ def _known(problem: Problem, symbol: Symbol, value: str) -> bool:
 # ------------------------------------------------------------------------------------------------------------- execution
 
 
-def _refusal(world: Guarded, before: State) -> Check:
+def _refusal(world: Guarded, before: State, arguments: tuple[str, ...]) -> Check:
     """Check that a primitive that doesn't exist fails, reports it, and has no effect."""
-    verdict = world.execute(Step((0,), 0, 1, "no such behaviour", ()))
+    verdict = world.execute(Step((0,), 0, 1, "NO_SUCH_BEHAVIOUR", arguments))
     after = world.observe()
     changed = sorted(str(s) for s in after.keys() | before.keys() if after.get(s) != before.get(s))
     if verdict.ok:
@@ -178,7 +183,7 @@ def _stopped(
     running.start()
     sleep(BEGUN)
     if not running.is_alive():
-        checks.append(Check("cancellation", None, f"{steps[0]} took less than {BEGUN * 1000:.0f} ms"))
+        checks.append(_after_idle_stop(steps[0], answers[0]))
     else:
         begin = perf_counter()
         world.stop()
@@ -200,6 +205,15 @@ def _stopped(
     return steps if left is not None else steps[1:]
 
 
+def _after_idle_stop(step: Step, ended: Verdict | Exception) -> Check:
+    """Check that a stop with nothing running doesn't stop the primitive after it."""
+    if isinstance(ended, Exception):
+        raise ended
+    if ended.code == INTERRUPTED:
+        return Check("cancellation", False, f"{step} was stopped by the stop() before it, when nothing was running")
+    return Check("cancellation", None, f"{step} took less than {BEGUN * 1000:.0f} ms")
+
+
 def _noting(answers: list[Verdict | Exception], work: Callable[[], Verdict]) -> Callable[[], None]:
     def run() -> None:
         try:
@@ -210,28 +224,42 @@ def _noting(answers: list[Verdict | Exception], work: Callable[[], Verdict]) -> 
     return run
 
 
-def _executed(world: Guarded, problem: Problem, steps: Iterable[Step], checks: list[Check]) -> None:
-    """Check verdicts against observations, primitive by primitive."""
+def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: list[Check]) -> None:
+    """Check verdicts against observations, primitive by primitive; what fails is tried again."""
     done, failed, lies, understated, nameless, times = 0, 0, list[str](), list[str](), list[str](), list[float]()
+    seen, wanted, ended = set[Symbol](), dict[Symbol, None](), ""
     for step in steps:
-        before = {**problem.initial, **world.observe()}
-        expected = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, before)
-        if expected is None:
-            break  # an earlier one failed: the rest of the plan has no preconditions
-        begin = perf_counter()
-        verdict = world.execute(step)
-        times.append(perf_counter() - begin)
-        missing = _missing(problem, before, expected, world.observe())
-        if verdict.ok:
-            done += 1
-            lies += [f"{step}: {missing}"] if missing else []
-        else:
+        for attempt in range(1, ATTEMPTS + 1):
+            before = {**problem.initial, **world.observe()}
+            expected = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, before)
+            if expected is None:
+                ended = f"ended at {step}, whose preconditions aren't seen to hold"
+                break
+            begin = perf_counter()
+            verdict = world.execute(step)
+            times.append(perf_counter() - begin)
+            after = world.observe()
+            seen.update(after)
+            missing = _missing(problem, before, expected, after)
+            if verdict.ok:
+                done += 1
+                changed = (s for s, value in expected.items() if before.get(s) != value)
+                wanted.update(dict.fromkeys(s for s in changed if not problem.domain.situations[s.situation].boolean))
+                lies += [f"{step}: {missing}"] if missing else []
+                break
             failed += 1
             understated += [str(step)] if not missing else []
             nameless += [str(step)] if not isinstance(verdict.code, str) or not verdict.code else []
+            if attempt == ATTEMPTS:
+                ended = f"ended at {step}, which failed {ATTEMPTS} times: {verdict.code}"
+        if ended:
+            break
     longest = f", the longest in {max(times):.2f} s" if times else ""
-    checks.append(Check("execution", done > 0 or None, f"{done} primitives done, {failed} failed{longest}"))
+    text = f"{done} of {len(steps)} primitives done, {failed} attempts failed{longest}"
+    checks.append(Check("execution", not ended if steps else None, "; ".join(filter(None, (text, ended)))))
+    never = sorted({str(symbol) for symbol in wanted if symbol not in seen})
     text = f"done by the verdict, and not seen: {'; '.join(lies[:3])}" if lies else "what was reported as done was seen"
+    text += f"; never perceived, so not checked: {', '.join(never[:5])}" if never else ""
     checks.append(Check("effects", not lies if done else None, text))
     text = f"failed without a code: {', '.join(nameless[:3])}" if nameless else "every failure has a code"
     checks.append(Check("failures", not nameless if failed else None, text if failed else "nothing failed"))

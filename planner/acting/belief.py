@@ -12,9 +12,11 @@ from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
+from confab.reasoner.amounts import DECIMAL
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import (
     FALSE,
+    TRUE,
     AnyOf,
     Behavior,
     Condition,
@@ -71,6 +73,21 @@ class Belief:
     def boolean(self, symbol: Symbol) -> bool:
         """Return whether a symbol is boolean, so that not observing it means that it is false."""
         return self.problem.domain.situations[symbol.situation].boolean
+
+    def fault(self, symbol: Symbol, value: str) -> str:
+        """Return why an observed value can't be believed; an empty text if it can."""
+        situation = self.problem.domain.situations.get(symbol.situation)
+        if situation is None:
+            return f"the scene has no situation type {symbol.situation}"
+        if len(symbol.arguments) != len(situation.arguments):
+            return f"{symbol.situation} is about {len(situation.arguments)} individuals"
+        if situation.quantity is not None:
+            return "" if DECIMAL.fullmatch(value) else "wanted a number as text"
+        if value in (TRUE, FALSE) or value in self.problem.individuals:
+            return ""
+        values = [TRUE, FALSE] if situation.boolean else sorted(self.problem.members(situation.range))
+        listed = ", ".join(values[:8]) + (", …" if len(values) > 8 else "")
+        return f"which is no value of {symbol.situation} ({listed})"
 
     def take_in(self, expected: State, seen: State) -> tuple[Surprise, ...]:
         """Believe the observation, and the expectation for symbols that can't be observed; return the differences between them."""

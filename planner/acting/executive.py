@@ -251,6 +251,9 @@ class _Run:
         """Observe the world unless `seen` is given, believe the observation, and return the differences from the expectation."""
         seen = self.world.observe() if seen is None else seen
         self.meet()
+        for symbol, value in seen.items():
+            if why := self.belief.fault(symbol, value):
+                raise WorldError(f"the world's observe() says {symbol} = {value}; {why}")
         before = self.belief.state
         surprises = self.belief.take_in(expected, seen)
         self.record.changes(before, self.belief.problem.initial, self.world.seconds)

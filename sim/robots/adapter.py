@@ -3,12 +3,14 @@
 Rule 1: only facts shown by the world model are believed. Facts that the scene doesn't know are ignored.
 Rule 2: an action that exceeds its time limit, or is stopped, is cancelled; its late result is ignored.
 Rule 3: a robot that doesn't confirm a cancellation is busy and gets no further calls until the action has ended.
+Rule 4: an action whose wait an exception ends, such as Ctrl-C, is cancelled by `stop` itself.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from fractions import Fraction
 from threading import Condition, Thread
 from time import monotonic
@@ -23,6 +25,12 @@ from confab.sim.robots.transport import Model, RobotError, Transport
 
 GRACE = 5.0
 """Seconds that a robot is given to end a cancelled action."""
+
+SENT = 2.0
+"""Seconds that are allowed for sending a cancellation after an exception."""
+
+NOT_STOPPED = "not stopped"
+"""The code of a primitive whose action goes on though it was stopped."""
 
 LOOKS = 3
 """Number of requests for the world model before the robot counts as out of reach."""
@@ -46,7 +54,7 @@ class InterfaceWorld:
         self.begun = monotonic()
         self.changed = Condition()
         self.running: object | None = None
-        self.stopping = False
+        self.stopping = self.waiting = False
         names = {individual for members in problem.classes.values() for individual in members}
         self.robot_name = {name: interface.robot_names.get(name, name.rpartition(":")[2]) for name in sorted(names)}
         self.own_name = {theirs: ours for ours, theirs in self.robot_name.items()}
@@ -117,7 +125,7 @@ class InterfaceWorld:
         """Execute a primitive: call its action, and wait for the answer, for the time limit, or for `stop`."""
         call = self.interface.calls.get(step.behavior)
         if call is None:
-            return Report(False, "no action", (), f"no action of {self.interface.name} carries {step.behavior} out")
+            return Report(False, "no action", (), f"{self.interface.name} has no action for {step.behavior}")
         if not self._idle():
             return Report(False, "busy", step.arguments, "the robot still executes an action that was cancelled")
         arguments = {
@@ -135,10 +143,13 @@ class InterfaceWorld:
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
-        """Stop the running action."""
+        """Stop the running action: the call that waits for it cancels it, or this one if an exception has ended that wait."""
         with self.changed:
             self.stopping = self.running is not None
+            abandoned = self.stopping and not self.waiting
             self.changed.notify_all()
+        if abandoned:
+            self._begin_cancelling().join(SENT)
 
     def _begin(self, work: Callable[[], T], results: list[T | Exception]) -> None:
         """Do some work in a thread of its own, and note its result or its exception."""
@@ -162,7 +173,11 @@ class InterfaceWorld:
     def _wait(self, over: Callable[[], bool], seconds: float) -> bool:
         """Wait until something is over, time has passed, or the world is stopped; return whether it is over."""
         with self.changed:
-            self.changed.wait_for(lambda: over() or self.stopping, seconds)
+            self.waiting = True
+            try:
+                self.changed.wait_for(lambda: over() or self.stopping, seconds)
+            finally:
+                self.waiting = False
             return over()
 
     def _idle(self) -> bool:
@@ -173,19 +188,27 @@ class InterfaceWorld:
     def _cancelled(self, step: Step, call: InterfaceCall) -> Report:
         """Cancel the running action and return why."""
         stopped = self.stopping
-        ignored: list[Exception | None] = []
-        Thread(target=self._cancel, args=(ignored,), daemon=True, name=f"cancelling of {self.interface.name}").start()
-        idle = self._idle()
-        said = "" if idle else "; the robot didn't end it"
+        self._begin_cancelling()
+        said = (
+            ""
+            if self._idle()
+            else f"{call.action} didn't end within {GRACE:g} s of being cancelled; the robot may still move"
+        )
         if stopped:
-            return Report(False, INTERRUPTED, step.arguments, f"it was stopped{said}")
-        return Report(False, "timed out", step.arguments, f"{call.action} took longer than {call.seconds:g} s{said}")
+            return Report(False, NOT_STOPPED if said else INTERRUPTED, step.arguments, said or "it was stopped")
+        late = f"{call.action} took longer than {call.seconds:g} s"
+        return Report(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
 
-    def _cancel(self, ignored: list[Exception | None]) -> None:
-        try:
-            self.transport.cancel()
-        except Exception as error:
-            ignored.append(error)
+    def _begin_cancelling(self) -> Thread:
+        """Request the robot to end its action, in a thread of its own, which is returned; an error of it is ignored."""
+
+        def run() -> None:
+            with suppress(Exception):
+                self.transport.cancel()
+
+        cancelling = Thread(target=run, daemon=True, name=f"cancelling of {self.interface.name}")
+        cancelling.start()
+        return cancelling
 
     def _meaning(self, step: Step, call: InterfaceCall, status: str, message: str) -> Report:
         meaning = self.interface.meanings.get(status)

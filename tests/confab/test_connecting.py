@@ -2,6 +2,9 @@
 
 import asyncio
 import random
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +23,7 @@ from confab.planner.plan import Step
 from confab.reasoner.embodiment.interfaces import read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.symbols import Problem, State, Symbol
 from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
 from confab.sim.robots.http_transport import HttpRobot
@@ -36,13 +39,17 @@ CATALOG = """<?xml version="1.0"?><catalog prefer="public" xmlns="urn:oasis:name
 @pytest.fixture(scope="module")
 def rover(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     """Return the scene that the robot's own world model makes, with its interface."""
-    folder = tmp_path_factory.mktemp("rover")
+    return confab.load(scene_file(tmp_path_factory.mktemp("rover"))).with_goal(*GOALS)
+
+
+def scene_file(folder: Path) -> Path:
+    """Write that scene."""
     (folder / "rover.ttl").write_text(interface())
     (folder / "catalog-v001.xml").write_text(CATALOG)
     alone = confab.load(str(folder / "rover.ttl"))
     found = read_interface(alone.knowledge.store, alone.names.short, "rover")
     (folder / "scene.ttl").write_text(scene_text(found, Robot().model(), "scene", "Two rooms")[0])
-    return confab.load(str(folder / "scene.ttl")).with_goal(*GOALS)
+    return folder / "scene.ttl"
 
 
 @contextmanager
@@ -276,6 +283,84 @@ def test_the_deadline_stops_an_asynchronous_robot() -> None:
         done = scene.execute(world=world, time_limit=1.0)
     assert time.monotonic() - begin < 5.0
     assert not done.reached
+
+
+def test_ctrl_c_cancels_the_running_action(tmp_path: Path) -> None:
+    robot = Robot(lambda *_: "hang")
+    with served(robot) as address:
+        script = (
+            "import sys; from confab.cli import main; "
+            f"main(['execute', sys.argv[1], '--on', 'rover:{address}', '--goal', 'ball THING_AT chest_inside'])"
+        )
+        command = [sys.executable, "-c", script, str(scene_file(tmp_path))]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+            while not robot.called and running.poll() is None:
+                time.sleep(0.05)
+            running.send_signal(signal.SIGINT)
+            _, said = running.communicate(timeout=20)
+    assert robot.called == 1
+    assert robot.cancelled.is_set()
+    assert running.returncode == 130
+    assert "interrupted" in said
+
+
+def test_interventions_are_refused_before_a_robot_moves(rover: Scene) -> None:
+    with acting(rover, fine) as (world, robot), pytest.raises(KnowledgeError, match="in simulated worlds only"):
+        execute(rover, rover.problem, world=world, interventions=["at=1 ball THING_AT chest_inside"])
+    assert robot.called == 0
+
+
+def test_a_value_that_the_scene_does_not_have_ends_the_episode_by_name() -> None:
+    problem = confab.load("beverage-serving").problem
+
+    class Odd(SymbolicWorld):
+        def observe(self) -> State:
+            return {**super().observe(), **odd}
+
+    odd = {Symbol("LOCATION", ("cup1",)): "shelf"}
+    done = confab.load("beverage-serving").execute(world=Odd(problem))
+    assert not done.reached
+    assert "<cup1, LOCATION> = shelf; which is no value of LOCATION (in_hand, location1, " in done.summary()
+    odd = {Symbol("COLOUR", ("cup1",)): "red"}
+    assert (
+        "the scene has no situation type COLOUR"
+        in confab.load("beverage-serving").execute(world=Odd(problem)).summary()
+    )
+    assert check_world(Odd(problem), problem)["symbols"].passed is False
+
+
+def test_a_stop_that_is_never_forgotten_and_a_step_that_always_fails_fail_the_test() -> None:
+    problem = confab.load("beverage-serving").problem
+
+    class Stopped(SymbolicWorld):
+        still = False
+
+        def execute(self, step: Step) -> Report:
+            return Report(False, "interrupted") if self.still else super().execute(step)
+
+        def stop(self) -> None:
+            self.still = True
+
+    assert check_world(Stopped(problem), problem)["cancellation"].passed is False
+
+    class Clumsy(SymbolicWorld):
+        def execute(self, step: Step) -> Report:
+            if step.behavior == "B3_GRASP":
+                return Report(False, "slipped", step.arguments)
+            return super().execute(step)
+
+    found = check_world(Clumsy(problem), problem)
+    assert not found.passed
+    assert "B3_GRASP left_hand, which failed 5 times: slipped" in found["execution"].found
+
+
+def test_a_robot_that_ignores_being_cancelled_is_said_to_go_on(rover: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("confab.sim.robots.adapter.GRACE", 0.2)
+    with acting(rover, lambda *_: "hang", seconds=60.0) as (world, _):
+        monkeypatch.setattr(world.transport, "cancel", lambda: None)
+        found = check_world(world, rover.problem)
+    assert found["cancellation"].passed is False
+    assert "not stopped" in found["cancellation"].found
 
 
 def test_a_world_that_does_not_stop_or_goes_backwards_fails_the_test() -> None:
