@@ -25,7 +25,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import nearest, right_names
-from confab.reasoner.possible import PLACE, refuse_impossible
+from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
@@ -117,6 +117,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         return _add(problem, words, text, when)
     fact = Fact(*parse_fact(problem, match[3]))
     with possible():
+        refuse_derived(problem.domain, [fact], f"'{text}'")
         refuse_impossible(problem, {}, {fact.symbol: fact.value}, f"'{text}'")
     return Intervention(InterventionKind.WORLD, (fact,), **when)
 

@@ -8,12 +8,12 @@ unknown, which is no fault.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 from confab.reasoner.amounts import DECIMAL, Quantity, written
-from confab.reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Domain, Fact, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
 """Perceivers of an object's place, of the object in a hand, and of a hand's position."""
@@ -91,6 +91,14 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
     for fault in impossible(problem, after):
         if fault.what not in known:
             raise ImpossibleStateError(f"{cause}: {fault}" if cause else str(fault))
+
+
+def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> None:
+    """Raise `ImpossibleStateError` if one of some facts is a derived amount, which other facts determine."""
+    for fact in facts:
+        if (name := fact.symbol.situation) in domain.aggregates:
+            text = f"a rule defines {name}; change a fact that it follows from"
+            raise ImpossibleStateError(f"{cause or fact}: {text}")
 
 
 def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:

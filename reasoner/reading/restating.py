@@ -15,7 +15,7 @@ from confab.reasoner.amounts import bounds, written
 from confab.reasoner.condition_nodes import Properties, equality_properties, symbol_properties, triples
 from confab.reasoner.files import as_iri_part
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
+from confab.reasoner.possible import ImpossibleStateError, refuse_derived, refuse_impossible
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
@@ -44,6 +44,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
     """
     initial = reading.problem.initial
     try:
+        refuse_derived(reading.problem.domain, facts)
         refuse_impossible(reading.problem, initial, {**initial, **{fact.symbol: fact.value for fact in facts}})
     except ImpossibleStateError as error:
         raise KnowledgeError(f"{', '.join(map(str, facts))}: {error}") from error

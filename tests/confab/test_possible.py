@@ -7,6 +7,7 @@ import pytest
 
 import confab
 from confab.page.sheet import Sheet
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.possible import impossible
 from confab.reasoner.reading.observed import load_observed, save_observed
 from confab.reasoner.symbols import Fact, Symbol
@@ -112,3 +113,11 @@ def test_what_a_scene_has_wrong_already_does_not_refuse_other_facts(tmp_path: Pa
     scene = confab.load(tmp_path / "twice.ttl")
     assert scene.with_fact("right_hand HAND_TILT tilted").facts
     assert scene.with_fact("cup1 LOCATION location3").facts
+
+
+def test_a_derived_fact_is_refused_by_interventions_as_by_with_fact() -> None:
+    scene = confab.load("carts-small")
+    with pytest.raises(KnowledgeError, match="a rule defines LOAD; change a fact that it follows from"):
+        scene.execute(interventions=["after=1 cart LOAD 5"])
+    with pytest.raises(KnowledgeError, match="a rule defines LOAD; change a fact"):
+        scene.with_fact("cart LOAD 5")
