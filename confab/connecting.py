@@ -20,7 +20,7 @@ FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml or rover:http://loca
 
 
 def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[InterfaceWorld, RetryPolicy]:
-    """Return the world of a robot, and the patience that its interface states.
+    """Return the world of a robot, and the retry policy that its interface states.
 
     Parameters
     ----------
