@@ -37,7 +37,8 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     certificate, tried = outcome.certificate, False
     while certificate is not None or not tried:
         if certificate is None:
-            certificate, tried = certify(problem), True
+            examined = outcome.reason is not None and outcome.reason.states > 0
+            certificate, tried = certify(problem, few_states=examined), True
         if certificate is not None:
             refused = refusal(problem, certificate)
             if refused is None:

@@ -41,8 +41,9 @@ WORK = 3_000_000
 """Maximum work to find a certificate: tests of conditions, and behaviours tried in a case."""
 LITTLE = 2_000, 20_000
 """Maximum number of tests per goal in the first and in the second round, before all goals are examined to the end."""
-PAIR, SHARE = 100_000, 0.5
-"""Maximum number of tests for each pair of goals; and the share of the remaining tests that each kind of partition may use."""
+PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
+"""Maximum number of tests for each pair of goals, and for leaving symbols out of a certificate; and the share of the remaining
+tests that each kind of partition may use."""
 FEW = 3
 """Maximum number of distinguished values of a symbol; beyond it, all its values are distinguished."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
@@ -51,13 +52,20 @@ by how much), or whether a condition on the final state can hold (`ENDS`)."""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
 
 
-def certify(problem: Problem, most: float = WORK) -> Certificate | None:
-    """Return a certificate that a task has no plan; None if the allowed work doesn't find one, or if there is a plan."""
+def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
+    """Return a certificate that a task has no plan; None if the allowed work doesn't find one, or if there is a plan.
+
+    If there are `few_states`, since a search has examined them all, these are the first proof that is tried.
+    """
     if not problem.domain.levels:
         return None
     lowest = Lowest(problem, most)
     try:
         relaxed = Relaxed(lowest)
+        if few_states:
+            found = _with_little(lowest, most, partial(_by_states, lowest))
+            if found is not None:
+                return _with_fewer(lowest, found)
         return (
             _at_once(lowest, LITTLE[0])
             or _contested(lowest)
@@ -374,9 +382,10 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
     """Return a certificate without the symbols that needn't be distinguished, as far as little work shows it for each."""
+    most = min(lowest.work + FEWER, lowest.most)
     for symbol in sorted(found.told_apart):
         fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
-        work = min(LITTLE[1], SHARE * (lowest.most - lowest.work))
+        work = min(LITTLE[1], SHARE * (most - lowest.work))
         found = _with_little(lowest, work, partial(_counted, lowest, fewer)) or found
     return found
 

@@ -190,10 +190,11 @@ class Counts:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why there is no plan: a sentence, and the facts or terms in it."""
+    """Why there is no plan: a sentence, the facts or terms in it, and the number of states if all were examined."""
 
     text: str
     terms: tuple[str, ...] = ()
+    states: int = 0
 
 
 OUT_OF_MEMORY = Reason("there isn't enough memory to go on")

@@ -115,4 +115,7 @@ def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | 
     found = shortest(task, most=most, deadline=deadline, known=most)
     if found.plan is not None or found.bound < math.inf:
         return None
-    return Reason(f"none of all {len(found.states)} states of level {task.level} that can be reached fulfils the goal")
+    count = len(found.states)
+    return Reason(
+        f"none of all {count} states of level {task.level} that can be reached fulfils the goal", states=count
+    )

@@ -207,3 +207,16 @@ def test_in_mixed_worlds_exactly_what_has_no_plan_has_a_certificate(first: int) 
         certificate = certify(problem)
         assert (certificate is None) == (truth.least is not None), seed
         assert certificate is None or refusal(problem, certificate) is None, seed
+
+
+def test_few_states_that_a_search_has_examined_are_the_first_proof_that_is_tried() -> None:
+    doors = ("closet_dining", "closet_office", "closet_trash", "dining_trash", "kitchen_office", "kitchen_trash")
+    stuck = confab.load("rooms-battery").with_fact(
+        *(f"hall_{door} DOOR_OPEN false" for door in doors),
+        *("pantry OPEN true", "bread0 THING_AT rooms-battery:robot"),
+        *(f"rooms-battery:robot {fact}" for fact in ("BATTERY 17", "ROBOT_AT pantry_storage", "ROBOT_IN kitchen")),
+    )
+    found = certify(stuck.problem, 600_000, few_states=True)
+    assert found is not None
+    assert refusal(stuck.problem, found) is None
+    assert certify(stuck.problem, 600_000) is None  # by other proofs the work doesn't suffice
