@@ -33,6 +33,11 @@ class Quantity:
     least: Fraction | None = None
     most: Fraction | None = None
 
+    @property
+    def bounded(self) -> bool:
+        """Whether there is a lower or an upper bound."""
+        return self.least is not None or self.most is not None
+
     def allows(self, amount: Number) -> bool:
         """Return whether an amount is of this kind."""
         return (

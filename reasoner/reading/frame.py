@@ -247,6 +247,13 @@ def _aggregates(
             found[name] = unfolded(parts.aggregate(iri, situations[name].arguments), rules)
         except DomainError as error:
             raise KnowledgeError(f"<{iri}>: {error}", iri) from None
+        quantity = situations[name].quantity
+        if quantity is not None and quantity.bounded and not found[name].kept:
+            raise KnowledgeError(
+                f"{name} is a {found[name].function} with bounds, which no behaviour would keep; "
+                "let the behaviours require a comparison instead",
+                situation,
+            )
     try:
         return {one.situation: one for one in in_order(found)}
     except DomainError as error:

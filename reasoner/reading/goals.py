@@ -53,6 +53,11 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
     given: dict[Symbol, str] = {}
     for fact in goals:
         symbol, value = parse_fact(problem, fact)
+        aggregate = problem.domain.aggregates.get(symbol.situation)
+        if aggregate is not None and not aggregate.kept:
+            raise KnowledgeError(
+                f"'{fact}': {symbol.situation} is a {aggregate.function}; state such a goal in the scene, as a :Comparison"
+            )
         if given.setdefault(symbol, value) != value:
             raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
     return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())))

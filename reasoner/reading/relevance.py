@@ -21,6 +21,7 @@ from typing import TypeAlias
 
 import pyoxigraph as ox
 
+from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in, terms_of
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import situations_of, terms
@@ -35,6 +36,7 @@ from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     AnyOf,
     Behavior,
@@ -136,13 +138,34 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
     aggregates = (aggregate.behavior for aggregate in known.domain.aggregates.values())
     doing = [_Doing(behavior) for behavior in (*known.lifted.values(), *rules, *aggregates)]
+    changed = set[str]()
     before = -1
-    while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
+    while before != (before := len(counting) + len(changed) + len(looked_up) + sum(map(len, looked_up.values()))):
         for one in doing:
             if one.behavior.changes & counting:
                 one.follow(known, found, looked_up)
                 counting |= one.situations
+                changed |= one.behavior.changes
+        for aggregate in known.domain.aggregates.values():
+            quantity = known.domain.situations[aggregate.situation].quantity
+            if quantity is not None and quantity.bounded and read_by(aggregate) & changed:
+                counting.add(aggregate.situation)  # its bound may forbid a step
+                _span_to_totals(aggregate, changed, known, found, looked_up)
     return found
+
+
+def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
+    """Add the routes from facts that relevant steps change to the individuals whose derived amounts follow from these facts."""
+    kinds = {term.name: term.kind for term in (*aggregate.parameters, *aggregate.variables)}
+    named, left = {parameter.name for parameter in aggregate.parameters}, read_by(aggregate) & changed
+    for scope in _scopes(aggregate.conditions, kinds):
+        for condition in scope.conditions:
+            if isinstance(condition, ValueCondition) and condition.situation in changed:
+                start = {*condition.arguments, condition.value} - {TRUE, FALSE}
+                _span(scope, start, named, known, found, looked_up)
+                left -= {condition.situation}
+    if left:  # the facts are read in another way
+        found.classes.update(known.names.iri(parameter.kind) for parameter in aggregate.parameters)
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"

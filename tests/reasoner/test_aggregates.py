@@ -12,7 +12,7 @@ from confab.planner.validation import validate
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.dependencies import unfolded
 from confab.reasoner.aggregates.totals import with_totals
-from confab.reasoner.graph.knowledge import load
+from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Symbol
 from worlds.interpreter import Interpreter, TooManyStatesError
@@ -128,3 +128,54 @@ def test_a_fact_that_is_changed_changes_what_is_derived_from_it() -> None:
     moved = confab.load("carts-small").with_fact("books IN cart").problem
     assert moved.initial[Symbol("LOAD", ("cart",))] == "7"
     assert moved.initial[Symbol("STOCK", ("store",))] == "2"
+
+
+LAMPS = """
+@prefix : <https://example.org/lamps#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix skos: <http://www.w3.org/2004/02/skos/core#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+@prefix dcterms: <http://purl.org/dc/terms/> .
+<https://example.org/lamps> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Lamp a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :ON .
+:ON a owl:Class, owl:NamedIndividual, c:SituationType .
+:House a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LAMPS .
+:LAMPS a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :lamps ; c:mostAmount 1 .
+:lamps a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :House ; rdfs:range xsd:integer .
+:LAMPS.rule a owl:NamedIndividual, c:Rule ;
+  c:construct '''CONSTRUCT { ?h :lamps ?n } WHERE {
+    SELECT ?h (COUNT(?l) AS ?n) WHERE { ?h a :House . ?l a :Lamp ; :ON true } GROUP BY ?h }''' .
+:B1_ON a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ;
+  c:update "INSERT { ?l :ON true } WHERE { ?l a :Lamp . ?l :ON false }" .
+:house a owl:NamedIndividual, :House ; c:index 1 .
+:l1 a owl:NamedIndividual, :Lamp ; c:index 2 .
+:l2 a owl:NamedIndividual, :Lamp ; c:index 3 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :l1 :l2 ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.one, :task.two .
+:task.one a owl:NamedIndividual, c:ValueCondition ; c:about :l1 ; c:situationType :ON ; c:value c:true .
+:task.two a owl:NamedIndividual, c:ValueCondition ; c:about :l2 ; c:situationType :ON ; c:value c:true .
+"""
+"""Two lamps shall be on, and a house has one lamp on at most: nothing but the count names the house."""
+
+
+def test_the_bound_of_a_count_holds_though_no_goal_and_no_behaviour_names_its_individual(tmp_path: Path) -> None:
+    (tmp_path / "lamps.ttl").write_text(LAMPS)
+    outcome = confab.load(tmp_path / "lamps.ttl").plan().outcome
+    assert outcome.status is Status.UNSOLVABLE
+    (tmp_path / "more.ttl").write_text(LAMPS.replace("c:mostAmount 1", "c:mostAmount 2"))
+    assert confab.load(tmp_path / "more.ttl").plan().plan.length == {1: 2}
+
+
+WATTS = ":watts a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Lamp ; rdfs:range xsd:integer ."
+
+
+def test_a_maximum_with_a_bound_and_a_goal_about_one_in_words_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "bound.ttl").write_text(
+        LAMPS.replace("COUNT(?l)", "MAX(?w)").replace(":ON true } GROUP", ":ON true ; :watts ?w } GROUP") + WATTS
+    )
+    with pytest.raises(KnowledgeError, match="LAMPS is a max with bounds, which no behaviour would keep"):
+        confab.load(tmp_path / "bound.ttl").plan()
+    with pytest.raises(KnowledgeError, match="HEAVIEST is a max; state such a goal in the scene"):
+        confab.load("carts-small").plan("cart HEAVIEST >=1")
