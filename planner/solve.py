@@ -105,7 +105,7 @@ def solve(request: Request) -> Outcome:
             "this is a fault of the planner, not of the scene: please report it with the scene's files"
         )
     plan = outcome.plan
-    if any(behavior.price is not None for behavior in request.problem.domain.behaviors.values()):
+    if any(one.price is not None or one.cost != 1.0 for one in request.problem.domain.behaviors.values()):
         outcome = replace(outcome, cost=cost_of(request.problem, plan))
     first = request.problem.domain.levels[0]
     if all(step.level == first for step in plan.steps):
