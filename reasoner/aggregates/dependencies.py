@@ -52,6 +52,18 @@ def read_by(aggregate: Aggregate) -> frozenset[str]:
     return situations_in(aggregate.amount).union(asked)
 
 
+def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -> set[str]:
+    """Return some situation types with all that their definitions name, directly or not."""
+    found, waiting = set[str](), [*situations]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            named = (c for rule in rules.get(name, ()) for one in rule.conditions for c in walk(one))
+            waiting += (s for condition in named for s in situations_of(condition))
+    return found
+
+
 def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
     """Return an aggregate whose conditions name no defined situation type, but the conditions of its rules.
 
@@ -62,7 +74,7 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
     """
     if not read_by(aggregate) & rules.keys():
         return aggregate
-    if lost := sorted(read_by(aggregate) & circular(rules)):
+    if lost := sorted(_followed(read_by(aggregate), rules) & circular(rules)):
         raise DomainError(
             f"{aggregate.situation} is calculated from {lost[0]}, which is defined recursively; aggregate over situation types "
             "that behaviours change, or over one whose definition isn't recursive"
