@@ -198,7 +198,7 @@ def guessed(kind: str, name: str) -> str:
     """Return the names that may do what a wrong name of a thing asks for, the best first, or an empty text.
 
     >>> guessed("result", "planning_time"), guessed("plan", "xyzzy")
-    ('seconds', '')
+    ('seconds, timed, or outcome.seconds', '')
     """
     wanted = words_of(name)
     wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in OF_ANY) or wanted

@@ -296,10 +296,10 @@ class Agenda:
         self._examine()
 
     def _certify(self) -> None:
-        """Raise `UnsolvableError` if there is a certificate; it is looked for again when the effort has doubled."""
+        """Raise `UnsolvableError` if there is a certificate; again when the effort has doubled, and at the limit."""
         call = self.call
         tests = max(FIRST_TESTS, min(call.space.effort // TEST, PAIRS))
-        if tests >= 2 * self._tested and not self._expects_a_plan():
+        if self._tested < tests >= min(2 * self._tested, PAIRS) and not self._expects_a_plan():
             self._tested = tests
             if proof := impossible(call.problem, tests, call.space.deadline):
                 raise proof

@@ -24,8 +24,8 @@ LOOKING = 1_800_000
 """Work of examining all states that is allowed before any search, in states times relaxed operators."""
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of tests of conditions for a certificate: before a search, in the paper's mode, and after searches have failed."""
-TEST = 16
-"""Work of a test, in the unit of `Workspace.effort`: about half a microsecond."""
+TEST = 8
+"""Work of a test, in the unit of `Workspace.effort`."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """Maximum size of a join of relaxed reachability (some 200 MB), and of the changes of a level that is grounded (600 MB)."""
 
