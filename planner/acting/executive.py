@@ -346,8 +346,9 @@ class _Run:
         if self.repairs:
             expected = {s: v for s, v in {**belief.state, **self.request.missed}.items() if v is not None}
             planned = replace(self.agenda.planned_for, initial=expected)
+            begun = bool(old) and old[0].path in self.agenda.begun
             repaired = repair_or_replan(
-                belief.problem, old, planned, self.planner, belief.using, self.agenda.sound, limits
+                belief.problem, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
             )
             kind, steps, cost, outcome = repaired.kind, repaired.steps, repaired.cost, repaired.outcome
         else:

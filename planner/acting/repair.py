@@ -70,6 +70,7 @@ def repair_or_replan(
     using: Compiled | None = None,
     in_progress: bool = True,
     limits: Limits = Limits(),  # noqa: B008 - frozen
+    begun: bool = False,
 ) -> RepairResult:
     """Return the steps from a situation that differs from the one for which a plan was made.
 
@@ -89,9 +90,11 @@ def repair_or_replan(
         Whether the first step of `rest` may be finished as planned.
     limits : Limits
         Limits of the whole call, whether it repairs, replans, or does both.
+    begun : bool
+        Whether the first step of `rest` has been begun: then it is finished although its level's precondition no longer holds.
     """
     using, end = using or compiled(problem), limits.end()
-    repaired = repair(problem, rest, planned, using, in_progress, limits)
+    repaired = repair(problem, rest, planned, using, in_progress, limits, begun)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
     fewer = planned.goal.keys() - problem.goal.keys()  # then steps needed before may be needless
@@ -104,7 +107,13 @@ def repair_or_replan(
 
 
 def repair(
-    problem: Problem, rest: Sequence[Step], planned: Problem, using: Compiled, in_progress: bool, limits: Limits
+    problem: Problem,
+    rest: Sequence[Step],
+    planned: Problem,
+    using: Compiled,
+    in_progress: bool,
+    limits: Limits,
+    begun: bool = False,
 ) -> Repaired | None:
     """Return steps for the open goals that keep as many valid steps of `rest` as possible, or None if none were found.
 
@@ -118,7 +127,7 @@ def repair(
     agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
-        if not call.at_rest():
+        if begun or not call.at_rest():
             if in_progress:
                 _finish(call, pending, wanted)
             else:

@@ -222,6 +222,24 @@ def test_what_a_hand_holds_goes_where_it_is_wanted_also_where_nothing_is_left_of
         assert repaired.cost == cost_of(now, Plan(rest))
 
 
+def test_a_step_that_has_begun_is_finished_although_its_domain_knows_no_rest() -> None:
+    """A thing that is carried stands at no spot, so bringing it isn't applicable any more; nothing is put down on the way."""
+    rooms = read(load("rooms-battery")).problem
+    first = plan(rooms).plan
+    assert first is not None
+    at = next(i for i, step in enumerate(first.steps) if any(child.behavior == "B2_PICK" for child in step.steps))
+    step, *others = first.steps[at:]
+    assert step.steps[-1].behavior == "B2_PLACE"
+    state = carried_out(rooms, rooms.initial, (*first.steps[:at], *step.steps[:-1]))
+    rest = (replace(step, steps=step.steps[-1:]), *others)
+    charge = Symbol("BATTERY", ("rooms-battery:robot",))
+    planned_for = replace(rooms, initial=state)
+    now = replace(rooms, initial={**state, charge: str(float(state[charge]) + 1)})
+    repaired = repair_or_replan(now, rest, planned_for, begun=True)
+    assert repaired.steps is not None
+    assert difference(rest, repaired.steps) == (0, 0)
+
+
 def test_what_is_in_progress_is_not_finished_if_nobody_wants_it_any_more() -> None:
     goal = {s: v for s, v in serving().goal.items() if s.arguments != ("cup1",)}
     now, rest = in_the_hand(3, goal=goal)
