@@ -112,8 +112,12 @@ class Call:
         last = self.steps[-1] if self.unseen.issuperset(targets) and self.steps else None
         inside = last is not None and last.level == first and last.steps[0].level == level
         if inside:
-            above = self.space.refining(first)
-            keep = lambda cell, value: kept.get(cell) or above(cell, value)  # noqa: E731
+            above, visible = self.space.refining(first), self.space.visible
+
+            def keep(cell: Cell, value: str) -> str | None:
+                # An amount that a goal bounds must stay as the step left it, not just within the bound.
+                return above(cell, value) if visible(first, cell) else kept.get(cell) or above(cell, value)
+
         steps = self.refiner.achieve(level, targets, keep, budgets)
         if steps is None:
             return False
