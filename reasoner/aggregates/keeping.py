@@ -60,7 +60,10 @@ def kept(
         Too many of the behaviour's effects change one number at once.
     """
     for aggregate in aggregates:
-        if aggregate.kept and read_by(aggregate) & behavior.changes:
+        seen = (
+            situations[aggregate.situation].level <= behavior.level
+        )  # its refinement keeps a total that it doesn't see
+        if seen and aggregate.kept and read_by(aggregate) & behavior.changes:
             try:
                 behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
             except TooManyCasesError:

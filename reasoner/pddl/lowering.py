@@ -17,6 +17,7 @@ anything else                   as it is, with ``or``, ``exists``, ``when``, ``f
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -438,7 +439,10 @@ class Lowering:
                 if limit is not None and all(linear for _, _, linear in changes):
                     scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
             if all(operation in ("increase", "decrease") for operation, _, _ in changes):
-                yield from (ConditionalEffect(Assignment(operation, at, by), when, own) for operation, by, _ in changes)
+                for (operation, by), times in Counter((operation, by) for operation, by, _ in changes).items():
+                    # Equal effects of one action are one effect to a reader of PDDL.
+                    total = _times(by, times)
+                    yield ConditionalEffect(Assignment(operation, at, total), when, own)
             else:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
@@ -494,3 +498,10 @@ def named(condition: Condition) -> set[str]:
         case Witness() | AnyOf():
             terms = set()
     return {term for term in terms if term.startswith("?")}
+
+
+def _times(number: Number, times: int) -> Number:
+    """Return a multiple of a number."""
+    if isinstance(number, Fraction):
+        return number * times
+    return number if times == 1 else Operation("*", number, Fraction(times))

@@ -127,3 +127,18 @@ def test_a_count_that_takes_too_many_conditions_is_refused_at_once(seed: int, tm
     with pytest.raises(KnowledgeError, match="by too many effects at once; use fewer effects"):
         world.plan()
     assert process_time() - begin < 3.0
+
+
+@pytest.mark.parametrize("seed", [340_002_992, 340_028_395, 340_015_222])
+def test_a_step_is_not_held_to_totals_that_its_level_does_not_see(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
+
+
+@pytest.mark.parametrize("seed", [340_001_535, 340_010_834])
+def test_goals_of_lower_levels_leave_bounded_amounts_as_the_step_did(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
+
+
+@pytest.mark.parametrize("seed", [340_005_745, 340_013_944])
+def test_equal_effects_on_a_total_are_exported_as_one_multiple(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
