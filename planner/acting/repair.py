@@ -127,12 +127,11 @@ def repair(
     agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
-        if begun or not call.at_rest():
-            if in_progress:
-                _finish(call, pending, wanted)
-            else:
-                del pending[:1]
-            settle(call)
+        if in_progress and (begun or not call.at_rest()):
+            _finish(call, pending, wanted)
+        elif not call.at_rest():
+            del pending[:1]
+        settle(call)
         finished = len(call.steps)
         _restore(call, pending)
         restored = len(call.steps)
@@ -232,7 +231,8 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
     """Apply the open steps of the step in progress, up to a situation of rest, and remove them from `pending`.
 
-    If they don't lead to such a situation, or only to values that are no longer goals, none is applied and the first is dropped.
+    If they don't lead to such a situation, or only to values that are no longer goals, none is applied; unless the situation is
+    one of rest already, the first is dropped.
     """
     mark = len(call.table.trail)
     for count, step in enumerate(pending, 1):
@@ -247,7 +247,8 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
             return
     call.table.undo(mark)
     call.steps.clear()
-    del pending[:1]
+    if not call.at_rest():
+        del pending[:1]
 
 
 def _restore(call: Call, pending: Sequence[Step]) -> None:

@@ -60,9 +60,8 @@ def kept(
         Too many of the behaviour's effects change one number at once.
     """
     for aggregate in aggregates:
-        seen = (
-            situations[aggregate.situation].level <= behavior.level
-        )  # its refinement keeps a total that it doesn't see
+        # Primitives keep a total that the level of the behaviour doesn't see.
+        seen = situations[aggregate.situation].level <= behavior.level
         if seen and aggregate.kept and read_by(aggregate) & behavior.changes:
             try:
                 behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
