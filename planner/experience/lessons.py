@@ -226,7 +226,7 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
         if not step.steps:
             call.space.apply(made)
             continue
-        targets = call.refiner.targets(made)
+        targets = call.refiner.targets(step.level, made)
         method, roles = method_of(call.refiner.methods, step, (*step.arguments, *bindings))
         lesson.counted.append((method, ITSELF, CHOSEN))
         lesson.personal += taken(call, method, roles)

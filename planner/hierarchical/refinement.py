@@ -101,7 +101,7 @@ class Refiner:
         below = self.levels[self.levels.index(level) + 1]
         larger = (SMALL,) if self.hasty else scopes(self.space.program.size(below))
         budgets = (BY_RULES, REFINING, *larger)
-        targets = self.targets(changes)
+        targets = self.targets(level, changes)
         self.at = (name, arguments) if level == self.levels[0] else self.at
         steps = None
         for careful in (True, False) if self.careful else (False,):
@@ -201,11 +201,13 @@ class Refiner:
 
     # ---------------------------------------------------------------------------------------------------- required values
 
-    def targets(self, changes: Sequence[Change]) -> dict[Cell, str]:
-        """Return the changes whose values differ from the present state."""
-        now = self.table.now
+    def targets(self, level: int, changes: Sequence[Change]) -> dict[Cell, str]:
+        """Return what a step changes, without totals that its level doesn't see."""
+        now, totals = self.table.now, self.space.program.domain.aggregates
         found: dict[Cell, str] = {}
         for situation, key, value in changes:
+            if situation in totals and not self.space.visible(level, (situation, key)):
+                continue
             if now[situation].get(key) is not None or self.space.exists(situation, key):
                 found[situation, key] = value
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
@@ -277,7 +279,7 @@ class Refiner:
             self.space.apply(done[1])
             return RefinedStep(level, name, arguments, done[0], ())
         mark = len(self.table.trail)
-        targets = self.targets(done[1])
+        targets = self.targets(level, done[1])
         inner = []
         for child in below:
             again = self.replay_checked(child)

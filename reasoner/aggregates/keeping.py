@@ -60,9 +60,7 @@ def kept(
         Too many of the behaviour's effects change one number at once.
     """
     for aggregate in aggregates:
-        # Primitives keep a total that the level of the behaviour doesn't see.
-        seen = situations[aggregate.situation].level <= behavior.level
-        if seen and aggregate.kept and read_by(aggregate) & behavior.changes:
+        if aggregate.kept and read_by(aggregate) & behavior.changes:
             try:
                 behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
             except TooManyCasesError:

@@ -34,7 +34,7 @@ from confab.reasoner.pddl.formulas import (
     terms_of,
     typed,
 )
-from confab.reasoner.pddl.lowering import Action, Lowering
+from confab.reasoner.pddl.lowering import Action, Lowering, Scope
 from confab.reasoner.pddl.vocabulary import Vocabulary
 from confab.reasoner.symbols import Problem, State
 from confab.reasoner.timing import only_during
@@ -128,7 +128,8 @@ class _Export:
             if action is not None
         }
         self.derived = list(self.lowering.derived()) if self.lowering.recursive else []
-        self.goal = both(self.lowering.goal(symbol, value) for symbol, value in problem.goal.items())
+        wanted = [self.lowering.goal(symbol, value) for symbol, value in problem.goal.items()]
+        self.goal = both([*wanted, *self.lowering.within_bounds(Scope({}))])
         self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]
         self.changes = [change for action in self.actions.values() for change in action.changes]

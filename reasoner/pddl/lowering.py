@@ -119,6 +119,8 @@ class Lowering:
         self.rules = problem.domain.rules
         self.recursive = circular(self.rules)
         self.kept = Kept(problem, behaviors, words)
+        changed = {effect.situation for behavior in behaviors for effect in behavior.amounts}
+        self.totals = sorted(changed & problem.domain.aggregates.keys())
 
     # ------------------------------------------------------------------------------------------------- conditions
 
@@ -246,7 +248,7 @@ class Lowering:
             self.need(condition, terms, scope)
         cost = self.cost(behavior, terms, scope)
         changes = [*self.value_changes(behavior, terms, scope), *self.amount_changes(behavior, terms, scope)]
-        needs = both(scope.needs)
+        needs = both([*scope.needs, *self.within_bounds(scope)])
         if needs == NEVER or not changes or not all(term.members for term in scope.parameters):
             return None
         names = [term.name for term in scope.parameters]
@@ -434,7 +436,8 @@ class Lowering:
             for operation, by, _ in changes:
                 sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
                 result = by if sign is None else Operation(sign, result, by)
-            quantity = self.words.situations[situation].quantity
+            # Several effects change a total at once: `within_bounds` states its bounds.
+            quantity = None if situation in self.totals else self.words.situations[situation].quantity
             for sign, limit in (("<", quantity.least), (">", quantity.most)) if quantity else ():
                 if limit is not None and all(linear for _, _, linear in changes):
                     scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
@@ -445,6 +448,20 @@ class Lowering:
                     yield ConditionalEffect(Assignment(operation, at, total), when, own)
             else:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
+
+    def within_bounds(self, scope: Scope) -> Iterator[Formula]:
+        """Yield that all totals are within their bounds.
+
+        It is a precondition of every action and a goal: a state in which a total is out of bounds leads nowhere.
+        """
+        for situation in self.totals:
+            kind = self.words.situations[situation]
+            own = tuple(self.words.variable(scope.fresh(one), one) for one in kind.arguments)
+            its = [*map(self.words.guard, own, kind.arguments), self.words.exists(situation, own)]
+            for sign, limit in (("<", kind.quantity.least), (">", kind.quantity.most)) if kind.quantity else ():
+                if limit is not None:
+                    outside = Compare(sign, self.words.amount(situation, own), limit)
+                    yield no(some(own, both([*its, outside])))
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
         """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers: PDDL has only numbers."""

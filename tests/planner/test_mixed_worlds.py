@@ -142,3 +142,8 @@ def test_goals_of_lower_levels_leave_bounded_amounts_as_the_step_did(seed: int, 
 @pytest.mark.parametrize("seed", [340_005_745, 340_013_944])
 def test_equal_effects_on_a_total_are_exported_as_one_multiple(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
+
+
+@pytest.mark.parametrize("seed", [340_025_843, 340_033_199])
+def test_bounds_of_totals_are_exported_for_all_effects_of_an_action_together(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
