@@ -201,10 +201,16 @@ def _plan(
         return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
         doable = without(problem, [behavior for behavior, _ in faulty])
-        outcome = search(doable)
-        if outcome.status is not Status.SOLVED and (options.leave_levels or not _solved_below(doable, deadline)):
-            behavior, why = faulty[0]
+        leaves = options.leave_levels and mode != "paper"
+        possible = leaves or _solved_below(doable, deadline)
+        behavior, why = faulty[0]
+        if not possible:
             raise KnowledgeError(why, seen.names.iri(behavior.name))
+        outcome = search(doable)
+        if leaves and outcome.status is not Status.SOLVED:
+            raise KnowledgeError(why, seen.names.iri(behavior.name))
+        if outcome.status is Status.GAVE_UP and outcome.reason:
+            outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
     else:
         outcome = search(problem)
     if (
@@ -229,8 +235,9 @@ def _plan(
 
 
 def _solved_below(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether a task that isn't solved on its levels is solved where these may be left."""
-    return solve(Request(problem, limits=Limits(seconds=deadline.left))).status is Status.SOLVED
+    """Return whether half of the time left suffices to solve a task by a plan that may leave levels."""
+    limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
+    return solve(Request(problem, limits=limits)).status is Status.SOLVED
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:

@@ -14,7 +14,7 @@ conditions and its other effects. So planning in the slice and planning in the w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TypeAlias
@@ -136,8 +136,10 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: LookedUp = {}
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
-    aggregates = (aggregate.behavior for aggregate in known.domain.aggregates.values())
-    doing = [_Doing(behavior) for behavior in (*known.lifted.values(), *rules, *aggregates)]
+    aggregates = [_Doing(one.behavior, {*one.kinds}) for one in known.domain.aggregates.values()]
+    doing = [*(_Doing(behavior) for behavior in (*known.lifted.values(), *rules)), *aggregates]
+    for total in aggregates:
+        total.follow(known, found, looked_up)  # each total in the slice follows from all of its facts, also if no step counts
     changed = set[str]()
     before = -1
     while before != (before := len(counting) + len(changed) + len(looked_up) + sum(map(len, looked_up.values()))):
@@ -179,13 +181,16 @@ class _Doing:
     ----------
     situations : set of str
         The situation types in its conditions and effects.
+    step : set of str
+        The parameters, the variables in positive conditions, and those `always` needed: a total counts the individuals of a
+        variable that has no condition, too.
     """
 
-    def __init__(self, behavior: Behavior) -> None:
+    def __init__(self, behavior: Behavior, always: Collection[str] = ()) -> None:
         self.behavior = behavior
         self.asks = _scopes(behavior.preconditions, behavior.kinds)
         self.step = {t for c in self.asks[0].conditions for t in terms(c)} & behavior.kinds.keys()
-        self.step |= {parameter.name for parameter in behavior.parameters}
+        self.step |= {*always, *(parameter.name for parameter in behavior.parameters)}
         self.effects = []
         for effect in behavior.every_effect:
             kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}

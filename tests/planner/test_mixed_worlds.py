@@ -147,3 +147,17 @@ def test_equal_effects_on_a_total_are_exported_as_one_multiple(seed: int, tmp_pa
 @pytest.mark.parametrize("seed", [340_025_843, 340_033_199])
 def test_bounds_of_totals_are_exported_for_all_effects_of_an_action_together(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
+
+
+@pytest.mark.parametrize("seed", [340_002_931, 340_040_024])
+def test_a_total_counts_individuals_that_the_task_does_not_need(seed: int, tmp_path: Path) -> None:
+    """A variable of a total without a condition has all individuals of its class, so the slice has them."""
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
+
+
+def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_level(tmp_path: Path) -> None:
+    """The default leaves the level; modes that keep all levels give up and name the step."""
+    its = Judge(mixed(340_007_688), tmp_path, every=True).judged()
+    assert not its.complaints
+    assert its.status["guarded"] == "solved"
+    assert any("L1_1 of level 1 can never be refined" in one.text for one in its.remarks if one.mode == "strict levels")
