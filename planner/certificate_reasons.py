@@ -10,7 +10,7 @@ from confab.planner.certificate_checks import CaseView, Claims, own_variables, u
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Reason
 from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
-from confab.reasoner.amounts import MORE, Expression, terms_of, towards, written
+from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
@@ -143,6 +143,8 @@ class _Causes:
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):
             return [Cause(f"there is no {symbol} on level {lowest.level}")]
+        if limits := self.exceeded(fact):
+            return [Cause(limits, (*symbol.arguments, situation))]
         found: list[Cause] = []
         for rule in self.problem.domain.rules.get(situation, ()):
             given = {p.name: a for p, a in zip(rule.parameters, symbol.arguments, strict=True) if a not in free}
@@ -194,6 +196,29 @@ class _Causes:
             what = "gives it another value" if kept else "has this effect"
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
+
+    def exceeded(self, fact: Fact) -> str:
+        """Return the bound of an amount that a goal value lies beyond, in words; empty if there is none."""
+        quantity, words = (
+            self.lowest.quantity(fact.symbol.situation),
+            f"{fact.symbol.arguments[0]} {fact.symbol.situation}",
+        )
+        if quantity is None:
+            return ""
+        for sign, limit in bounds(fact.value):
+            if (
+                quantity.most is not None
+                and sign[0] != "<"
+                and (limit > quantity.most or (limit, sign) == (quantity.most, ">"))
+            ):
+                return f"{words} is at most {written(quantity.most)}"
+            if (
+                quantity.least is not None
+                and sign[0] != ">"
+                and (limit < quantity.least or (limit, sign) == (quantity.least, "<"))
+            ):
+                return f"{words} is at least {written(quantity.least)}"
+        return ""
 
     def direction(self, fact: Fact) -> str:
         """Return whether the goal requires more of an amount, or less."""

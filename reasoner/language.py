@@ -74,13 +74,17 @@ def situations_of(condition: Condition) -> frozenset[str]:
             return frozenset()
 
 
+def measured(behavior: Behavior) -> Iterator[Measure]:
+    """Yield the static numbers that a behaviour looks up in its effects and conditions, such as distances."""
+    amounts = [effect.amount for effect in behavior.amounts]
+    for condition in behavior.conditions:
+        amounts += [side for c in walk(condition) if isinstance(c, Comparison) for side in (c.left, c.right)]
+    yield from (part for amount in amounts for part in inside(amount) if isinstance(part, Measure))
+
+
 def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
     """Return the relations that behaviours use as numbers, whose tuples end with a number."""
-    amounts = [effect.amount for behavior in behaviors for effect in behavior.amounts]
-    for behavior in behaviors:
-        for condition in behavior.conditions:
-            amounts += [side for c in walk(condition) if isinstance(c, Comparison) for side in (c.left, c.right)]
-    return frozenset(part.relation for amount in amounts for part in inside(amount) if isinstance(part, Measure))
+    return frozenset(one.relation for behavior in behaviors for one in measured(behavior))
 
 
 def mentions(condition: Condition) -> set[str]:

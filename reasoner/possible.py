@@ -106,9 +106,10 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
     for symbol, value in state.items():
         quantity = domain.situations[symbol.situation].quantity
         if quantity is not None and (limits := _limits(value, quantity)):
-            yield Impossible(
-                symbol, f"{symbol} is {value[:40]}; {limits}", "amounts keep to their bounds", "state such an amount"
-            )
+            name, remedy = symbol.situation, "state such an amount"
+            if name in domain.aggregates:
+                remedy = f"change the facts from which {name} is calculated, or the bound of {name}"
+            yield Impossible(symbol, f"{symbol} is {value[:40]}; {limits}", "amounts keep to their bounds", remedy)
         for name in symbol.arguments if quantity else (*symbol.arguments, value):
             if name not in declared and name not in (TRUE, FALSE):
                 yield Impossible(

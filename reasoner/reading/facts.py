@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 
-from confab.reasoner.amounts import written
+from confab.reasoner.amounts import Measure, written
 from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.language import walk
+from confab.reasoner.language import measured, walk
 from confab.reasoner.names import Names
 from confab.reasoner.possible import values_at_fault
 from confab.reasoner.reading.definitions import Definitions
@@ -50,8 +50,8 @@ def facts_of(
         if CORE + "relation" in node:
             individuals = (*facts.arguments(iri), *(names.short(v) for v in facts.values(iri, "value")))
             relation, amount = names.short(facts.one(iri, "relation")), facts.decimal(iri, "amount")
+            of_tuples[iri] = relation, individuals
             if amount is None:
-                of_tuples[iri] = relation, individuals
                 relations[relation].add(individuals)
             else:
                 numbered[relation].add((*individuals, written(amount)))
@@ -72,35 +72,45 @@ def facts_of(
         check_arguments(symbol, domain, "a fact")
     for relation, pairs in numbered.items():
         _check_numbers(relation, pairs, relations.get(relation, ()))
-    asked = individuals_named(domain)
-    for relation, rows in sorted(relations.items()):
-        many = asked.get(relation) or max(map(len, rows))
+    asked = individuals_named(domain, names)
+    without_numbers = {relation: {row[:-1] for row in rows} for relation, rows in numbered.items()}
+    for relation, rows in sorted({**relations, **without_numbers}.items()):
+        many = asked.get(relation, max(map(len, rows), default=0))
         for row in sorted(rows):
             if len(row) != many:
-                others = "conditions" if relation in asked else "others"
+                others = "behaviours and rules" if relation in asked else "others"
                 raise KnowledgeError(
-                    f"{relation} of {', '.join(row)} names {len(row)} individuals; {others} name {many}; state what is lacking, "
-                    "or drop what is too much",
+                    f"{relation} of {', '.join(row)} names {len(row)} individual{'s' * (len(row) != 1)}; {others} name {many}; "
+                    "state the missing individual, or remove the superfluous one",
                     next((iri for iri, said in of_tuples.items() if said == (relation, row)), ""),
                 )
     return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
 
 
-def individuals_named(domain: Domain) -> dict[str, int]:
-    """Return how many individuals conditions name for each relation without a number; raise `KnowledgeError` if they differ."""
-    found: dict[str, int] = {}
+def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
+    """Return the number of individuals that behaviours and rules name for each static relation.
+
+    Raises
+    ------
+    KnowledgeError
+        Two of them name different numbers of individuals for one relation.
+    """
+    found: dict[str, tuple[int, str]] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
     rules += [aggregate.behavior for aggregate in domain.aggregates.values()]
     for behavior in (*domain.behaviors.values(), *rules):
-        for one in (inner for condition in behavior.conditions for inner in walk(condition)):
-            if not isinstance(one, RelationCondition):
-                continue
-            if found.setdefault(one.relation, len(one.arguments)) != len(one.arguments):
-                fewest, most = sorted((found[one.relation], len(one.arguments)))
+        conditions = (inner for condition in behavior.conditions for inner in walk(condition))
+        named: list[RelationCondition | Measure] = [c for c in conditions if isinstance(c, RelationCondition)]
+        for one in (*named, *measured(behavior)):
+            many, first = found.setdefault(one.relation, (len(one.arguments), behavior.name))
+            if many != len(one.arguments):
+                other = "in one place and" if first == behavior.name else f"and {behavior.name} names"
                 raise KnowledgeError(
-                    f"conditions of {one.relation} name {fewest} individuals here and {most} there; let all of them name as many"
+                    f"{first} names {many} individual{'s' * (many != 1)} for {one.relation} {other} {len(one.arguments)}"
+                    "; name the same number in all conditions and calculations",
+                    names.iri(behavior.name) if behavior.name in names else "",
                 )
-    return found
+    return {relation: many for relation, (many, _) in found.items()}
 
 
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:

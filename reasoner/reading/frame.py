@@ -128,7 +128,7 @@ def frame(
     following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]
     for one in following:
         _check_behavior(replace(one.behavior, level=domain.situations[one.situation].level), domain)
-    individuals_named(domain)
+    individuals_named(domain, names)
     try:
         domain = compiled(domain, classes)
     except DomainError as error:

@@ -139,7 +139,9 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     aggregates = [_Doing(one.behavior, {*one.kinds}) for one in known.domain.aggregates.values()]
     doing = [*(_Doing(behavior) for behavior in (*known.lifted.values(), *rules)), *aggregates]
     for total in aggregates:
-        total.follow(known, found, looked_up)  # each total in the slice follows from all of its facts, also if no step counts
+        total.follow(
+            known, found, looked_up
+        )  # each total in the slice follows from all of its facts, also if no step counts
     changed = set[str]()
     before = -1
     while before != (before := len(counting) + len(changed) + len(looked_up) + sum(map(len, looked_up.values()))):

@@ -220,3 +220,18 @@ def test_few_states_that_a_search_has_examined_are_the_first_proof_that_is_tried
     assert found is not None
     assert refusal(stuck.problem, found) is None
     assert certify(stuck.problem, 600_000) is None  # by other proofs the work doesn't suffice
+
+
+@pytest.mark.parametrize(
+    ("goal", "reason"),
+    [
+        ("trolley BATTERY >=25", "trolley BATTERY is at most 20"),
+        ("trolley BATTERY >20", "trolley BATTERY is at most 20"),
+        ("trolley BATTERY 21", "trolley BATTERY is at most 20"),
+        ("trolley BATTERY <0", "trolley BATTERY is at least 0"),
+    ],
+)
+def test_the_reason_is_the_bound_that_a_goal_lies_beyond(goal: str, reason: str) -> None:
+    outcome = confab.load("canteen-small").plan(goal).outcome
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None and reason in outcome.reason.text
