@@ -201,8 +201,8 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
     left = [value for value in problem.values(symbol, level) if value != wanted.value]
     if len(left) != 1:
         raise KnowledgeError(
-            f"<{iri}>: the goal says which value {wanted.situation} shall not have, and leaves {some_of(left) or 'none'}; name the "
-            "one that it shall have, or want a situation type that is defined"
+            f"<{iri}>: the goal excludes a value of {wanted.situation}, and leaves {some_of(left) or 'none'}; state the wanted "
+            "value, or several of them as alternatives (:AnyOf)"
         )
     return left[0]
 

@@ -179,7 +179,9 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     found = [*_sure(found, case)]
     yield from found
     if faults:
-        yield from (finding for finding in _by_rules(case, places, found) if finding.rule == "undeclared-term")
+        parts = tuple(f"<{behavior}." for behavior in unread)  # an update that can't be read declares no parameters
+        undeclared = (finding for finding in _by_rules(case, places, found) if finding.rule == "undeclared-term")
+        yield from (finding for finding in undeclared if not any(part in finding.remedy for part in parts))
         return
     if problem and not any(finding.serious for finding in found):
         yield _unreadable(graph, places, problem)

@@ -175,6 +175,13 @@ def test_a_cost_in_quotes_is_no_negative_one(tmp_path: Path) -> None:
     assert (said.rule, local_name(said.node)) == ("not-a-number", "PUSH")
 
 
+def test_a_number_of_another_type_is_shown_as_it_is_written(tmp_path: Path) -> None:
+    found = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ":PUSH c:index 2.5 ; a owl:NamedIndividual,", "")
+    (said,) = (one for one in found if one.rule == "not-a-number")
+    assert said.remedy == "write a whole number like 3"
+    assert said.what.startswith("PUSH has 2.5 as its index")
+
+
 MINI = """
 @prefix : <https://example.org/mini#> .
 @prefix c: <https://w3id.org/confab/core#> .
@@ -208,14 +215,19 @@ MINI = """
         ({"shut": "'false'", "unit": "kg"}, "CLOSE", "the text 'false' stands where an individual belongs"),
         ({"shut": "~", "unit": "kg"}, "CLOSE", "this is no SPARQL update"),
         ({"shut": "false", "unit": "litres"}, "SEAL", "SEAL compares kg and litres (FILL and size); so does POUR"),
+        ({"shut": "false . ?box :SHUTT true", "unit": "kg"}, "CLOSE", ":SHUTT is neither a property"),
         ({"shut": "false . ?box :SHUT true", "unit": "kg"}, "CLOSE", "CLOSE requires that box SHUT false and that box SHUT true"),
     ],
-    ids=["a text", "no update", "units", "a contradiction"],
+    ids=["a text", "no update", "units", "a misspelt name", "a contradiction"],
 )  # fmt: skip
 def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
     tmp_path: Path, said: dict[str, str], node: str, what: str
 ) -> None:
-    (tmp_path / "mini.ttl").write_text(MINI.format(**said), encoding="utf-8")
+    text = (
+        MINI.format(**said)
+        + ":CLOSE c:price :price . :price a owl:NamedIndividual, c:Calculation ; c:about :CLOSE.box ; c:relation :size ."
+    )
+    (tmp_path / "mini.ttl").write_text(text, encoding="utf-8")
     (finding,) = (f for f in validate([tmp_path / "mini.ttl"]) if f.serious)
     assert finding.what.startswith(what)
     assert (local_name(finding.node), finding.line > 0, bool(finding.remedy)) == (node, True, True)
