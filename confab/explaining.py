@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from confab.lifted import Sayings
 from confab.page.markup import styled, tag
 from confab.planner.experience.advice import Memory as Advisor
-from confab.planner.experience.evidence import View
-from confab.planner.experience.following import Candidate, Guide
+from confab.planner.experience.evidence import FactReader
+from confab.planner.experience.following import RulePolicy
+from confab.planner.experience.instances import RuleInstance
 from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally
@@ -157,15 +158,17 @@ def explain(
         if asked_of is not None and call.space.forward[asked_of[0]](*asked_of[1]) is None:
             raise KnowledgeError(f"{_words(asked_of)}: {trouble}")
     say = Sayings(labels)
-    guide = Guide(call, advisor.rules, advisor.orders)
-    every = list(guide.every(guide.open()))
-    ways = [c for c in every if not guide.waits(c.goal)] or every
-    view = View(call.program, call.table, call.goal)
-    chosen = _best([c for c in every if c.ground == steps[number]], advisor, view)
+    policy = RulePolicy(call, advisor.rules, advisor.orders)
+    every = list(policy.every(policy.open()))
+    alternatives = [c for c in every if not policy.waits(c.goal)] or every
+    reader = FactReader(call.program, call.table, call.goal)
+    chosen = _best([c for c in every if c.ground == steps[number]], advisor, reader)
     asked = (
-        [c for c in ways if c.ground != steps[number]] if against is None else [c for c in every if c.ground == against]
+        [c for c in alternatives if c.ground != steps[number]]
+        if against is None
+        else [c for c in every if c.ground == against]
     )
-    other = _best(asked, advisor, view)
+    other = _best(asked, advisor, reader)
     what = say.step(*steps[number])
     ground = other.ground if other is not None else against
     instead = say.step(*ground) if ground is not None else ""
@@ -173,7 +176,7 @@ def explain(
         note = f"memory has no rule that would do {what} there"
         return Explanation(what, instead, 0.0, (), note=note)
     note = "" if other is not None or against is None else f"memory has no rule that would do {instead} there"
-    reasons = _differences(chosen, other, advisor, view, say) if other is not None else ()
+    reasons = _differences(chosen, other, advisor, reader, say) if other is not None else ()
     return Explanation(
         what,
         instead,
@@ -194,21 +197,23 @@ def behind(memory: Memory, name: str) -> str:
     return f"chosen {tally.chosen}, passed over {tally.passed_over}, failed {tally.failed} times{of}"
 
 
-def _best(ways: Sequence[Candidate], advisor: Advisor, view: View) -> Candidate | None:
+def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:
     """Return the most cogent way."""
 
-    def key(c: Candidate) -> float:
-        facts, who = view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles)
-        return advisor.judge.cogency(c.rule, facts, who)
+    def key(c: RuleInstance) -> float:
+        facts, individual = reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles)
+        return advisor.scorer.cogency(c.rule, facts, individual)
 
-    return max(ways, key=key, default=None)
+    return max(alternatives, key=key, default=None)
 
 
-def _differences(chosen: Candidate, other: Candidate, advisor: Advisor, view: View, say: Sayings) -> tuple[Why, ...]:
+def _differences(
+    chosen: RuleInstance, other: RuleInstance, advisor: Advisor, reader: FactReader, say: Sayings
+) -> tuple[Why, ...]:
     """Return the summands in which two cogencies differ, the greatest first."""
     facts: list[dict[str, tuple[Fact, float]]] = []
     for c in (chosen, other):
-        factors = advisor.judge.factors(c.rule, view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles))
+        factors = advisor.scorer.factors(c.rule, reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles))
         facts.append({f.fact[0]: (f.fact, f.weight) for f in factors})
     here, there = facts
     roles = [dict(zip((role for role, _ in c.rule.kinds), c.roles, strict=True)) for c in (chosen, other)]

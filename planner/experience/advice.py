@@ -18,8 +18,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
-from confab.planner.experience.evidence import Judge, View, fillers
-from confab.planner.experience.following import Candidate, Guide, rules_in, usable
+from confab.planner.experience.evidence import FactReader, Scorer, fillers
+from confab.planner.experience.following import RulePolicy, rules_in, usable
+from confab.planner.experience.instances import RuleInstance
 from confab.planner.experience.matching import Bind
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled
@@ -60,9 +61,9 @@ class Memory:
         return self.experience.totals()
 
     @cached_property
-    def judge(self) -> Judge:
+    def scorer(self) -> Scorer:
         """The scorer of rules."""
-        return Judge(self.experience)
+        return Scorer(self.experience)
 
     def record(self, rule: Rule) -> Tally:
         """Return how often rules achieved goals of this kind, and how often not."""
@@ -90,25 +91,25 @@ class Memory:
             )
         )
 
-    def guide(
+    def policy(
         self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
-    ) -> Guide:
-        """Return the rules bound to a call, with scores for rules and for individuals in roles; `joins` as for `Guide`."""
-        view = cache(lambda: View(call.program, call.table, call.goal))
+    ) -> RulePolicy:
+        """Return the rules for a call, with scores for rules and for individuals in roles; `joins` as for `RulePolicy`."""
+        reader = cache(lambda: FactReader(call.program, call.table, call.goal))
 
-        def score(c: Candidate) -> float:
-            return self.judge.told(view(), c.rule, c.roles)
+        def score(instance: RuleInstance) -> float:
+            return self.scorer.score(reader(), instance.rule, instance.roles)
 
-        def ranked(method: Method, ways: list[Roles]) -> list[Roles]:
-            if method.name not in self.judge.preferred:
-                return ways
-            facts = (fillers(method, way, call.problem) for way in ways)
-            told = [self.judge.cogency(method, (), who) for who in facts]
-            return [way for _, way in sorted(zip(told, ways, strict=True), key=lambda one: -one[0])]
+        def ranked(method: Method, fillings: list[Roles]) -> list[Roles]:
+            if method.name not in self.scorer.preferred:
+                return fillings
+            facts = (fillers(method, filling, call.problem) for filling in fillings)
+            scores = [self.scorer.cogency(method, (), individuals) for individuals in facts]
+            return [filling for _, filling in sorted(zip(scores, fillings, strict=True), key=lambda one: -one[0])]
 
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
         rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or not self.harms(rule)]
-        return Guide(call, [*rules, *also], self.orders, score, joins, ranked)
+        return RulePolicy(call, [*rules, *also], self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return the compiled problem, with the methods that succeeded more often than not as the first refinements."""
@@ -169,7 +170,7 @@ def plan(
     joins: dict[str, Bind | None] = {}
 
     def advised(call: Call) -> None:
-        call.advise(memory.guide(call, mode, joins))
+        call.advise(memory.policy(call, mode, joins))
 
     with paused_collection():
         warm = memory.warmed(using or fast.compiled(problem))

@@ -33,7 +33,7 @@ Answer: TypeAlias = "Callable[[str, Named], str]"
 """Returns the answer to a question about an individual in a role."""
 
 
-class View:
+class FactReader:
     """Reads facts about the individuals in a rule's roles from one table and goal."""
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
@@ -51,15 +51,15 @@ class View:
         if plan is None:
             asked = [question for question in self._questions(rule) if among is None or question[1] in among]
             plan = self._plans[rule.name, among is None] = asked
-        named = {who: role for (role, _), who in zip(rule.kinds, roles, strict=True)}
+        named = {individual: role for (role, _), individual in zip(rule.kinds, roles, strict=True)}
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
     def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
         """Return the individuals in the roles that few individuals can fill."""
         members = self.problem.members
         return [
-            (f"who is {role[1:]}", who)
-            for (role, kind), who in zip(rule.kinds, roles, strict=True)
+            (f"who is {role[1:]}", individual)
+            for (role, kind), individual in zip(rule.kinds, roles, strict=True)
             if 1 < len(members(kind)) <= CROWD
         ]
 
@@ -84,41 +84,44 @@ class View:
                         if j != i and any(a in here and b in members(of) for a, b in rows):
                             yield i, f"{name} {relation} {other[1:]}", partial(self._tied, rows, other)
 
-    def _belongs(self, among: Container[str], who: str, _: Named) -> str:
-        return "yes" if who in among else "no"
+    def _belongs(self, among: Container[str], individual: str, _: Named) -> str:
+        return "yes" if individual in among else "no"
 
-    def _value(self, situation: str, who: str, named: Named) -> str:
-        value = self.table.now[situation].get(who, "none")
+    def _value(self, situation: str, individual: str, named: Named) -> str:
+        value = self.table.now[situation].get(individual, "none")
         return value if value == "none" or value in self.constants else named.get(value, "?another")[1:]
 
-    def _wanted(self, situation: str, who: str, _: Named) -> str:
-        wanted = self.goal.get((situation, who))
+    def _wanted(self, situation: str, individual: str, _: Named) -> str:
+        wanted = self.goal.get((situation, individual))
         if wanted is None:
             return "nothing"
-        return "as it is" if self.table.now[situation].get(who, FALSE) == wanted else "not yet"
+        return "as it is" if self.table.now[situation].get(individual, FALSE) == wanted else "not yet"
 
-    def _holders(self, situation: str, who: str, named: Named) -> str:
-        keys = self.table.holders[situation].get(who)
+    def _holders(self, situation: str, individual: str, named: Named) -> str:
+        keys = self.table.holders[situation].get(individual)
         if not keys:
             return "nobody"
         return next((role[1:] for one, role in named.items() if one in keys), "somebody")
 
-    def _wanting(self, situation: str, own: Container[str], who: str, named: Named) -> str:
-        now, wanters = self.table.now[situation], self.wanters.get((situation, who), ())
+    def _wanting(self, situation: str, own: Container[str], individual: str, named: Named) -> str:
+        now, wanters = self.table.now[situation], self.wanters.get((situation, individual), ())
         others = (key for _, key in wanters if not isinstance(key, str) or named.get(key) not in own)
-        return "somebody" if any(now.get(key, FALSE) != who for key in others) else "nobody"
+        return "somebody" if any(now.get(key, FALSE) != individual for key in others) else "nobody"
 
-    def _tied(self, rows: Container[tuple[str, ...]], other: str, who: str, named: Named) -> str:
-        return "yes" if any(role == other and (who, end) in rows for end, role in named.items()) else "no"
+    def _tied(self, rows: Container[tuple[str, ...]], other: str, individual: str, named: Named) -> str:
+        return "yes" if any(role == other and (individual, end) in rows for end, role in named.items()) else "no"
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
     """Return the individuals in the open roles of a method that few can fill: alone, and with each of its behaviour's."""
     found = list[Fact]()
-    for role, who in zip(method.open, roles[method.roles :], strict=True):
-        if role.source is None and who is not None and 1 < len(problem.members(role.kind)) <= CROWD:
+    for role, individual in zip(method.open, roles[method.roles :], strict=True):
+        if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:
             asks = f"who is {role.kind}"
-            found += [(asks, who), *((f"{asks} with {other}", who) for other in roles[: method.roles] if other)]
+            found += [
+                (asks, individual),
+                *((f"{asks} with {other}", individual) for other in roles[: method.roles] if other),
+            ]
     return found
 
 
@@ -130,7 +133,7 @@ class Factor:
     weight: float
 
 
-class Judge:
+class Scorer:
     """Computes the cogency of following a rule from counts."""
 
     def __init__(self, experience: Experience) -> None:
@@ -172,14 +175,14 @@ class Judge:
         """Return the sum of the factors."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
-    def told(self, view: View, rule: Rule, roles: tuple[str, ...]) -> float:
+    def score(self, reader: FactReader, rule: Rule, roles: tuple[str, ...]) -> float:
         """Return the cogency of following a rule with individuals in its roles, by the counted facts."""
         weights = self.weights(rule)
         if rule.name not in self._asked:
             self._asked[rule.name] = frozenset(asks for asks, _ in weights)
-        facts = view.facts(rule, roles, self._asked[rule.name])
-        who = view.individuals(rule, roles) if rule.name in self.preferred else ()
-        return self.cogency(rule, facts, who)
+        facts = reader.facts(rule, roles, self._asked[rule.name])
+        individual = reader.individuals(rule, roles) if rule.name in self.preferred else ()
+        return self.cogency(rule, facts, individual)
 
 
 def told_apart(problem: Problem) -> tuple[str, ...]:

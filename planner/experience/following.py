@@ -1,99 +1,55 @@
-"""Learned rules as methods of subgoals: what a rule lacks is achieved first, by rules again, then its step is done.
+"""Learned rules as methods: the unmet conditions of a rule are achieved first, by rules again, then its step is applied.
 
-way      a rule with individuals in its roles, and which of its conditions are unmet; the wants of which one would do for each of
-         them are subgoals (`confab.planner.hierarchical.subgoals`)
-cost     how many rules must follow each other at least, each condition taken by itself, as h_max: the ways to a goal, the ways to
-         what these lack, and so on, layer by layer, until no deeper layer could make it cheaper
-attain   a goal by its cheapest ways, of these first by what spoils least and is most cogent: their conditions one by one, those
-         that plans brought about first, else the dearest; then the step, refined and done on the table
-budget   the unit of the search (`confab.planner.hierarchical.workspace`); of all effort a tenth may come to nothing, and a little
+achieve    a goal by its cheapest instances (`confab.planner.experience.instances`), the most cogent first: their unmet conditions
+           one by one, those that plans achieved first, otherwise the most expensive; then the step, refined and applied
+budget     rules spend the budget of the search; failed attempts may waste a tenth of it (`confab.planner.experience.allowance`)
 
-`Guide.follow` leaves the table as wanted, with all kept that must be, or as it was: so the search goes on as if rules hadn't been
-asked, and a wrong rule costs a part of the same budget.
+`RulePolicy.follow` either achieves the targets and keeps the other values, or leaves the table unchanged. The search then continues
+as if no rules had been tried.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import groupby, islice
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import inf
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import TypeAlias
 
-from confab.planner.experience.matching import Bind, Find, finder, known, soft
+from confab.planner.experience.allowance import Allowance, OverspentError
+from confab.planner.experience.instances import FARTHEST, SLACK, TRIES, Goal, Instances, RuleInstance, Score
+from confab.planner.experience.matching import Bind
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.methods import Ranked, unranked
-from confab.planner.hierarchical.operators import FEW, Achiever, Program
+from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.refinement import RefinedStep
-from confab.planner.hierarchical.symmetry import representatives
 from confab.planner.hierarchical.workspace import EXPANSION, Keep
-from confab.planner.transitions import Cell, arguments_of, key_of
-from confab.reasoner.amounts import meets, number, towards
-from confab.reasoner.memory.experience import ITSELF, Experience, Ground, Order, Rule, Tally
+from confab.planner.transitions import Cell, arguments_of
+from confab.reasoner.amounts import meets, number
+from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition, Witness
 
-WAYS, TRIES = 40, 3
-"""Maximum number of instances of a rule that are compared, and of instances for a goal that are tried."""
-FARTHEST, SLACK = 30, 2
-"""Maximum cost of a goal, and maximum excess in cost of an instance over the cheapest one."""
-ASKED = 5
-"""Cost of matching a rule, in states times operators (about a microsecond each)."""
-WASTE, FREE = 10, 500_000
-"""Inverse of the share of expansions, and of effort, that unsuccessful rules may take, and the effort assumed before the call."""
-PATIENCE = 3
+STEPS_PER_COST = 3
 """Maximum ratio of applied steps to a goal's cost, beside `SLACK` more: each condition is costed separately."""
 TWICE = 2
-"""Maximum number of times that a goal is achieved: what was shut may be opened once more."""
+"""Maximum number of times that a goal is achieved: a door that was closed may be opened once more."""
 CASES, NEARLY = 3, 0.95
 """Minimum number of cases of an order of goals, and minimum share of cases in which it held."""
 
-Roles: TypeAlias = "tuple[str, ...]"
-Goal: TypeAlias = "tuple[Cell, str]"
-Asked: TypeAlias = "tuple[int, Goal, bool]"
-"""A level, a goal on it, and whether individuals are considered that the state doesn't suggest."""
 Steps: TypeAlias = "list[RefinedStep]"
-Found = TypeVar("Found")
 
 
-class Candidate(NamedTuple):
-    """A way to follow a rule now: the symbol that it is for, the individuals in its roles, and which conditions are unmet."""
-
-    rule: Rule
-    goal: Cell
-    roles: Roles
-    unmet: tuple[int, ...] = ()
-
-    @property
-    def named(self) -> dict[str, str]:
-        """The individuals by role."""
-        return dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
-
-    @property
-    def ground(self) -> Ground:
-        """The step to do."""
-        filled = self.named
-        return self.rule.does[0], tuple([filled.get(term, term) for term in self.rule.does[1]])
-
-
-Score: TypeAlias = "Callable[[Candidate], float]"
-
-
-class TooMuchError(Exception):
-    """Following rules took more than may come to nothing."""
-
-
-class Guide:
-    """Rules bound to one call: its table, its goals and the order of these.
+class RulePolicy:
+    """Rules that achieve the goals of one call.
 
     Parameters
     ----------
     call : Call
     rules : iterable of Rule
     orders : sequence of Order
-    score : function of a candidate, optional
-        The greater, the sooner tried.
+    score : function of an instance, optional
+        Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
-        What was compiled of rules for other calls over the same program; grows.
-    ranked : function of a method and ways to fill its roles, optional
+        Compiled rules of other calls of the same program; it is extended.
+    ranked : function of a method and individuals for its roles, optional
         Returns these, the best first.
     """
 
@@ -106,150 +62,114 @@ class Guide:
         joins: dict[str, Bind | None] | None = None,
         ranked: Ranked = unranked,
     ) -> None:
-        self.call, self.ranked, self.score = call, ranked, score
-        self.joins: dict[str, Bind | None] = {} if joins is None else joins
+        self.call, self.ranked = call, ranked
+        self.allowance = Allowance(call.space)
+        self.instances = Instances(call, rules, self.allowance, score, joins)
         self.first = call.program.levels[0]
         self.constants = frozenset(call.program.named) | {TRUE, FALSE}
         self.orders = frozenset(orders)
         self.before = _before(call.goal, orders, call.program)
-        self.rules: dict[tuple[int, str], list[Rule]] = {}
-        for rule in rules:
-            if known(rule, call.program.problem):
-                level = call.program.domain.behaviors[rule.does[0]].level
-                self.rules.setdefault((level, rule.goal.situation), []).append(rule)
-        self.expects = all((self.first, situation) in self.rules for situation, _ in self.open())
-        self.finds: dict[str, Find | None] = {}
-        self.achievers: dict[str, Achiever] = {}
-        self.spent, self.most, self.vain, self.wasted = 0, inf, 0.0, 0
-        """Effort of asking rules, what it may become, and what came to nothing: in all, and in expansions of the first level."""
-        self.left = 0
-        """How many steps may still be done for what is to be attained."""
-        self.taken: frozenset[str] = frozenset()
-        """Individuals that ways to other goals use up."""
+        self.expects = all((self.first, situation) in self.instances.rules for situation, _ in self.open())
+        self.steps_left = 0
+        """Number of steps that may still be applied for the current goal."""
         self.serial, self.passed = True, set[str]()
-        """Whether goals were achieved one after the other so far, and of which situation types one was."""
-        self.age = -1
-        self.found: dict[Asked, list[Candidate]] = {}
-        self.least: dict[Asked, int] = {}
-        self.more: dict[Asked, float] = {}
-        """What goals cost at most, and more than what."""
-        self.seen: set[Asked] = set()
-        self.cut = False
-        self.picked: dict[tuple[int, str], Sequence[str]] = {}
-        self.lacking: dict[tuple[int, int, int], tuple[Candidate, list[Goal]]] = {}
+        """Whether each goal so far left another one within reach, and the situation types for which this was checked."""
 
     # ----------------------------------------------------------------------------------------------------- the call's goals
 
     def open(self) -> dict[Cell, str]:
-        """Return the goals of the call that don't hold now."""
+        """Return the goals of the call that don't hold in the current state."""
         return {cell: value for cell, value in self.call.goal.items() if not self.call.met(cell)}
 
     def waits(self, cell: Cell) -> bool:
-        """Whether another open goal comes first."""
+        """Return whether another open goal should be achieved first."""
         return any(not self.call.met(other) for other in self.before.get(cell, ()))
 
-    def every(self, cells: Mapping[Cell, str]) -> Iterator[Candidate]:
-        """Yield the ways to follow a rule of the most abstract level now for some values, or for what the cheapest ways lack."""
+    def every(self, cells: Mapping[Cell, str]) -> Iterator[RuleInstance]:
+        """Yield the instances of the most abstract level without unmet conditions, for some goals or for their subgoals."""
         goals = dict.fromkeys(cells.items())
-        for goal in (asked := list(goals)):
-            ready = [way for way in self.ways((self.first, goal, False)) if not way.unmet]
+        for goal in (waiting := list(goals)):
+            ready = [one for one in self.instances.of((self.first, goal, False)) if not one.unmet]
             yield from ready
-            for _, way in () if ready else self.cheapest(self.first, goal):
-                new = [g for n in way.unmet for g in self.lacks(self.first, way, n) if g not in goals]
+            for _, one in () if ready else self.instances.cheapest(self.first, goal):
+                new = [g for n in one.unmet for g in self.instances.goals_of(self.first, one, n) if g not in goals]
                 goals.update(dict.fromkeys(new))
-                asked += new
-
-    def rank(self, cell: Cell) -> int:
-        """Return 1 if rules promise a goal by one step, 2 if ways to it lack something, 0 if they promise nothing."""
-        goal = cell, self.call.goal[cell]
-
-        def ask() -> int:
-            ways = self.ways((self.first, goal, False)) or self.ways((self.first, goal, True))
-            return min((1 + bool(way.unmet) for way in ways), default=0)
-
-        return self.bounded(self.first, ask) or 0
-
-    # ------------------------------------------------------------------------------------------------------------ the budget
-
-    def allowed(self) -> float:
-        """Return how much more may come to nothing."""
-        return (self.call.space.effort + self.spent + FREE) / WASTE - self.vain
+                waiting += new
 
     def ready(self) -> bool:
-        """Whether more may come to nothing."""
-        return self.wasted * WASTE <= self.call.space.expanded and self.allowed() > 0
+        """Return whether the planner should follow rules now."""
+        return self.allowance.ready()
 
-    def bounded(self, level: int, ask: Callable[[], Found | None]) -> Found | None:
-        """Return what rules answer, None if they have no answer or asking takes more than what may come to nothing."""
-        if not self.ready() if level == self.first else self.allowed() <= 0:
-            return None
-        outer, vain, began = self.most, self.vain, self.spent
-        self.most = min(outer, began + self.allowed())
-        try:
-            found = ask()
-        except TooMuchError:
-            found = None
-        self.most = outer + self.spent - began  # what it is a part of isn't stopped by it
-        if not found:
-            self.vain = max(self.vain, vain + self.spent - began)
-        return found
+    def rank(self, cell: Cell) -> int:
+        """Return 1 if a rule achieves the goal in one step, 2 if in more steps, 0 if no rule achieves it."""
+        goal = cell, self.call.goal[cell]
 
-    def spend(self, effort: int) -> None:
-        """Count effort, and raise `TooMuchError` where that is more than there may be."""
-        self.spent += effort
-        if self.spent > self.most:
-            raise TooMuchError
+        def fewest() -> int:
+            found = self.instances.of((self.first, goal, False)) or self.instances.of((self.first, goal, True))
+            return min((1 + bool(one.unmet) for one in found), default=0)
+
+        return (self.allowance.bounded(fewest) if self.ready() else 0) or 0
 
     # ------------------------------------------------------------------------------------------------------------- following
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
-        return self.bounded(level, lambda: self.tried(level, targets, keep))
+        """Apply refined steps of a level that achieve the targets and keep the other values.
 
-    def tried(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Do the same, however much comes to nothing."""
-        call, space, vain = self.call, self.call.space, self.vain
-        start, expanded, began = len(call.table.trail), space.expanded, space.effort + self.spent
-        other = self.another(targets) if level == self.first else None
+        Returns None, with the table unchanged, if rules fail or have no allowance left.
+        """
+        if not (self.ready() if level == self.first else self.allowance.left() > 0):
+            return None
+        return self.allowance.bounded(lambda: self.attempt(level, targets, keep))
+
+    def attempt(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
+        """Do the same as `follow`, without a limit of the effort of search."""
+        call, space, allowance = self.call, self.call.space, self.allowance
+        wasted, start, expanded, began = (
+            allowance.wasted_effort,
+            len(call.table.trail),
+            space.expanded,
+            space.effort + allowance.spent,
+        )
+        other = self.other_open_goal(targets) if level == self.first else None
         try:
-            steps = self.led(level, targets, keep)
+            steps = self.achieve_all(level, targets, keep)
             if steps is not None and other is not None:
                 self.passed.add(other[0][0])
-                self.serial = self.far(level, other) < inf
+                self.serial = self.instances.distance(level, other) < inf
                 if not self.serial:
                     call.table.undo(start)
-                    steps = self.together(level, list(self.open().items()))
-        except TooMuchError:
+                    steps = self.achieve_jointly(level, list(self.open().items()))
+        except OverspentError:
             steps = None
         if steps is not None and call.refiner.wrong_value(start, targets, keep) is None:
             return steps if level == self.first else call.refiner.pruned(steps, start, targets, keep)
-        self.wasted += space.expanded - expanded if level == self.first else 0
-        self.vain = max(self.vain, vain + space.effort + self.spent - began)
+        allowance.wasted_expansions += space.expanded - expanded if level == self.first else 0
+        allowance.wasted_effort = max(allowance.wasted_effort, wasted + space.effort + allowance.spent - began)
         call.table.undo(start)
         return None
 
-    def led(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Attain what is wanted, and what was touched on the way and is to be kept, until nothing is off."""
+    def achieve_all(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
+        """Achieve the targets, and restore the values to be kept, until none differs."""
         start, steps = len(self.call.table.trail), list[RefinedStep]()
-        closed: dict[Cell, int] = {}
-        while off := self.off(start, targets, keep):
-            before = _before(off, self.orders, self.call.program) if len(off) > 1 else {}
-            among = [goal for goal in off.items() if closed.get(goal[0], 0) < TWICE]
-            far = {goal: self.far(level, goal) for goal in among}
-            among.sort(key=lambda goal: (sum(other in off for other in before.get(goal[0], ())), -far[goal]))
+        achieved: dict[Cell, int] = {}
+        while differing := self.differing(start, targets, keep):
+            before = _before(differing, self.orders, self.call.program) if len(differing) > 1 else {}
+            among = [goal for goal in differing.items() if achieved.get(goal[0], 0) < TWICE]
+            cost = {goal: self.instances.distance(level, goal) for goal in among}
+            among.sort(key=lambda goal: (sum(other in differing for other in before.get(goal[0], ())), -cost[goal]))
             for goal in among:
-                self.left = int(SLACK + PATIENCE * far[goal]) if far[goal] < inf else 0
-                done = self.attain(level, goal) if self.left else None
+                self.steps_left = int(SLACK + STEPS_PER_COST * cost[goal]) if cost[goal] < inf else 0
+                done = self.achieve(level, goal) if self.steps_left else None
                 if done is not None:
                     steps += done
-                    closed[goal[0]] = closed.get(goal[0], 0) + 1
+                    achieved[goal[0]] = achieved.get(goal[0], 0) + 1
                     break
             else:
                 return None
         return steps
 
-    def off(self, start: int, targets: Mapping[Cell, str], keep: Keep) -> dict[Cell, str]:
-        """Return what isn't yet as it must be in the end: targets, and what was touched since a mark."""
+    def differing(self, start: int, targets: Mapping[Cell, str], keep: Keep) -> dict[Cell, str]:
+        """Return the required values that don't hold: the targets, and kept values that were changed since a mark."""
         now, wanted = self.call.table.now, dict(targets)
         for cell in self.call.space.defined:
             if value := keep(cell, ""):
@@ -259,209 +179,50 @@ class Guide:
                 wanted[cell] = value
         return {cell: value for cell, value in wanted.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
-    # ------------------------------------------------------------------------------------------------------------------ ways
+    # -------------------------------------------------------------------------------------------------------------- one goal
 
-    def fresh(self) -> None:
-        """Forget what was found of another state."""
-        if self.age != self.call.table.age:
-            self.age = self.call.table.age
-            for found in (self.found, self.least, self.more, self.picked, self.lacking):
-                found.clear()
+    def achieve(self, level: int, goal: Goal, above: tuple[Goal, ...] = (), below: float = inf) -> Steps | None:
+        """Apply steps that achieve a goal; return None, with the table unchanged, if no instance does.
 
-    def ways(self, asked: Asked) -> list[Candidate]:
-        """Return the ways to follow rules for a goal now."""
-        self.fresh()
-        if asked not in self.found:
-            level, (cell, value), everybody = asked
-            rules = self.rules.get((level, cell[0]), ())
-            self.spend(ASKED * len(rules))
-            self.found[asked] = [
-                Candidate(rule, cell, *way)
-                for rule in rules
-                for way in islice(self.find(rule, cell, value, everybody), WAYS)
-                if self.taken.isdisjoint(way[0])
-            ]
-        return self.found[asked]
-
-    def find(self, rule: Rule, cell: Cell, value: str, everybody: bool) -> Iterator[tuple[Roles, tuple[int, ...]]]:
-        """Return ways to fill the roles of a rule; it is compiled when it is first asked."""
-        name, program = rule.name, self.call.program
-        if name not in self.finds:
-            asks = soft(rule, program.problem)
-            if name not in self.joins:
-                self.joins[name] = finder(rule, program.writer, asks)
-            bind = self.joins[name]
-            self.finds[name] = bind(self.call.table, self.pick) if bind is not None else None
-            self.achievers[name] = Achiever(name, 0, asks, {}, dict(rule.kinds), deep=True)
-        find = self.finds[name]
-        if program.domain.situations[cell[0]].quantity is not None:
-            value = towards(self.call.table.now[cell[0]].get(cell[1]), value)
-        return find(*arguments_of(cell[1]), value, everybody) if find is not None else iter(())
-
-    def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
-        """Return of many candidates for the value of a situation type one of each sort with values of equal sorts, of free ones."""
-        found = self.picked.get((id(candidates), situation))
-        if found is None:
-            self.spent += len(candidates)
-            table, symmetry, wanted = self.call.table, self.call.program.symmetry, self.call.space.subgoals.wanted
-            found = free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
-            if len(free) > FEW:
-                among = set(candidates)
-                cells = [its for its in table.now.values() if not among.isdisjoint(its)]
-                first = representatives(
-                    symmetry.groups(free), table.holders.get(situation, {}), wanted.get(situation, {})
-                )
-                sort = symmetry.class_of.get
-                unlike = {(sort(w), *[sort(its.get(w, "")) for its in cells]): w for w in (*free[::-1], *first[::-1])}
-                found = list(unlike.values())[::-1]
-            self.picked[id(candidates), situation] = found
-        self.spent += 1 + len(found)
-        return found
-
-    def lacks(self, level: int, way: Candidate, position: int) -> list[Goal]:
-        """Return the wants of which one would do for a condition."""
-        self.fresh()
-        if (key := (level, id(way), position)) not in self.lacking:
-            self.lacking[key] = way, self.wanting(level, way, position)
-        return self.lacking[key][1]
-
-    def wanting(self, level: int, way: Candidate, position: int) -> list[Goal]:
-        """Return the same, anew."""
-        achiever, env = self.achievers[way.rule.name], way.named
-        asked = achiever.soft[position]
-        if isinstance(asked, ValueCondition):
-            key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
-            if asked.situation in self.call.program.rules:
-                if (level, asked.situation) in self.rules:
-                    return [((asked.situation, key), TRUE if (asked.value == TRUE) is not asked.negated else FALSE)]
-            elif not asked.negated and key in self.call.table.now[asked.situation]:
-                return [((asked.situation, key), env.get(asked.value, asked.value))]
-        wants = self.call.space.subgoals.of(achiever, asked, env, level)
-        return [((situation, key), value) for situation, key, values in wants for value in values]
-
-    # ------------------------------------------------------------------------------------------------------------------ cost
-
-    def met(self, goal: Goal) -> bool:
-        """Whether something is as wanted now."""
-        (situation, key), value = goal
-        return meets(self.call.table.now[situation].get(key, FALSE), value)
-
-    def cost(self, level: int, goal: Goal, everybody: bool) -> float:
-        """Return how many rules must follow each other at least for a goal; infinity if no chain leads to it, or a longer one."""
-        for most in range(FARTHEST + 1):
-            self.cut, self.seen, before = False, set(), len(self.least)
-            if self.within(level, goal, most, everybody):
-                return most
-            if not self.cut and len(self.least) == before:  # no chain of any length leads to it
-                self.more.update((asked, inf) for asked in self.seen if asked not in self.least)
-                return inf
-        return inf
-
-    def far(self, level: int, goal: Goal) -> float:
-        """Return the cost of a goal by individuals that the state suggests if there is a chain, else by any."""
-        cost = self.cost(level, goal, False)
-        return cost if cost < inf else self.cost(level, goal, True)
-
-    def within(self, level: int, goal: Goal, most: int, everybody: bool) -> bool:
-        """Whether a goal costs at most so much."""
-        if self.met(goal):
-            return True
-        asked = level, goal, everybody
-        ways = self.ways(asked)
-        if self.least.get(asked, inf) <= most:
-            return True
-        if most <= 0 or self.more.get(asked, 0) >= most:
-            self.cut |= (asked not in self.seen or asked in self.least) and self.more.get(asked, 0) < inf
-            return False
-        before, self.more[asked] = self.more.get(asked, 0), most  # met again on the way, it isn't cheaper
-        self.seen.add(asked)
-        if any(self.leads(level, way, most, everybody) for way in ways):
-            self.least[asked], self.more[asked] = most, before
-            return True
-        return False
-
-    def leads(self, level: int, way: Candidate, most: int, everybody: bool) -> bool:
-        """Whether a way costs at most so much; what nothing is known to lead to is hoped for."""
-        lacking = (self.lacks(level, way, n) for n in way.unmet)
-        return all(
-            any(self.within(level, goal, most - 1, everybody) for goal in lacks) if lacks else most > 1
-            for lacks in lacking
-        )
-
-    def priced(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, list[Candidate]]]:
-        """Yield the ways to a goal by cost, up to a little more than that of the cheapest."""
-        for everybody in (False, True):
-            most, found = self.cost(level, goal, everybody), False
-            left = self.ways((level, goal, everybody)) if most < inf else []
-            for cost in range(int(most), int(min(most + SLACK + 1, below))) if left else ():
-                near = [way for way in left if self.leads(level, way, cost, everybody)]
-                now = {*map(id, near)}  # two ways may be long to compare
-                left, found = [way for way in left if id(way) not in now], found or bool(near)
-                yield cost, near
-            if found:
-                return
-
-    def cheapest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, Candidate]]:
-        """Yield the cheapest ways to a goal, each with its cost, the best first; a dearer one is looked for when asked."""
-        ways = ((cost, way) for cost, near in self.priced(level, goal, below) for way in self.best(level, near))
-        return islice(ways, TRIES)
-
-    def best(self, level: int, ways: Sequence[Candidate]) -> Iterator[Candidate]:
-        """Yield ways of the same cost in the order in which to try them."""
-        if len(ways) < 2:
-            yield from ways
-            return
-        rank = {id(way): (self.spoils(level, way), len(way.unmet)) for way in ways}
-        for _, alike in groupby(sorted(ways, key=lambda way: rank[id(way)]), key=lambda way: rank[id(way)]):
-            group = list(alike)
-            if self.score is not None and len(group) > 1:
-                group.sort(key=self.score, reverse=True)
-            yield from group
-
-    def spoils(self, level: int, way: Candidate) -> int:
-        """Return how many of a way's changes, or of the changes that it lacks, would spoil goals reached before."""
-        if way.unmet:
-            lacking = (self.lacks(level, way, n) for n in way.unmet)
-            changes = [lacks[0] for lacks in lacking if len(lacks) == 1]
-        else:
-            done = self.call.space.forward[way.ground[0]](*way.ground[1])
-            changes = [((situation, key), value) for situation, key, value in done[1]] if done is not None else []
-        return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
-
-    # ------------------------------------------------------------------------------------------------------------- attaining
-
-    def attain(self, level: int, goal: Goal, above: tuple[Goal, ...] = (), below: float = inf) -> Steps | None:
-        """Do steps that lead to a goal; None, and the table as it was, without any."""
-        if self.met(goal):
+        Parameters
+        ----------
+        level : int
+        goal : Goal
+        above : tuple of Goal
+            The goals that this one is a subgoal of.
+        below : float
+            Only instances of lower cost are tried.
+        """
+        if self.instances.met(goal):
             return []
         if goal in above or len(above) > FARTHEST:
             return None
-        table, amiss = self.call.table, self.amiss(goal)
-        for cost, way in self.cheapest(level, goal, below):
-            if self.left <= 0:
+        table, deviation = self.call.table, self.deviation(goal)
+        for cost, instance in self.instances.cheapest(level, goal, below):
+            if self.steps_left <= 0:
                 return None
-            mark, left = len(table.trail), self.left
-            steps = self.go(level, way, (*above, goal))
+            mark, left = len(table.trail), self.steps_left
+            steps = self.apply(level, instance, (*above, goal))
             if steps:
                 most: float = cost
-                if (steps[-1].behavior, steps[-1].arguments) == way.ground:
-                    # What is defined, or an amount, may need the same once more.
-                    most = below if self.amiss(goal) < amiss else 0.0
-                    self.left = left if most else self.left
-                rest = self.attain(level, goal, above, most)
-                if rest is not None and (above or self.hopeful(level, mark)):
+                if (steps[-1].behavior, steps[-1].arguments) == instance.ground:
+                    # A defined situation type, or an amount, may need the same step once more.
+                    most = below if self.deviation(goal) < deviation else 0.0
+                    self.steps_left = left if most else self.steps_left
+                rest = self.achieve(level, goal, above, most)
+                if rest is not None and (above or self.undone_within_reach(level, mark)):
                     return steps + rest
             table.undo(mark)
         return None
 
-    def hopeful(self, level: int, mark: int) -> bool:
-        """Whether the goals reached before that were spoiled since a mark are still within reach."""
-        kept = self.call.kept
-        spoiled = dict.fromkeys((s, key) for s, key, _ in self.call.table.trail[mark:] if (s, key) in kept)
-        return level != self.first or all(self.far(level, (cell, kept[cell])) < inf for cell in spoiled)
+    def undone_within_reach(self, level: int, mark: int) -> bool:
+        """Return whether the achieved goals that were undone since a mark can be achieved again."""
+        kept, trail = self.call.kept, self.call.table.trail[mark:]
+        undone = dict.fromkeys((situation, key) for situation, key, _ in trail if (situation, key) in kept)
+        return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)
 
-    def amiss(self, goal: Goal) -> float:
-        """Return by how much an amount isn't as wanted, or in how many respects what is defined isn't; nothing of others."""
+    def deviation(self, goal: Goal) -> float:
+        """Return the difference of an amount from its goal, or the number of wrong facts of a defined goal; zero for others."""
         (situation, key), value = goal
         if situation in self.call.program.rules:
             return len(self.call.space.subgoals.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
@@ -470,169 +231,168 @@ class Guide:
         now = float(number(self.call.table.now[situation].get(key)))
         return min(abs(now - float(number(bound.lstrip("<>=")))) for bound in value.split(","))
 
-    def go(self, level: int, way: Candidate, above: tuple[Goal, ...]) -> Steps | None:
-        """Bring about what a way lacks, and do its step; where it is no way any more, stop before that.
+    def apply(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
+        """Achieve the unmet conditions of an instance, and apply its step; stop early if no instance of the rule is left.
 
-        Without steps the table may be changed.
+        The table may be changed if None is returned.
         """
         call, steps = self.call, list[RefinedStep]()
-        rounds, fewest = 2 * len(self.achievers[way.rule.name].soft), inf
-        while way.unmet:
-            lacking = sum(len(self.lacks(level, way, n)) for n in way.unmet)
-            rounds, fewest = rounds - (lacking >= fewest), min(lacking, fewest)
-            done = self.mend(level, way, above) if rounds >= 0 else None
+        rounds, fewest = 2 * len(self.instances.achievers[instance.rule.name].soft), inf
+        while instance.unmet:
+            many = sum(len(self.instances.goals_of(level, instance, n)) for n in instance.unmet)
+            rounds, fewest = rounds - (many >= fewest), min(many, fewest)
+            done = self.achieve_condition(level, instance, above) if rounds >= 0 else None
             if done is None:
                 return None
             steps += done
-            now = self.same(level, way, above[-1])
-            if now is None:
+            following = self.instances.next(level, instance, above[-1])
+            if following is None:
                 return steps
-            way = now
-        if self.left <= 0:
+            instance = following
+        if self.steps_left <= 0:
             return None
-        self.left -= 1
+        self.steps_left -= 1
         call.space.expand(level)
         effort = call.space.effort
-        step = call.refiner.do(level, *way.ground)
-        self.spend(EXPANSION if step is not None else call.space.effort - effort)  # what was searched in vain counts
+        step = call.refiner.do(level, *instance.ground)
+        self.allowance.spend(EXPANSION if step is not None else call.space.effort - effort)  # a failed search counts
         return None if step is None else [*steps, step]
 
-    def same(self, level: int, way: Candidate, goal: Goal) -> Candidate | None:
-        """Return the cheapest way by the same rule to go on with, of these the one to the same step."""
-        mine = ([w for w in near if w.rule is way.rule] for _, near in self.priced(level, goal))
-        near = next(filter(None, mine), [])
-        return min(near, key=lambda w: (len(w.unmet), w.ground != way.ground), default=None)
-
-    def mend(self, level: int, way: Candidate, above: tuple[Goal, ...]) -> Steps | None:
-        """Bring about the next of the conditions that a way lacks, so that the others stay within reach."""
-        asks, env, table = self.achievers[way.rule.name].soft, way.named, self.call.table
+    def achieve_condition(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
+        """Achieve one unmet condition of an instance, such that the others stay within reach."""
+        conditions, named, table = self.instances.achievers[instance.rule.name].soft, instance.named, self.call.table
         goals = dict[int, list[Goal]]()
-        far = dict[Goal, float]()
-        for n in way.unmet:
-            lacks = self.lacks(level, way, n)
-            far |= {goal: self.far(level, goal) for goal in lacks}
-            there = [goal for goal in lacks if far[goal] < inf]
-            goals[n] = sorted(there, key=lambda goal: (far[goal], len(there) > 1 and not self.mends(way, n, goal)))
+        cost = dict[Goal, float]()
+        for n in instance.unmet:
+            alternatives = self.instances.goals_of(level, instance, n)
+            cost |= {goal: self.instances.distance(level, goal) for goal in alternatives}
+            reachable = [goal for goal in alternatives if cost[goal] < inf]
+            goals[n] = sorted(
+                reachable, key=lambda goal: (cost[goal], len(reachable) > 1 and not self.suffices(instance, n, goal))
+            )
         ready = [n for n in goals if goals[n]]
 
         def later(n: int) -> tuple[int, float]:
-            return sum(self.sooner(asks[m], asks[n], env) for m in ready if m != n), -far[goals[n][0]]
+            earlier = (self.ordered(conditions[m], conditions[n], named) for m in ready if m != n)
+            return sum(earlier), -cost[goals[n][0]]
 
         for n in sorted(ready, key=later):
-            lost = False
+            others_lost = False
             for goal in goals[n][:TRIES]:
-                mark, left = len(table.trail), self.left
-                done = self.attain(level, goal, above)
+                mark, left = len(table.trail), self.steps_left
+                done = self.achieve(level, goal, above)
                 if done is None:
                     continue
-                if isinstance(asks[n], Witness) and asks[n].negated:
-                    self.left = left  # each individual that it forbids has steps of its own
-                if all(any(self.far(level, other) < inf for other in goals[m]) for m in ready if m != n):
+                condition = conditions[n]
+                if isinstance(condition, Witness) and condition.negated:
+                    self.steps_left = left  # each individual that the condition excludes has steps of its own
+                if all(any(self.instances.distance(level, other) < inf for other in goals[m]) for m in ready if m != n):
                     return done
                 table.undo(mark)
-                lost = True
-            if not lost:  # else another condition comes first: this one put the others out of reach
+                others_lost = True
+            if not others_lost:  # otherwise another condition comes first
                 return None
         return None
 
-    def mends(self, way: Candidate, position: int, goal: Goal) -> bool:
-        """Whether a want alone would do for a condition; of amounts and of what is defined that isn't asked."""
-        table, achiever, program = self.call.table, self.achievers[way.rule.name], self.call.program
+    def suffices(self, instance: RuleInstance, position: int, goal: Goal) -> bool:
+        """Return whether a goal alone makes a condition true; amounts and defined situation types aren't tested."""
+        table, achiever, program = self.call.table, self.instances.achievers[instance.rule.name], self.call.program
         if goal[0][0] in program.rules or program.domain.situations[goal[0][0]].quantity is not None:
             return True
         mark, age = len(table.trail), table.age
         table.put(*goal[0], goal[1])
-        holds = self.call.space.subgoals.holds(achiever, achiever.soft[position], way.named)
+        holds = self.call.space.subgoals.holds(achiever, achiever.soft[position], instance.named)
         table.undo(mark)
-        self.age = table.age if self.age == age else self.age  # all is as it was
+        if self.instances.age == age:
+            self.instances.age = table.age  # the state is the same again
         return holds
 
-    def sooner(self, first: Condition, then: Condition, env: Mapping[str, str]) -> bool:
-        """Whether one condition is known to be brought about before another one."""
-        one, other = fact(first, env), fact(then, env)
+    def ordered(self, first: Condition, then: Condition, named: Mapping[str, str]) -> bool:
+        """Return whether plans achieved one condition before another one."""
+        one, other = fact(first, named), fact(then, named)
         return one is not None and other is not None and Order.of(one, other, self.constants) in self.orders
 
-    # ------------------------------------------------------------------------------------------------------- goals together
+    # --------------------------------------------------------------------------------------------------------- goals jointly
 
-    def another(self, targets: Mapping[Cell, str]) -> Goal | None:
-        """Return another open goal of a target's situation type that is within reach, if that wasn't asked of the type before."""
+    def other_open_goal(self, targets: Mapping[Cell, str]) -> Goal | None:
+        """Return another open goal of a target's situation type that is within reach, once for each type."""
         kinds = {cell[0] for cell in targets} - self.passed if self.serial else set()
         for cell, value in reversed(self.call.goal.items()) if kinds else ():
             if cell[0] in kinds and cell not in targets and not self.call.met(cell):
-                return (cell, value) if self.far(self.first, (cell, value)) < inf else None
+                goal = cell, value
+                return goal if self.instances.distance(self.first, goal) < inf else None
         return None
 
-    def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
-        """Do steps that lead to goals of which none can be reached after the others: what their last steps ask comes first.
+    def achieve_jointly(self, level: int, goals: Sequence[Goal]) -> Steps | None:
+        """Achieve goals none of which can be achieved after the others: first the conditions of all their last steps.
 
-        Each has a way of its own, so that no individual is used up twice. Without steps the table may be changed.
+        Each goal has an instance with individuals of its own. The table may be changed if None is returned.
         """
-        ways, steps = list[tuple[Goal, Candidate]](), list[RefinedStep]()
+        chosen, steps = list[tuple[Goal, RuleInstance]](), list[RefinedStep]()
         try:
             for goal in goals:
-                found = next(self.cheapest(level, goal), None)
+                found = next(self.instances.cheapest(level, goal), None)
                 if found is None:
                     return None
-                ways.append((goal, found[1]))
-                self.taken |= self.used_up(found[1])
-                self.age = -1
+                chosen.append((goal, found[1]))
+                self.instances.exclude(self.instances.excluded | self.consumed(found[1]))
         finally:
-            self.taken, self.age = frozenset(), -1
-        lacking = (self.lacks(level, way, n) for _, way in ways for n in way.unmet)
-        wants = list(dict.fromkeys(lacks[0] for lacks in lacking if lacks))
-        while wants:
-            done = self.nearest(level, wants)
+            self.instances.exclude(frozenset())
+        alternatives = (self.instances.goals_of(level, one, n) for _, one in chosen for n in one.unmet)
+        subgoals = list(dict.fromkeys(of_one[0] for of_one in alternatives if of_one))
+        while subgoals:
+            done = self.achieve_nearest(level, subgoals)
             if done is None:
                 return None
             steps += done
-            wants = [want for want in wants if not self.met(want)]
-        for goal, way in ways:
-            now = self.same(level, way, goal)
-            self.left = SLACK
-            last = self.go(level, now, (goal,)) if now is not None else None
+            subgoals = [goal for goal in subgoals if not self.instances.met(goal)]
+        for goal, one in chosen:
+            following = self.instances.next(level, one, goal)
+            self.steps_left = SLACK
+            last = self.apply(level, following, (goal,)) if following is not None else None
             if last is None:
                 return None
             steps += last
         return steps
 
-    def nearest(self, level: int, wants: Sequence[Goal]) -> Steps | None:
-        """Bring about the cheapest of some wants after which those about as cheap are within reach."""
-        table, far = self.call.table, {want: self.far(level, want) for want in wants}
-        for want in sorted((want for want in wants if far[want] < inf), key=far.__getitem__):
-            beside = [other for other in wants if other != want and far[other] <= far[want] + SLACK]
-            self.left, mark = int(far[want]) + SLACK, len(table.trail)
-            done = self.attain(level, want)
-            if done and all(self.far(level, other) < inf for other in beside):
+    def achieve_nearest(self, level: int, subgoals: Sequence[Goal]) -> Steps | None:
+        """Achieve the cheapest subgoal after which those of about the same cost are still within reach."""
+        table, cost = self.call.table, {goal: self.instances.distance(level, goal) for goal in subgoals}
+        for goal in sorted((goal for goal in subgoals if cost[goal] < inf), key=cost.__getitem__):
+            near = [other for other in subgoals if other != goal and cost[other] <= cost[goal] + SLACK]
+            self.steps_left, mark = int(cost[goal]) + SLACK, len(table.trail)
+            done = self.achieve(level, goal)
+            if done and all(self.instances.distance(level, other) < inf for other in near):
                 return done
             table.undo(mark)
         return None
 
-    def used_up(self, way: Candidate) -> set[str]:
-        """Return of whom a way asks something that its step changes."""
-        env, behavior = way.named, self.call.program.domain.behaviors[way.rule.does[0]]
-        put = {p.name: who for p, who in zip(behavior.parameters, way.ground[1], strict=True)}
-        made = {(e.situation, tuple([put.get(a, a) for a in e.arguments])): e.value for e in behavior.effects}
-        asked = [found for c in way.rule.asks if (found := fact(c, env)) is not None]
+    def consumed(self, instance: RuleInstance) -> set[str]:
+        """Return the individuals in conditions of an instance that its step makes false."""
+        named, behavior = instance.named, self.call.program.domain.behaviors[instance.rule.does[0]]
+        bound = {p.name: individual for p, individual in zip(behavior.parameters, instance.ground[1], strict=True)}
+        made = {(e.situation, tuple([bound.get(a, a) for a in e.arguments])): e.value for e in behavior.effects}
+        required = [found for c in instance.rule.asks if (found := fact(c, named)) is not None]
         return {
-            who
-            for f in asked
-            if put.get(value := made.get((f.symbol.situation, f.symbol.arguments), f.value), value) != f.value
-            for who in f.symbol.arguments
+            individual
+            for one in required
+            if bound.get(value := made.get((one.symbol.situation, one.symbol.arguments), one.value), value) != one.value
+            for individual in one.symbol.arguments
         }
 
 
-def by_rules(guide: Guide) -> None:
-    """Achieve goals by rules alone, as many as they can."""
-    call, reached = guide.call, True
-    while reached:
-        reached = False
-        for cell, value in sorted(guide.open().items(), key=lambda item: guide.waits(item[0])):
+def by_rules(policy: RulePolicy) -> None:
+    """Achieve as many goals of a call as possible by rules alone."""
+    call, progress = policy.call, True
+    while progress:
+        progress = False
+        for cell, value in sorted(policy.open().items(), key=lambda item: policy.waits(item[0])):
             if not call.met(cell):
-                steps = guide.tried(guide.first, {cell: value}, call.space.keeping(call.kept))
+                steps = policy.attempt(policy.first, {cell: value}, call.space.keeping(call.kept))
                 if steps is not None:
                     call.steps += steps
                     call.kept[cell] = value
-                    reached = True
+                    progress = True
 
 
 def rules_in(experience: Experience) -> list[Rule]:
@@ -642,7 +402,10 @@ def rules_in(experience: Experience) -> list[Rule]:
 
 
 def usable(experience: Experience) -> list[Order]:
-    """Return the orders that held in nearly all cases; one between goals that share nobody, of different situation types only."""
+    """Return the orders that held in nearly all cases.
+
+    Orders between goals without a common individual are returned only for different situation types.
+    """
     counts = experience.totals()
     found = []
     for name, order in sorted(experience.said.items()):
@@ -654,16 +417,16 @@ def usable(experience: Experience) -> list[Order]:
     return found
 
 
-def fact(condition: Condition, env: Mapping[str, str]) -> Fact | None:
-    """Return the value that a condition asks for, if it asks for one."""
+def fact(condition: Condition, named: Mapping[str, str]) -> Fact | None:
+    """Return the fact that a positive value condition requires, with the individuals of its roles; None for other conditions."""
     if not isinstance(condition, ValueCondition) or condition.negated:
         return None
-    arguments = tuple([env.get(a, a) for a in condition.arguments])
-    return Fact(Symbol(condition.situation, arguments), env.get(condition.value, condition.value))
+    arguments = tuple([named.get(a, a) for a in condition.arguments])
+    return Fact(Symbol(condition.situation, arguments), named.get(condition.value, condition.value))
 
 
 def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program) -> dict[Cell, list[Cell]]:
-    """Return for each goal those that come before it."""
+    """Return for each goal the other goals that orders place before it."""
     found: dict[Cell, list[Cell]] = {}
     parts = {cell: (*arguments_of(cell[1]), value) for cell, value in goal.items()}
     constants = frozenset(program.named) | {TRUE, FALSE}

@@ -1,10 +1,9 @@
 """Lessons from an episode: rules, orders of goals, methods, and a record of the rules known before.
 
-steps      the steps of a plan, each with its refinement
-before     known rules are tried first: the goals that they achieve without search are their record, per kind of goal
-regress    the plan becomes rules (`confab.planner.experience.regression`)
-replay     where rules apply, the plan's step counts as chosen and the others as passed over, with the facts of each
-orders     teaching also plans the goals in other orders: only orders common to all plans are learned
+record     known rules are tried first; the goals that they achieve without search are counted for each kind of goal
+regress    the rules of the plan (`confab.planner.experience.regression`)
+replay     where several rule instances are applicable, the plan's step counts as chosen and the others as passed over
+orders     `teach` also plans with the goals in other orders; only the orders of achieved goals that all plans share are learned
 """
 
 from __future__ import annotations
@@ -14,9 +13,10 @@ from contextlib import suppress
 from dataclasses import replace
 
 from confab.planner.experience.advice import Memory
-from confab.planner.experience.evidence import View, fillers
-from confab.planner.experience.following import Candidate, by_rules, rules_in
-from confab.planner.experience.regression import Course
+from confab.planner.experience.evidence import FactReader, fillers
+from confab.planner.experience.following import by_rules, rules_in
+from confab.planner.experience.instances import RuleInstance
+from confab.planner.experience.regression import PlanTrace
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.methods import Methods, Roles
@@ -60,15 +60,15 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
     if plan is None:
         return None
-    lesson = tried(experience, problem, using)
+    lesson = record(experience, problem, using)
     for variant in variants(problem):
         found = fast.plan(variant, limits=SHORT, using=using, improve=0).plan
         if found is not None:
-            lesson += shows(variant, found, using)
+            lesson += rules_and_methods(variant, found, using)
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
     lesson.personal.clear()  # choices of the planner are no preferences
-    experience.learn(shown(experience, lesson, problem, using))
+    experience.learn(with_first_record(experience, lesson, problem, using))
     return plan
 
 
@@ -110,10 +110,10 @@ def live(
         A step's preconditions don't hold in the state before it; the experience is unchanged.
     """
     using = compiled(problem)
-    lesson = tried(experience, problem, using) if failed is None and plan.steps else Lesson()
+    lesson = record(experience, problem, using) if failed is None and plan.steps else Lesson()
     if plan.steps:
         lesson += learned(experience, problem, plan, using, failed)
-        lesson = shown(experience, lesson, problem, using) if failed is None else lesson
+        lesson = with_first_record(experience, lesson, problem, using) if failed is None else lesson
     for there, step, path in failures:
         lesson += lesson_of_failure(experience, there, step, path[1:], using)
     experience.learn(lesson)
@@ -125,12 +125,12 @@ def grounds(steps: Sequence[Step]) -> list[Ground]:
 
 
 def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Change]]:
-    """Return the individuals of a behaviour's variables in the present state, and its changes.
+    """Return the individuals that the current state assigns to a behaviour's variables, and the changes that it makes.
 
     Raises
     ------
     LearningError
-        Its preconditions don't hold.
+        The preconditions of the behaviour don't hold.
     """
     done = call.space.forward[ground[0]](*ground[1])
     if done is None:
@@ -155,26 +155,26 @@ def carry_out(call: Call, step: Step) -> None:
         call.space.apply(changes(call, (step.behavior, step.arguments))[1])
 
 
-def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
-    """Return a lesson with its record on its own problem if there were no rules before."""
+def with_first_record(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
+    """Return a lesson; if `experience` has no rules yet, with the record of the lesson's rules on its own problem."""
     if not rules_in(experience):
         alone = Experience("alone")
         alone.learn(lesson)
-        lesson += tried(alone, problem, using)
+        lesson += record(alone, problem, using)
     return lesson
 
 
-def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
+def record(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     """Return the record of the known rules on a problem: the goals that they achieve without search."""
     memory = Memory(experience)
     call = Call(problem, memory.warmed(using), None, SHORT.expansions)
-    guide = memory.guide(call)
-    lesson, open_ = Lesson(), guide.open()
+    policy = memory.policy(call)
+    lesson, open_ = Lesson(), policy.open()
     with suppress(LimitError):
-        by_rules(guide)
+        by_rules(policy)
     check("learning")  # without time for its rules there is no record
     for cell in open_:
-        kinds = {rule.goals for rule in guide.rules.get((call.program.levels[0], cell[0]), ())}
+        kinds = {rule.goals for rule in policy.instances.rules.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
             (kind, ITSELF, CHOSEN if call.met(cell) else FAILED) for kind in kinds if about(kind, cell, problem)
         ]
@@ -182,9 +182,10 @@ def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
 
 
 def about(kind: GoalKind, cell: Cell, problem: Problem) -> bool:
-    """Whether a goal is of a kind."""
+    """Return whether a goal belongs to a kind of goals."""
     return kind.situation == cell[0] and all(
-        who in problem.members(of) or who == of for who, of in zip(arguments_of(cell[1]), kind.classes, strict=True)
+        individual in problem.members(of) or individual == of
+        for individual, of in zip(arguments_of(cell[1]), kind.classes, strict=True)
     )
 
 
@@ -201,17 +202,17 @@ def learned(
     at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
     if at is not None:
         return lesson_of_failure(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
-    lesson = shows(problem, plan, using)
+    lesson = rules_and_methods(problem, plan, using)
     own = [rule for rule in lesson.said if isinstance(rule, Rule)]
     lesson += chosen([*rules, *own], experience, problem, steps, using)
     return lesson
 
 
-def shows(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
+def rules_and_methods(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
     """Return the rules and orders of a plan's steps, and those of their refinements with the methods."""
-    course = Course(problem, grounds(on_one_level(plan.steps)))
-    lesson = Lesson(said=list(course.rules_of()))
-    lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
+    trace = PlanTrace(problem, grounds(on_one_level(plan.steps)))
+    lesson = Lesson(said=list(trace.rules_of()))
+    lesson.counted += [(order, ITSELF, CHOSEN) for order in trace.orders()]
     lesson += refined(Call(problem, using, None, SHORT.expansions), plan.steps)
     return lesson
 
@@ -233,7 +234,7 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
         lesson += refined(call, step.steps)
         if len({inner.level for inner in step.steps}) == 1:
             keep = call.space.refining(step.level)
-            rules = list(course(call, mark, targets, keep, grounds(step.steps)).rules_of())
+            rules = list(trace_of(call, mark, targets, keep, grounds(step.steps)).rules_of())
             lesson.said += rules
             lesson.counted += [(rule, ITSELF, CHOSEN) for rule in rules]
     return lesson
@@ -263,8 +264,8 @@ def possible(call: Call, method: Method, roles: Roles) -> bool:
     return not left
 
 
-def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
-    """Return the steps of a level since a mark as a course from the state at the mark to the facts that they had to leave."""
+def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> PlanTrace:
+    """Return the trace of a level's steps since a mark: from the state at the mark to the targets and the values to be kept."""
     before, state = call.table.before(mark), call.table.state()
     goal = {}
     for cell, first in before.items():
@@ -275,17 +276,19 @@ def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done:
             goal[symbol] = wanted
     for cell in targets.keys() - before.keys():
         goal[Symbol(cell[0], arguments_of(cell[1]))] = targets[cell]
-    return Course(replace(call.problem, initial=state, goal=goal), done)
+    return PlanTrace(replace(call.problem, initial=state, goal=goal), done)
 
 
 def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
     """Return a step's refinement over roles, and their individuals; None where the table determines them."""
     method = methods.lifted(step.behavior, grounds(step.steps), own)
-    who = dict(zip(range(len(own)), own, strict=True))
+    filled = dict(zip(range(len(own)), own, strict=True))
     for (_, places), inner in zip(method.steps, step.steps, strict=True):
-        who.update(zip(places, inner.arguments, strict=True))
-    told = {place for place, role in enumerate(method.open, len(own)) if role.source is not None}
-    return method, tuple([None if place in told else who[place] for place in range(len(own) + len(method.open))])
+        filled.update(zip(places, inner.arguments, strict=True))
+    determined = {place for place, role in enumerate(method.open, len(own)) if role.source is not None}
+    return method, tuple(
+        [None if place in determined else filled[place] for place in range(len(own) + len(method.open))]
+    )
 
 
 def chosen(
@@ -293,47 +296,47 @@ def chosen(
 ) -> Lesson:
     """Return the choices and rejections of a plan among the applicable instances of known rules and of the given ones."""
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Memory(experience).guide(call, also=rules)
-    view = View(using.program, call.table, call.goal)
+    policy = Memory(experience).policy(call, also=rules)
+    reader = FactReader(using.program, call.table, call.goal)
     later = grounds(steps)
     lesson = Lesson()
     for number, ground in enumerate(later):
         check("learning")
-        open_ = guide.open() if problem.domain.behaviors[ground[0]].level == guide.first else {}
-        ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
-        tried_ = list(guide.every(ready)) or list(guide.every(open_))
-        done = [c for c in tried_ if c.ground == ground]
+        open_ = policy.open() if problem.domain.behaviors[ground[0]].level == policy.first else {}
+        ready = {cell: value for cell, value in open_.items() if not policy.waits(cell)}
+        applicable = list(policy.every(ready)) or list(policy.every(open_))
+        done = [c for c in applicable if c.ground == ground]
         if done:
             rest = set(later[number + 1 :])
-            passed = {c.ground: c for c in tried_ if c.ground != ground and c.ground not in rest}
-            lesson += compared(view, done, list(passed.values()))
+            passed = {c.ground: c for c in applicable if c.ground != ground and c.ground not in rest}
+            lesson += compared(reader, done, list(passed.values()))
         carry_out(call, steps[number])
     return lesson
 
 
-def judged(view: View, c: Candidate, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
+def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
     """Yield the counts of a rule instance: for the rule, and for the facts about the individuals in its roles."""
-    return ((c.rule, fact, tally) for fact in (ITSELF, *view.facts(c.rule, c.roles)))
+    return ((c.rule, fact, tally) for fact in (ITSELF, *reader.facts(c.rule, c.roles)))
 
 
-def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate]) -> Lesson:
+def compared(reader: FactReader, done: Sequence[RuleInstance], passed: Sequence[RuleInstance]) -> Lesson:
     """Return the counts for some chosen and some passed-over instances."""
     lesson = Lesson()
     for c in {c.rule.name: c for c in done}.values():
-        lesson.counted += judged(view, c, CHOSEN)
+        lesson.counted += counts_of(reader, c, CHOSEN)
     for c in passed:
-        lesson.counted += judged(view, c, PASSED)
+        lesson.counted += counts_of(reader, c, PASSED)
     for c in done:
         for other in passed:
-            who = [
+            different = [
                 (a, b)
                 for a, b in zip(
-                    view.individuals(c.rule, c.roles), view.individuals(other.rule, other.roles), strict=False
+                    reader.individuals(c.rule, c.roles), reader.individuals(other.rule, other.roles), strict=False
                 )
                 if a != b
             ]
-            if c.rule == other.rule and len(who) == 1:
-                lesson.personal += [(c.rule, who[0][0], CHOSEN), (other.rule, who[0][1], PASSED)]
+            if c.rule == other.rule and len(different) == 1:
+                lesson.personal += [(c.rule, different[0][0], CHOSEN), (other.rule, different[0][1], PASSED)]
     return lesson
 
 
@@ -350,24 +353,24 @@ def lesson_of_failure(
     It counts a failure of the rules that would have chosen the step, with its facts, and of the individuals in its refinement.
     """
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Memory(experience).guide(call)
+    policy = Memory(experience).policy(call)
     for earlier in before:
         carry_out(call, earlier)
-    view = View(using.program, call.table, call.goal)
+    reader = FactReader(using.program, call.table, call.goal)
     lesson = Lesson()
     wanted = (step.behavior, step.arguments)
-    for c in guide.every(guide.open()):
+    for c in policy.every(policy.open()):
         if c.ground == wanted:
-            lesson.counted += judged(view, c, FAILED)
-            lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
+            lesson.counted += counts_of(reader, c, FAILED)
+            lesson.personal += [(c.rule, fact, PASSED) for fact in reader.individuals(c.rule, c.roles)]
     for number in (*path, 0):
         done = call.space.forward[step.behavior](*step.arguments)
         if done is None or number >= len(step.steps):
             break
         method, roles = method_of(call.refiner.methods, step, (*step.arguments, *done[0]))
-        who = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
-        lesson.personal += who
-        lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # other individuals might have succeeded
+        failed = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
+        lesson.personal += failed
+        lesson.counted += [] if failed else [(method, ITSELF, FAILED)]  # other individuals might have succeeded
         for earlier in step.steps[:number]:
             with suppress(LearningError):
                 carry_out(call, earlier)

@@ -57,7 +57,7 @@ class Done:
     mark: int
 
 
-class Course:
+class PlanTrace:
     """The steps of a plan, executed one after another on the checker's facts.
 
     Parameters
@@ -84,7 +84,11 @@ class Course:
         if bound is None:
             raise LearningError(f"step {number} ({' '.join((name, *arguments))}): its preconditions don't hold there")
         asked = list(self.plain(behavior.preconditions, bound, behavior.kinds, facts))
-        kinds = [ClassCondition(bound[who], kind) for who, kind in behavior.kinds.items() if who in bound]
+        kinds = [
+            ClassCondition(bound[individual], kind)
+            for individual, kind in behavior.kinds.items()
+            if individual in bound
+        ]
         because: dict[tuple[str, tuple[str, ...]], list[Condition]] = {}
         for effect in behavior.effects:
             inner = self.rules.satisfied(effect.when, bound, behavior.kinds, facts) if effect.when else None
@@ -116,8 +120,12 @@ class Course:
                 if found is not None:
                     yield from self.plain(wanted, found, inner, facts)
             elif isinstance(condition, AnyOf) and not condition.negated:
-                ways = ((group, self.rules.satisfied(group, {}, kinds, facts)) for group in condition.alternatives)
-                group, found = next((way for way in ways if way[1] is not None), ((), None))
+                alternatives = (
+                    (group, self.rules.satisfied(group, {}, kinds, facts)) for group in condition.alternatives
+                )
+                group, found = next(
+                    (alternative for alternative in alternatives if alternative[1] is not None), ((), None)
+                )
                 yield from self.plain(group, found or {}, kinds, facts)
             else:
                 yield condition
@@ -129,7 +137,7 @@ class Course:
         group = next(group for group in strata(rules) if condition.situation in group)
         for conditions, kinds, parameters in sorted(of, key=lambda its: any(s in group for s in situations_of(its[0]))):
             own = dict(zip((p.name for p in parameters), condition.arguments, strict=True))
-            if not all(who in self.problem.members(kinds[name]) for name, who in own.items()):
+            if not all(individual in self.problem.members(kinds[name]) for name, individual in own.items()):
                 continue
             conditions, kinds = opened(conditions, kinds)
             for _ in range(BINDINGS):
@@ -160,10 +168,10 @@ class Course:
         for done in reversed(self.done):
             check("learning")
             undo(facts, done.mark)
-            before, served = self.needed(need, done, facts, later)
-            if served:
-                yield from self.links(done, served, facts, later)
-                others = (rest for _, rest in self.hindered(served, facts))
+            before, achieved = self.needed(need, done, facts, later)
+            if achieved:
+                yield from self.links(done, achieved, facts, later)
+                others = (rest for _, rest in self.hindered(achieved, facts))
                 need = {c: None for c in (*before, *others) if not isinstance(c, (*STATIC, EqualityCondition))}
             undo(later, done.mark)
 
@@ -176,7 +184,7 @@ class Course:
         follows,
         by the facts from which it followed before.
         """
-        need, served = dict[Condition, None](), dict[Condition, None]()
+        need, achieved = dict[Condition, None](), dict[Condition, None]()
         tries = BINDINGS
 
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
@@ -189,12 +197,12 @@ class Course:
                 return [(c, True)]
             if not isinstance(c, ValueCondition) or c.situation not in self.problem.domain.rules:
                 return [(c, False)]
-            for way in (
+            for alternative in (
                 self.because(c, later if (c.value == TRUE) is not c.negated else facts) if c not in above else ()
             ):
                 tries -= 1
                 found: list[tuple[Condition, bool]] = [(c, False)]
-                for other in way:
+                for other in alternative:
                     inner = rests(other, (*above, c)) if tries > 0 else None
                     if inner is None:
                         break
@@ -209,17 +217,17 @@ class Course:
                 need[c] = None
                 continue
             for other, holds in rests(c, ()) or [(c, False)]:
-                (need if holds else served)[other] = None
-        if served:
+                (need if holds else achieved)[other] = None
+        if achieved:
             need.update(dict.fromkeys(done.asked))
-            for c in served:
+            for c in achieved:
                 need.update(dict.fromkeys(self.before(c, done)))
-        return need, served
+        return need, achieved
 
-    def links(self, done: Done, served: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
+    def links(self, done: Done, achieved: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
         """Yield for each needed change of a step the rule with that change as its goal."""
         goals: dict[ValueCondition, None] = {}
-        for c in served:
+        for c in achieved:
             if isinstance(c, ValueCondition) and c.situation in self.problem.domain.rules:
                 value = c.value if not c.negated else FALSE if c.value == TRUE else TRUE
                 goals[ValueCondition(c.situation, c.arguments, value)] = None
@@ -231,7 +239,7 @@ class Course:
         for goal in goals:
             need, own = self.needed([goal], done, facts, later)
             if own:
-                need.update(dict.fromkeys(c for who, _ in self.hindered(own, facts) for c in who))
+                need.update(dict.fromkeys(c for individual, _ in self.hindered(own, facts) for c in individual))
                 order = dict.fromkeys((*goal.arguments, goal.value, *done.ground[1]))
                 order.update((t, None) for c in need for i in walk(c) for t in terms(i) if not t.startswith("?"))
                 rule = self.lifted(self.aimed(goal, facts), tuple(need), done.ground, tuple(order))
@@ -253,9 +261,9 @@ class Course:
             if when and ((situation, key) in about if plain else situation in situations):
                 yield from when
 
-    def hindered(self, served: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
+    def hindered(self, achieved: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
         """For a "no object …" condition, yield the fact of the one object that violated it, and that no other did."""
-        for c in served:
+        for c in achieved:
             if isinstance(c, Witness) and c.negated:
                 wanted = (*c.conditions, ClassCondition(c.variable, c.kind))
                 found = self.rules.satisfied(wanted, {}, {c.variable: c.kind}, facts)
@@ -273,10 +281,10 @@ class Course:
             return None
         kinds: dict[str, str] = {}
 
-        def narrow(who: str, kind: str) -> None:
-            known = kind in self.problem.classes and who not in self.written
-            if known and (who not in kinds or len(members(kind)) < len(members(kinds[who]))):
-                kinds[who] = kind
+        def narrow(individual: str, kind: str) -> None:
+            known = kind in self.problem.classes and individual not in self.written
+            if known and (individual not in kinds or len(members(kind)) < len(members(kinds[individual]))):
+                kinds[individual] = kind
 
         for c in need:
             if isinstance(c, ClassCondition) and not c.negated:
@@ -291,17 +299,17 @@ class Course:
                 if kind.quantity is not None:
                     ends = zip(inner.arguments, kind.arguments, strict=True)
             elif isinstance(inner, RelationCondition):
-                ends = ((who, "") for who in inner.arguments)
-            for who, of in ends:
-                if who not in kinds and not who.startswith("?"):
-                    narrow(who, self.plainest(who, of))
+                ends = ((individual, "") for individual in inner.arguments)
+            for individual, of in ends:
+                if individual not in kinds and not individual.startswith("?"):
+                    narrow(individual, self.plainest(individual, of))
         roles: dict[str, str] = {}
-        for who in order:
-            if who in kinds:
-                of = kinds[who]
+        for individual in order:
+            if individual in kinds:
+                of = kinds[individual]
                 base = "?" + (of.lower() if of.isupper() else of[0].lower() + of[1:])
                 same = sum(role.rstrip("0123456789") == base for role in roles.values())
-                roles[who] = base if not same else f"{base}{same + 1}"
+                roles[individual] = base if not same else f"{base}{same + 1}"
         known = {(c.situation, c.arguments) for c in need if isinstance(c, ValueCondition) and not c.negated}
         asks: dict[Condition, None] = {}
         for c in need:
@@ -319,10 +327,10 @@ class Course:
             ValueCondition(goal.situation, tuple(own[a] for a in goal.arguments), own[goal.value]),
             tuple(sorted(asks, key=repr)),
             (step[0], tuple(own[a] for a in step[1])),
-            tuple((role, kinds[who]) for who, role in roles.items() if self._used(role, asks, own)),
+            tuple((role, kinds[individual]) for individual, role in roles.items() if self._used(role, asks, own)),
         )
 
-    def plainest(self, who: str, of: str) -> str:
+    def plainest(self, individual: str, of: str) -> str:
         """Return the widest class of an individual within another class that isn't made of a situation type's values."""
         members, situations = self.problem.members, self.problem.domain.situations
         if of and of not in situations:
@@ -330,7 +338,7 @@ class Course:
         within = [
             k
             for k in self.problem.classes
-            if k not in situations and who in members(k) and (not of or members(k) <= members(of))
+            if k not in situations and individual in members(k) and (not of or members(k) <= members(of))
         ]
         return max(within, key=lambda k: len(members(k)), default=of)
 
@@ -351,12 +359,12 @@ def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[t
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
-            who = condition.variable
-            while who in of:  # another variable of the same name
-                who += "_"
-            of[who] = condition.kind
-            inner, of = opened([substituted(c, {condition.variable: who}) for c in condition.conditions], of)
-            found += [*inner, ClassCondition(who, condition.kind)]
+            individual = condition.variable
+            while individual in of:  # another variable of the same name
+                individual += "_"
+            of[individual] = condition.kind
+            inner, of = opened([substituted(c, {condition.variable: individual}) for c in condition.conditions], of)
+            found += [*inner, ClassCondition(individual, condition.kind)]
         else:
             found.append(condition)
     return tuple(found), of

@@ -12,10 +12,11 @@ import pytest
 
 import confab
 from confab.planner.experience.advice import Memory, plan
-from confab.planner.experience.evidence import View
-from confab.planner.experience.following import FREE, Guide, rules_in
+from confab.planner.experience.allowance import FREE
+from confab.planner.experience.evidence import FactReader
+from confab.planner.experience.following import RulePolicy, rules_in
 from confab.planner.experience.lessons import compared, live, teach
-from confab.planner.experience.regression import Course
+from confab.planner.experience.regression import PlanTrace
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import agenda
 from confab.planner.hierarchical import planner as fast
@@ -190,9 +191,9 @@ def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> No
     kinds = {rule.goals for rule in memory.rules}
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
     call = Call(within, compiled(within), None, 1000)
-    followed = Memory(poor).guide(call, "guarded").rules
+    followed = Memory(poor).policy(call, "guarded").instances.rules
     assert {level for level, _ in followed} == {2, 3}  # the record is of goals of a task, not of refinements
-    assert Memory(poor).guide(call, "leading").rules == memory.guide(call, "guarded").rules != {}
+    assert Memory(poor).policy(call, "leading").instances.rules == memory.policy(call, "guarded").instances.rules != {}
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
@@ -277,16 +278,16 @@ def test_a_hand_that_failed_at_a_place_is_not_taken_for_it_again_and_the_way_of_
 def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
     within, memory = problem("served", 6, 1), taught()
     call = Call(within, compiled(within), None, 1000)
-    guide = Guide(call, memory.rules, memory.orders)
-    one, other = list(guide.every(guide.open()))[:2]
-    view = View(Program(within), call.table, call.goal)
-    lesson = compared(view, [one], [other])
+    policy = RulePolicy(call, memory.rules, memory.orders)
+    one, other = list(policy.every(policy.open()))[:2]
+    reader = FactReader(Program(within), call.table, call.goal)
+    lesson = compared(reader, [one], [other])
     assert (one.rule, ITSELF, Tally(chosen=1)) in lesson.counted
     experience = Experience("robot")
     experience.learn(lesson)
-    before = Memory(experience).judge.cogency(one.rule, [], [])
+    before = Memory(experience).scorer.cogency(one.rule, [], [])
     experience.learn(Lesson(counted=[(one.rule, ITSELF, Tally(failed=3))]))
-    assert Memory(experience).judge.cogency(one.rule, [], []) < before
+    assert Memory(experience).scorer.cogency(one.rule, [], []) < before
 
 
 def jugs(cups: int, stuck: int) -> Problem:
@@ -323,7 +324,7 @@ def test_regression_asks_over_roles_for_what_a_step_to_the_goal_needs() -> None:
     within = problem("swap", 4, 1)
     found = fast.plan(within, improve=0).plan
     assert found is not None
-    rules = list(Course(within, [(s.behavior, s.arguments) for s in found.steps]).rules_of())
+    rules = list(PlanTrace(within, [(s.behavior, s.arguments) for s in found.steps]).rules_of())
     assert {rule.goals for rule in rules} <= {GoalKind("LOCATION", (kind,)) for kind in within.classes}
     assert all(any(isinstance(c, Witness) and c.negated for c in rule.asks) for rule in rules)  # nobody is at the place
     constants = {name for members in within.classes.values() for name in members}
@@ -342,11 +343,11 @@ def test_where_a_level_is_left_rules_still_act_on_the_level_of_their_behaviours_
     within = van().problem
     experience = Experience("robot")
     teach(experience, within)
-    guide = Guide(Call(within, compiled(within), None, 1000), rules_in(experience))
-    assert {level for level, _ in guide.rules} > {1}
+    policy = RulePolicy(Call(within, compiled(within), None, 1000), rules_in(experience))
+    assert {level for level, _ in policy.instances.rules} > {1}
     assert all(
         within.domain.behaviors[rule.does[0]].level == level
-        for (level, _), rules in guide.rules.items()
+        for (level, _), rules in policy.instances.rules.items()
         for rule in rules
     )
     alone, led = fast.plan(within), plan(within, Memory(experience))
@@ -459,34 +460,37 @@ def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_ha
         replace(rule, goal=replace(rule.goal, arguments=("?wanted",)), kinds=(("?wanted", "Movable"), *rule.kinds))
         for rule in moving
     ]
-    guide = Guide(call, wrong)
+    policy = RulePolicy(call, wrong)
     level, before = call.program.levels[0], call.table.state()
-    for cell, value in guide.open().items():
-        if not guide.vain and guide.follow(level, {cell: value}, call.space.keeping(call.kept)) is None:
+    for cell, value in policy.open().items():
+        if (
+            not policy.allowance.wasted_effort
+            and policy.follow(level, {cell: value}, call.space.keeping(call.kept)) is None
+        ):
             assert call.table.state() == before
-    assert guide.wasted > 0
-    assert guide.vain > EXPANSION * guide.wasted
-    assert not guide.ready()
-    call.space.expanded = 10 * guide.wasted
-    assert guide.ready()
+    assert policy.allowance.wasted_expansions > 0
+    assert policy.allowance.wasted_effort > EXPANSION * policy.allowance.wasted_expansions
+    assert not policy.ready()
+    call.space.expanded = 10 * policy.allowance.wasted_expansions
+    assert policy.ready()
 
 
 def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_too_much() -> None:
     within = problem("swap", 12, 1)
     call = Call(within, compiled(within), None, 100_000)
-    guide = Guide(call, taught().rules)
-    level, (cell, value) = call.program.levels[0], next(iter(guide.open().items()))
+    policy = RulePolicy(call, taught().rules)
+    level, (cell, value) = call.program.levels[0], next(iter(policy.open().items()))
     targets, keep = {cell: value}, call.space.keeping(call.kept)
     before = call.table.state()
-    guide.vain = guide.allowed() - 1
-    assert guide.ready()
-    assert guide.follow(level, targets, keep) is None  # stopped after the first question
+    policy.allowance.wasted_effort = policy.allowance.left() - 1
+    assert policy.ready()
+    assert policy.follow(level, targets, keep) is None  # stopped after the first question
     assert call.table.state() == before
-    assert not guide.ready()
-    assert not guide.rank(cell)
+    assert not policy.ready()
+    assert not policy.rank(cell)
     call.space.worked = 10 * FREE
-    assert guide.rank(cell)
-    assert guide.follow(level, targets, keep)
+    assert policy.rank(cell)
+    assert policy.follow(level, targets, keep)
 
 
 def test_of_an_amount_rules_say_whether_it_becomes_more_or_less_not_how_much_there_was_once() -> None:
@@ -559,10 +563,10 @@ def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: P
     experience = Experience("robot")
     small = dairy(tmp_path, 1, 1)
     teach(experience, small)
-    guide = Guide(Call(small, compiled(small), None, 1000), rules_in(experience))
-    (goal,) = guide.open().items()
+    policy = RulePolicy(Call(small, compiled(small), None, 1000), rules_in(experience))
+    (goal,) = policy.open().items()
     # To press a cheese needs it in a mould, which is needed for salting it, too, and was found one rule nearer.
-    assert guide.far(guide.first, goal) == 6
+    assert policy.instances.distance(policy.first, goal) == 6
 
 
 LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing place room - object lorry crate - thing)
@@ -650,6 +654,6 @@ def test_who_is_somewhere_else_does_not_stand_for_all_of_his_kind(tmp_path: Path
     for crates, places in ((1, 3), (2, 4), (3, 4)):
         teach(experience, lorries(tmp_path, 1, crates, places))
     islands = lorries(tmp_path, 12, 48, 48, 4)
-    guide = Guide(Call(islands, compiled(islands), None, 1000), rules_in(experience))
+    policy = RulePolicy(Call(islands, compiled(islands), None, 1000), rules_in(experience))
     # On each island there is one lorry, and no other gets there.
-    assert all(guide.far(guide.first, goal) < inf for goal in guide.open().items())
+    assert all(policy.instances.distance(policy.first, goal) < inf for goal in policy.open().items())

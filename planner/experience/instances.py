@@ -1,0 +1,290 @@
+"""Instances of learned rules in the current state, and the least number of rules that lead to a goal.
+
+instance   a rule with an individual in each role, and its unmet conditions; for each of these, one of several goals suffices
+cost       least number of rules in a chain to a goal; each condition is costed separately, as in h_max, by iterative deepening
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby, islice
+from math import inf
+from typing import NamedTuple, TypeAlias
+
+from confab.planner.experience.allowance import Allowance
+from confab.planner.experience.matching import Bind, Find, finder, known, soft
+from confab.planner.hierarchical.call import Call
+from confab.planner.hierarchical.operators import FEW, Achiever
+from confab.planner.hierarchical.symmetry import representatives
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.reasoner.amounts import meets, towards
+from confab.reasoner.memory.experience import Ground, Rule
+from confab.reasoner.symbols import FALSE, TRUE, ValueCondition
+
+COMPARED, TRIES = 40, 3
+"""Maximum number of instances of a rule that are compared, and of instances for a goal that are tried."""
+FARTHEST, SLACK = 30, 2
+"""Maximum cost of a goal, and maximum excess in cost of an instance over the cheapest one."""
+MATCHING = 5
+"""Cost of matching a rule, in states times operators (about a microsecond each)."""
+
+Roles: TypeAlias = "tuple[str, ...]"
+Goal: TypeAlias = "tuple[Cell, str]"
+Query: TypeAlias = "tuple[int, Goal, bool]"
+"""A level, a goal on it, and whether roles may be filled by individuals that the state doesn't suggest."""
+
+
+class RuleInstance(NamedTuple):
+    """A rule with individuals in its roles: the symbol that it changes, and the positions of its unmet conditions."""
+
+    rule: Rule
+    goal: Cell
+    roles: Roles
+    unmet: tuple[int, ...] = ()
+
+    @property
+    def named(self) -> dict[str, str]:
+        """The individuals by role."""
+        return dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
+
+    @property
+    def ground(self) -> Ground:
+        """The step of the rule, with the individuals as arguments."""
+        filled = self.named
+        return self.rule.does[0], tuple([filled.get(term, term) for term in self.rule.does[1]])
+
+
+Score: TypeAlias = "Callable[[RuleInstance], float]"
+
+
+class Instances:
+    """The instances of rules in the state of a call, compared by cost; results are cached until the state changes.
+
+    Parameters
+    ----------
+    call : Call
+    rules : iterable of Rule
+    allowance : Allowance
+        Counts the effort of matching.
+    score : function of an instance, optional
+        Of equally cheap instances, the one with the greatest score is tried first.
+    joins : dict, optional
+        Compiled rules of other calls of the same program; it is extended.
+
+    Attributes
+    ----------
+    rules : mapping of level and situation type to rules
+    excluded : frozenset of str
+        Individuals that instances for other goals use up; no role is filled by them.
+    """
+
+    def __init__(
+        self,
+        call: Call,
+        rules: Iterable[Rule],
+        allowance: Allowance,
+        score: Score | None = None,
+        joins: dict[str, Bind | None] | None = None,
+    ) -> None:
+        self.call, self.allowance, self.score = call, allowance, score
+        self.joins: dict[str, Bind | None] = {} if joins is None else joins
+        self.rules: dict[tuple[int, str], list[Rule]] = {}
+        for rule in rules:
+            if known(rule, call.program.problem):
+                level = call.program.domain.behaviors[rule.does[0]].level
+                self.rules.setdefault((level, rule.goal.situation), []).append(rule)
+        self.finds: dict[str, Find | None] = {}
+        self.achievers: dict[str, Achiever] = {}
+        self.excluded: frozenset[str] = frozenset()
+        self.age = -1
+        self.found: dict[Query, list[RuleInstance]] = {}
+        self.least: dict[Query, int] = {}
+        self.more_than: dict[Query, float] = {}
+        """Known bounds of costs: the cost of a goal is at most `least`, and more than `more_than`."""
+        self.seen: set[Query] = set()
+        self.cut = False
+        self.picked: dict[tuple[int, str], Sequence[str]] = {}
+        self.goals: dict[tuple[int, int, int], tuple[RuleInstance, list[Goal]]] = {}
+
+    # ------------------------------------------------------------------------------------------------------------- instances
+
+    def exclude(self, individuals: frozenset[str]) -> None:
+        """Fill no more roles with some individuals."""
+        self.excluded, self.age = individuals, -1
+
+    def refresh(self) -> None:
+        """Clear the caches if the state has changed."""
+        if self.age != self.call.table.age:
+            self.age = self.call.table.age
+            for cache in (self.found, self.least, self.more_than, self.picked, self.goals):
+                cache.clear()
+
+    def of(self, query: Query) -> list[RuleInstance]:
+        """Return the instances of rules for a goal in the current state."""
+        self.refresh()
+        if query not in self.found:
+            level, (cell, value), suggested_or_not = query
+            rules = self.rules.get((level, cell[0]), ())
+            self.allowance.spend(MATCHING * len(rules))
+            self.found[query] = [
+                RuleInstance(rule, cell, *filled)
+                for rule in rules
+                for filled in islice(self.fillings(rule, cell, value, suggested_or_not), COMPARED)
+                if self.excluded.isdisjoint(filled[0])
+            ]
+        return self.found[query]
+
+    def fillings(
+        self, rule: Rule, cell: Cell, value: str, suggested_or_not: bool
+    ) -> Iterator[tuple[Roles, tuple[int, ...]]]:
+        """Return individuals for the roles of a rule, with its unmet conditions; a rule is compiled when it is first needed."""
+        name, program = rule.name, self.call.program
+        if name not in self.finds:
+            conditions = soft(rule, program.problem)
+            if name not in self.joins:
+                self.joins[name] = finder(rule, program.writer, conditions)
+            bind = self.joins[name]
+            self.finds[name] = bind(self.call.table, self.pick) if bind is not None else None
+            self.achievers[name] = Achiever(name, 0, conditions, {}, dict(rule.kinds), deep=True)
+        find = self.finds[name]
+        if program.domain.situations[cell[0]].quantity is not None:
+            value = towards(self.call.table.now[cell[0]].get(cell[1]), value)
+        return find(*arguments_of(cell[1]), value, suggested_or_not) if find is not None else iter(())
+
+    def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
+        """Return one of many candidates for the value of a situation type for each symmetry class and state, free ones first."""
+        found = self.picked.get((id(candidates), situation))
+        if found is None:
+            self.allowance.spent += len(candidates)
+            table, symmetry, wanted = self.call.table, self.call.program.symmetry, self.call.space.subgoals.wanted
+            found = free = tuple([c for c in candidates if c not in self.excluded]) if self.excluded else candidates
+            if len(free) > FEW:
+                among = set(candidates)
+                cells = [values for values in table.now.values() if not among.isdisjoint(values)]
+                first = representatives(
+                    symmetry.groups(free), table.holders.get(situation, {}), wanted.get(situation, {})
+                )
+                class_of = symmetry.class_of.get
+                unlike = {
+                    (class_of(c), *[class_of(values.get(c, "")) for values in cells]): c
+                    for c in (*free[::-1], *first[::-1])
+                }
+                found = list(unlike.values())[::-1]
+            self.picked[id(candidates), situation] = found
+        self.allowance.spent += 1 + len(found)
+        return found
+
+    def goals_of(self, level: int, instance: RuleInstance, position: int) -> list[Goal]:
+        """Return the goals of which one suffices for an unmet condition of an instance."""
+        self.refresh()
+        if (key := (level, id(instance), position)) not in self.goals:
+            self.goals[key] = instance, self._goals_of(level, instance, position)
+        return self.goals[key][1]
+
+    def _goals_of(self, level: int, instance: RuleInstance, position: int) -> list[Goal]:
+        achiever, named = self.achievers[instance.rule.name], instance.named
+        condition = achiever.soft[position]
+        if isinstance(condition, ValueCondition):
+            situation, key = condition.situation, key_of(tuple([named.get(a, a) for a in condition.arguments]))
+            if situation in self.call.program.rules:
+                if (level, situation) in self.rules:
+                    return [((situation, key), TRUE if (condition.value == TRUE) is not condition.negated else FALSE)]
+            elif not condition.negated and key in self.call.table.now[situation]:
+                return [((situation, key), named.get(condition.value, condition.value))]
+        subgoals = self.call.space.subgoals.of(achiever, condition, named, level)
+        return [((situation, key), value) for situation, key, values in subgoals for value in values]
+
+    # ------------------------------------------------------------------------------------------------------------------ cost
+
+    def met(self, goal: Goal) -> bool:
+        """Return whether a goal holds in the current state."""
+        (situation, key), value = goal
+        return meets(self.call.table.now[situation].get(key, FALSE), value)
+
+    def distance(self, level: int, goal: Goal) -> float:
+        """Return the cost of a goal by the individuals that the state suggests, else by any; infinity if no chain leads to it."""
+        cost = self.cost(level, goal, False)
+        return cost if cost < inf else self.cost(level, goal, True)
+
+    def cost(self, level: int, goal: Goal, suggested_or_not: bool) -> float:
+        """Return the least number of rules in a chain to a goal; infinity if there is none of at most `FARTHEST` rules."""
+        for most in range(FARTHEST + 1):
+            self.cut, self.seen, before = False, set(), len(self.least)
+            if self.within(level, goal, most, suggested_or_not):
+                return most
+            if not self.cut and len(self.least) == before:  # no chain of any length leads to it
+                self.more_than.update((query, inf) for query in self.seen if query not in self.least)
+                return inf
+        return inf
+
+    def within(self, level: int, goal: Goal, most: int, suggested_or_not: bool) -> bool:
+        """Return whether the cost of a goal is at most `most`."""
+        if self.met(goal):
+            return True
+        query = level, goal, suggested_or_not
+        instances = self.of(query)
+        if self.least.get(query, inf) <= most:
+            return True
+        if most <= 0 or self.more_than.get(query, 0) >= most:
+            self.cut |= (query not in self.seen or query in self.least) and self.more_than.get(query, 0) < inf
+            return False
+        before, self.more_than[query] = self.more_than.get(query, 0), most  # a cycle to the same goal isn't cheaper
+        self.seen.add(query)
+        if any(self.instance_within(level, one, most, suggested_or_not) for one in instances):
+            self.least[query], self.more_than[query] = most, before
+            return True
+        return False
+
+    def instance_within(self, level: int, instance: RuleInstance, most: int, suggested_or_not: bool) -> bool:
+        """Return whether an instance costs at most `most`; an unmet condition without goals costs one rule."""
+        alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)
+        return all(
+            any(self.within(level, goal, most - 1, suggested_or_not) for goal in goals) if goals else most > 1
+            for goals in alternatives
+        )
+
+    def by_cost(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, list[RuleInstance]]]:
+        """Yield the instances for a goal by increasing cost, up to `SLACK` above the cheapest."""
+        for suggested_or_not in (False, True):
+            least, found = self.cost(level, goal, suggested_or_not), False
+            left = self.of((level, goal, suggested_or_not)) if least < inf else []
+            for cost in range(int(least), int(min(least + SLACK + 1, below))) if left else ():
+                equal = [one for one in left if self.instance_within(level, one, cost, suggested_or_not)]
+                taken = {*map(id, equal)}  # comparing two instances takes longer
+                left, found = [one for one in left if id(one) not in taken], found or bool(equal)
+                yield cost, equal
+            if found:
+                return
+
+    def cheapest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, RuleInstance]]:
+        """Yield the instances to try for a goal, each with its cost, the best first; costs are computed on demand."""
+        ranked = ((cost, one) for cost, equal in self.by_cost(level, goal, below) for one in self.ranked(level, equal))
+        return islice(ranked, TRIES)
+
+    def ranked(self, level: int, instances: Sequence[RuleInstance]) -> Iterator[RuleInstance]:
+        """Yield equally cheap instances: those that undo fewer achieved goals and have fewer unmet conditions first."""
+        if len(instances) < 2:
+            yield from instances
+            return
+        rank = {id(one): (self.undone(level, one), len(one.unmet)) for one in instances}
+        for _, alike in groupby(sorted(instances, key=lambda one: rank[id(one)]), key=lambda one: rank[id(one)]):
+            group = list(alike)
+            if self.score is not None and len(group) > 1:
+                group.sort(key=self.score, reverse=True)
+            yield from group
+
+    def undone(self, level: int, instance: RuleInstance) -> int:
+        """Return the number of achieved goals that the step of an instance, or a condition with one goal, undoes."""
+        if instance.unmet:
+            alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)
+            changes = [goals[0] for goals in alternatives if len(goals) == 1]
+        else:
+            done = self.call.space.forward[instance.ground[0]](*instance.ground[1])
+            changes = [((situation, key), value) for situation, key, value in done[1]] if done is not None else []
+        return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
+
+    def next(self, level: int, instance: RuleInstance, goal: Goal) -> RuleInstance | None:
+        """Return the cheapest instance of the same rule in the current state, if possible with the same step."""
+        same_rule = ([w for w in equal if w.rule is instance.rule] for _, equal in self.by_cost(level, goal))
+        equal = next(filter(None, same_rule), [])
+        return min(equal, key=lambda w: (len(w.unmet), w.ground != instance.ground), default=None)
