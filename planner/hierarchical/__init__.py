@@ -1,1 +1,1 @@
-"""The default planner: achieves goals one after another on a mutable state table and searches lower levels only as needed."""
+"""The default planner: achieves goals one after another on a mutable state table and refines each step at once."""

@@ -1,12 +1,12 @@
 """The agenda: achieves the goals one after another on one state table and keeps the goals achieved before.
 
-open     goals to be tried in one step of the most abstract level
-asleep   goals that are blocked; a goal wakes when a symbol that it waits for changes
-kept     achieved goals: later steps may violate them temporarily, but must restore them
-before   ordering constraints: a goal that would make another one unreachable waits for it (a full cup isn't moved)
+open:    goals to be tried in one step of the most abstract level
+asleep:  blocked goals; a goal wakes when a symbol that it waits for changes
+kept:    achieved goals; later steps may violate them temporarily, but must restore them
+before:  ordering constraints; a goal that would make another goal unreachable waits for it (a full cup can't be moved)
 
-Where no goal is achieved in one step, the search budget is raised, step by step, on each level from the top. An attempt isn't
-repeated unless a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
+If no goal can be achieved in one step, the search budget is raised gradually, on each level from the top. A failed attempt is
+repeated only after a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""Minimum number of lowest-level states that are examined for a proof: proofs for small tasks against search time."""
+"""Number of lowest-level states whose examination must cost less than the searches so far before unsolvability is tested there."""
 
 
 @dataclass
@@ -49,11 +49,11 @@ class Agenda:
     ----------
     call : Call
     levels : tuple of int, optional
-        The levels whose steps may be used; all if left out. Goals that the first level doesn't see may use steps of any level.
+        Levels whose steps may be used, by default all. Steps of any level may achieve goals that the first level doesn't see.
     quickly : bool
         Whether only relevant steps and small scopes are tried.
     solvable : bool
-        Whether the problem is known to be solvable, so that no proof of unsolvability is tried.
+        Whether the problem is known to be solvable; no proof of unsolvability is then attempted.
     forward : bool
         Whether applied steps are final: planning never restarts from the initial state.
     """
@@ -80,7 +80,7 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
-        """Achieve the goals one after another, with larger budgets where goals get stuck; return whether all goals hold."""
+        """Achieve the goals one after another, with larger search budgets for blocked goals; return whether all goals hold."""
         call = self.call
         if not self.solvable:
             call.space.dead_end_check = self.check_unsolvable
@@ -133,7 +133,7 @@ class Agenda:
         return False
 
     def wake(self, mark: int) -> None:
-        """Open the goals affected by the changes since a mark: those that waited for a changed symbol, and those undone."""
+        """Reopen goals after the changes since a mark: goals that waited for a changed symbol, and goals that were undone."""
         call, asleep = self.call, self._asleep
 
         def opened(cell: Cell) -> None:
@@ -239,15 +239,15 @@ class Agenda:
         call.settled, call.refiner.hasty, steps = True, False, len(call.steps)
         settle(call)
         if len(call.steps) > steps:
-            call.given_up.append("steps of a lower level bring to rest what isn't in the beginning")
+            call.given_up.append("steps of a lower level bring symbols to rest that aren't at rest in the beginning")
             return True
         return False
 
     def restart(self, level: int) -> bool:
-        """Achieve all goals together from the initial state, after goals in series led to a dead end; on failure nothing changes.
+        """Achieve all goals together from the initial state, after planning goal by goal met a dead end; undo all if that fails.
 
-        Refinements then keep the symbols that no upper level sees as they were, where possible: otherwise a goal could become
-        unreachable without any upper level noticing.
+        Refinements then leave symbols that no upper level sees unchanged, where possible. Otherwise a goal could become unreachable
+        without a change that an upper level sees.
         """
         call, refiner = self.call, self.call.refiner
         if not call.steps or self.forward or level != call.program.levels[0]:
@@ -282,7 +282,7 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------------------ proofs
 
     def check_unsolvable(self) -> None:
-        """Raise `UnsolvableError` if a proof is found by about as much work as the searches have taken."""
+        """Raise `UnsolvableError` if about as much work as the searches so far have taken proves that there is no plan."""
         call = self.call
         if not self.solvable:
             if call.space.effort >= TEST * FIRST_TESTS:
@@ -291,12 +291,12 @@ class Agenda:
                 self._examine()
 
     def _prove(self) -> None:
-        """Raise `UnsolvableError` if a proof is found, the lowest level grounded for it."""
+        """Raise `UnsolvableError` if a certificate or the grounded lowest level proves that there is no plan."""
         self._certify()
         self._examine()
 
     def _certify(self) -> None:
-        """Raise `UnsolvableError` if there is a certificate; again when the effort has doubled, and at the limit."""
+        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, and at its limit."""
         call = self.call
         tests = max(FIRST_TESTS, min(call.space.effort // TEST, PAIRS))
         if self._tested < tests >= min(2 * self._tested, PAIRS) and not self._expects_a_plan():
@@ -305,7 +305,7 @@ class Agenda:
                 raise proof
 
     def _examine(self) -> None:
-        """Raise `UnsolvableError` if the relaxed lowest level, or all its states, show that there is no plan."""
+        """Raise `UnsolvableError` if delete relaxation or exhaustive search of the lowest level proves that there is no plan."""
         call = self.call
         if self._expects_a_plan():
             return
@@ -315,7 +315,7 @@ class Agenda:
             self._looked = looked_at(self._lowest, call.space, self._looked)
 
     def _expects_a_plan(self) -> bool:
-        """Return whether advice promises a plan, and the searches have taken less work than one small scope."""
+        """Return whether advice promises a plan and the searches have taken less work than one scope."""
         advice = self.call.advice
         return advice is not None and advice.expects and self.call.space.worked < WIDER.work
 
@@ -324,7 +324,7 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Return for each goal the goals that must be achieved before it, since they become unreachable once it holds."""
+    """Map each goal to the goals that become unreachable once it holds and so must be achieved before it."""
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None
@@ -347,7 +347,7 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
 
 
 def rules_out(call: Call, first: Cell, then: Cell) -> bool:
-    """Return whether no first-level behaviour could achieve goal `then` any more once goal `first` holds."""
+    """Return True if no first-level behaviour can achieve goal `then` once goal `first` holds."""
     level = call.program.levels[0]
     mark = len(call.table.trail)
     call.table.put(*first, call.goal[first])

@@ -1,13 +1,15 @@
 """Plans with a proved bound on their distance from the optimum.
 
-upper   cost of the best plan so far: the default planner's plan, shortened as long as shortening pays
-lower   a lower bound on the cost of every plan: the least f of A* on the lowest level, first with the cost of each goal
+upper:  cost of the best plan so far, which is the default planner's plan after shortening
+lower:  a lower bound on the cost of every plan: the least f of A* on the lowest level, first with the cost of each goal
         alone as heuristic, then with LM-cut
 
-When both meet, the plan is optimal. If a limit is reached first, both are returned, and their ratio bounds the loss.
+If both are equal, the plan is optimal. If a limit is reached first, both are returned; the plan costs at most upper / lower times
+the optimum.
 
 LM-cut: Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. Here the
-relaxed operators that come from one behaviour share its cost, which keeps the sum admissible with conditional effects.
+relaxed operators that come from one quantified behaviour share its cost. So the heuristic stays admissible with conditional
+effects.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ def plan(
     Returns
     -------
     Outcome
-        Optimal if `bound` is the cost of the plan's primitives.
+        The plan is optimal if `bound` equals the cost of its primitives.
     """
     begin = perf_counter()
     deadline = limits.end(SEARCHING)
@@ -79,7 +81,7 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Shorten a plan by trying more and more orders of the goals, until that stops paying or half of the time has passed."""
+    """Shorten a plan by other orders of the goals, with more and more work, then by windows; use at most half of the time."""
     begin = perf_counter()
     improve = 2 * ORDERS
     while best.plan is not None and improve <= 64 * ORDERS:
@@ -102,8 +104,8 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
 def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:
     """Return a lower bound, and a cheaper plan if the search found one.
 
-    Symbols that are at rest initially must be at rest in the end. The others may stay as they are while no step touches them; the
-    search ignores that condition, so its bound is valid, but a sequence that it finds may be no plan.
+    Symbols that are at rest initially must be at rest in the end. Other symbols may stay unchanged, but once a step changes them
+    they must end at rest, too. The search ignores this second condition, so the bound is valid, but the plan may be invalid.
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))
@@ -132,10 +134,10 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
 
 
 def lm_cut(task: Task, deadline: float | None = None) -> Bound:
-    """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is also a bound.
+    """Return the LM-cut heuristic of a task; after the deadline, the heuristic is the cost of the cuts so far, also a lower bound.
 
-    Bits are numbered as in the task, plus two: one that always holds, for operators without preconditions, and one that the
-    goal's bits give at no cost.
+    Bits are numbered as in the task. Two bits are added: `always`, the precondition of operators without preconditions, and `end`,
+    which the goal's bits achieve at no cost.
     """
     always, end = task.size, task.size + 1
     needs = [bits or [always] for bits in task.needs.lists()]
@@ -155,10 +157,7 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
             added_by[bit].append(o)
 
     def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
-        """Return the cost of each bit by its most expensive precondition, and that precondition for each operator.
-
-        The precondition of an operator that can't be reached is -1.
-        """
+        """Return the h_max value of each bit, and the most expensive precondition of each operator (-1 if unreachable)."""
         value = [math.inf] * (task.size + 2)
         missing = [len(bits) for bits in needs]
         support = [-1] * len(needs)
@@ -196,7 +195,7 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
                 return math.inf
             if value[end] == 0.0:
                 return total
-            zone, waiting = {end}, [end]  # bits from which the goal costs nothing more
+            zone, waiting = {end}, [end]  # bits from which the goal is reached at no cost
             while waiting:
                 for o in added_by[waiting.pop()]:
                     bit = support[o]

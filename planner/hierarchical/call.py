@@ -35,10 +35,10 @@ def compiled(problem: Problem) -> Compiled:
 
 
 class GoalAdvice(Advice, Protocol):
-    """Steps that experience proposes, for goals as well as for refinements."""
+    """Steps that learned rules propose, for goals and for refinements."""
 
     ranked: Ranked
-    """Returns the ways to fill the roles of a method, best first."""
+    """Function that sorts possible assignments of individuals to the roles of a method, best first."""
     expects: bool
     """Whether all goals are of kinds that were achieved before."""
 
@@ -70,28 +70,28 @@ class Call:
             for cell, value in self.goal.items()
             if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals that the most abstract level doesn't see: the refinement of its last step achieves them."""
+        """Goals that the most abstract level doesn't see; steps added to the refinement of the last step achieve them."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.aim: dict[Cell, str] = {}
-        """The goals that were last aimed at."""
+        """Goals of the latest attempt."""
         self.failed: dict[Cell, set[tuple[int | SearchBudget, ...]]] = {}
         self.progressed = False
         self.redone = 0
-        """Number of times that steps were applied from the initial state."""
+        """Number of times that all steps were replaced, from the initial state on."""
         self.saving: float | None = None
-        """Number of primitives per second that the last round of shortening saved."""
+        """Number of primitives that the last round of shortening saved, per second."""
         self.settled = False
-        """Whether steps of lower levels bring symbols to rest that aren't at rest initially."""
+        """Whether steps of lower levels have been tried to bring symbols to rest that aren't at rest initially."""
 
     def advise(self, advice: GoalAdvice) -> None:
-        """Follow advice before any search, for goals and for refinements."""
+        """Set the advice that is followed before any search, for goals and for refinements."""
         self.advice = self.refiner.advice = advice
         self.refiner.methods.ranked = advice.ranked
 
     def replace_steps(self, steps: Sequence[RefinedStep]) -> None:
-        """Replace the steps applied so far by other steps from the initial state; earlier marks of the trail become invalid."""
+        """Undo all steps and apply `steps` from the initial state; earlier marks of the trail become invalid."""
         self.redone += 1
         self.table.undo(0)
         for step in steps:
@@ -106,7 +106,7 @@ class Call:
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
         kept: Mapping[Cell, str] = self.kept
-        if level == first and self.unseen:  # its steps needn't keep symbols that it doesn't see
+        if level == first and self.unseen:  # steps of a level needn't keep symbols that the level doesn't see
             kept = {cell: value for cell, value in kept.items() if cell not in self.unseen}
         keep = self.space.keeping(kept)
         last = self.steps[-1] if self.unseen.issuperset(targets) and self.steps else None
@@ -154,7 +154,7 @@ class Call:
         }
 
     def count(self, other: Outcome) -> None:
-        """Add the counts of another search."""
+        """Add the counts of another search to the counts of this call."""
         for level, counts in other.search.items():
             self.space.counts[level].add(counts)
 
@@ -187,7 +187,7 @@ class Call:
 
 
 def fresh_call(call: Call, problem: Problem) -> Call:
-    """Return a new call from the initial state that knows which refinements succeeded and which failed."""
+    """Return a new call from the initial state that shares the known refinements and nogoods of `call`."""
     other = Call(problem, call.using, call.space.deadline, call.space.most)
     other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
     return other
@@ -196,7 +196,7 @@ def fresh_call(call: Call, problem: Problem) -> Call:
 def settle(call: Call) -> bool:
     """Bring all symbols that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
 
-    A held object is taken to the place where a goal requires it if that needs no more steps, otherwise to any place.
+    A held object is put where a goal requires it if a few steps suffice for that, otherwise at any place.
     """
     for level in reversed(call.program.levels[1:]):
         targets = call.restless(level)

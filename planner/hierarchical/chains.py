@@ -1,8 +1,8 @@
 """Search for a few relevant steps towards some targets, by iterative deepening on a table that is changed and undone.
 
-targets   the symbols to be changed, with their wanted values
-off       symbols that don't yet have their required final value: the search ends when none is left
-changed   the symbols that differ from the start, with their values: they identify a state
+targets:  the symbols to be changed, with their wanted values
+off:      symbols that don't yet have their required final value; the search ends when there are none
+changed:  the symbols that differ from the start, with their values, which identify a state
 
 Only relevant behaviours are tried (`confab.planner.hierarchical.relevance`), so a shortest sequence of relevant steps is found.
 Longer sequences, and other steps, are left to the search of a scope (`confab.planner.hierarchical.scope`).
@@ -21,7 +21,7 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE
 
 Barred: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
-"""A quantified behaviour, and the changes since the start in which it is barred."""
+"""A quantified behaviour, and the state in which it is barred (the changes since the start)."""
 MOST_EXPANSIONS = 150
 """Maximum number of expansions of one search for a few steps."""
 
@@ -36,7 +36,7 @@ class Chain:
         self.barred: set[Barred] = set()
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` excludes one of them."""
+        """Return steps, or None if none were found; `bar` excludes one of the steps from the next search."""
         found = find(self.space, self.level, self.targets, self.keep, self.longest, self.barred)
         self.found = found or []
         return found
@@ -54,7 +54,7 @@ def find(
     longest: int,
     barred: AbstractSet[Barred] = frozenset(),
 ) -> list[Ground] | None:
-    """Return the shortest sequence of at most `longest` relevant steps that achieves all targets and keeps the rest, or None.
+    """Return the shortest sequence of at most `longest` relevant steps that achieves all targets and respects `keep`, or None.
 
     The table is unchanged afterwards.
     """

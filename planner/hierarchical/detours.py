@@ -1,7 +1,7 @@
-"""Removal of detours from a plan: steps of a level whose changes cancel out and that no step between them needs.
+"""Removal of detours from a plan: steps of a level whose changes cancel out and that no step between requires.
 
 Examples: a lid that is shut at the end of a step and opened at the start of the next; an object put down and picked up again.
-The remaining steps are grouped under steps of the upper levels again wherever one of these still has its effect.
+A step of an upper level is kept if its remaining sub-steps still have its effect; otherwise the sub-steps replace it.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from confab.planner.hierarchical.refinement import RefinedStep, Refiner
 from confab.planner.transitions import Cell, Changes
 
 AGAIN = 30
-"""Maximum number of times that each step is replayed, on average, to test whether it works without others."""
+"""Maximum average number of replays per step, to test whether steps are applicable without the detours."""
 
 
 @dataclass(eq=False)
 class _Done:
-    """An applied step: its position, the step, its changes, and the mark of the table before it."""
+    """An applied step: its position, the step, its changes, and the mark of the table's trail before the step."""
 
     number: int
     step: RefinedStep
@@ -27,22 +27,22 @@ class _Done:
 
 
 def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) -> list[RefinedStep]:
-    """Return steps with the same final state, without steps of a level that cancel out; the same steps if there are none.
+    """Return the given steps without detours on a level; the final state is the same.
 
     Parameters
     ----------
     refiner : Refiner
-        Its table is in the initial state before and after the call.
+        The refiner's table is in the initial state before and after the call.
     steps : sequence of RefinedStep
-        Steps that were applied from there.
+        Steps that are applicable from the initial state.
     level : int
-        Steps of this level are removed with their refinements; where there are none, steps of the level below.
+        Steps of this level are removed with their refinements; where the plan has left this level, steps of a lower level.
     """
     table = refiner.table
     owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
     kept = dict(enumerate(part for step in steps for part in parts(step, level)))
     before, left, fewer = 0, AGAIN * len(kept), kept
-    while before != len(fewer):  # others may only have been needed by the removed steps
+    while before != len(fewer):  # the removed steps may have been the only ones that required other steps
         before = len(fewer)
         table.undo(0)
         done, left = _without_cycles(refiner, fewer, owners, left)
@@ -56,7 +56,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
 
 
 def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
-    """Yield the steps of a level within a step, in order; where there are none, steps of a lower level."""
+    """Yield the sub-steps of a step on a level, in order; where there are none, sub-steps of a lower level."""
     if step.level >= level or not step.steps:
         yield step
         return
@@ -67,10 +67,10 @@ def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
 def _without_cycles(
     refiner: Refiner, steps: Mapping[int, RefinedStep], owners: Sequence[int], left: int
 ) -> tuple[list[_Done], int]:
-    """Apply the steps that can't be removed; return them.
+    """Apply the steps that can't be removed; return these steps and the remaining number of replays.
 
-    Steps that refine the same step (by `owners`) stay, since that refinement was searched. At most `left` steps are replayed; the
-    remaining number is returned too.
+    Detours within one step of the plan (by `owners`) stay, since a search has chosen that refinement. At most `left` steps are
+    replayed.
     """
     table = refiner.table
     done: list[_Done] = []
@@ -93,7 +93,7 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return steps that changed exactly the same symbols, the last of which restores the values before the first."""
+    """Return successive steps, up to `last`, that changed exactly the same symbols and restored their values; [] if none."""
     cells = last.changes[0].keys()
     its = [latest[cell] for cell in cells]
     for back in range(2, 1 + min(map(len, its), default=0)):
@@ -106,7 +106,7 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
 
 
 def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
-    """Undo steps whose changes cancel out, if the steps between them work without them; return whether they do."""
+    """Remove the steps of `circle` if the steps between lead to the same state without them; return whether they were removed."""
     table, mark = refiner.table, circle[0].mark
     first = next(i for i in reversed(range(len(done))) if done[i] is circle[0])
     ended, gone = table.since(mark), set(map(id, circle))
@@ -133,8 +133,8 @@ def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bo
 class _Assembly:
     """Assembles steps from their remaining parts, by number, and replays each part on the table.
 
-    A step stays as it was if all of its parts remain and it still has its effect. A step inside a stretch of a lower level
-    doesn't: such a stretch ends where all symbols that the step's level doesn't see are at rest again.
+    A step is kept whole if all of its parts remain, it still has its effect, and it begins with all symbols at rest that its level
+    doesn't see. Otherwise its remaining parts replace it.
     """
 
     def __init__(self, refiner: Refiner, level: int, kept: Mapping[int, RefinedStep]) -> None:

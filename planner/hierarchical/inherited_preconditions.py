@@ -1,12 +1,14 @@
 """Preconditions that the lower level inherits from the behaviours of the upper levels.
 
-A search of a lower level finds steps that no step of an upper level stands for; that is how a plan gets shorter. A condition that
-only an upper level states ("a cup that is filled isn't moved") would then be lost. So wherever a level is planned without the
-levels above, a behaviour of the lower level may give a symbol a value that the upper level sees only if some behaviour of the
-upper level could do so: that behaviour's conditions on the changed individuals must hold.
+A search of a lower level alone finds steps that refine no step of an upper level. This shortens plans, but would ignore conditions
+that only an upper level has ("a filled cup isn't moved"). So when a level is planned without the levels above, its behaviours may
+change a symbol that an upper level sees only where some behaviour of the upper level could make the same change. The conditions
+of that behaviour on the changed individuals must hold.
 
-Not inherited are conditions on other individuals of the upper behaviour (the other vessel), and on the old value of a symbol that
-is between two values of the upper level (the place that a held object came from).
+Two kinds of conditions aren't inherited:
+
+- conditions on other individuals of the upper behaviour (the other vessel);
+- conditions on the old value of a symbol whose present value the upper level doesn't see (the place from which a held object came).
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ def binding(problem: Problem, level: int) -> Domain:
     Returns
     -------
     Domain
-        Its plans on that level are also plans of the problem's own domain.
+        Its plans on that level are also plans of the original domain.
     """
     domain = problem.domain
     above = [behavior for behavior in domain.behaviors.values() if behavior.level < level]
@@ -65,7 +67,7 @@ def _inherited(
         makers = [(upper, e) for upper in above if upper.level == level for e in upper.effects]
         makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]
         if not makers:
-            continue  # the level has the symbol, but changes it nowhere: it imposes nothing
+            continue  # no behaviour of the level changes the symbol, so the level imposes nothing
         alternatives = [*_unseen_values(problem, behavior, effect, level)]
         alternatives += [
             group for maker in makers for group in _conditions_for(problem, behavior, effect, *maker, level)
@@ -78,7 +80,7 @@ def _inherited(
 def _unseen_values(
     problem: Problem, behavior: Behavior, effect: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield one alternative for each value of the effect that the level doesn't see: the level imposes nothing on these."""
+    """Yield one alternative for each value of the effect that the level doesn't see; the level doesn't restrict such values."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
@@ -91,7 +93,7 @@ def _unseen_values(
 def _conditions_for(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield the conditions under which an upper behaviour could have this effect; nothing if it never could."""
+    """Yield the conditions under which an upper behaviour could have the given effect; nothing if it never could."""
     terms = upper.kinds
     here = lower.kinds
     names: dict[str, str] = {}
@@ -126,7 +128,7 @@ def _conditions_for(
 
 
 def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
-    """Yield the conditions on known terms, with the variables that they determine replaced by witnesses; drop the others."""
+    """Yield the conditions on known terms, with witnesses in place of the variables that known terms determine; drop the rest."""
     yield from (condition for condition in conditions if mentions(condition) <= known)
     for condition in conditions:
         if isinstance(condition, ValueCondition) and mentions(condition) - known == {condition.value}:

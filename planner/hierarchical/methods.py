@@ -2,7 +2,7 @@
 
 The individuals of the refined step fill the first roles of a method. Any other role is read off the table where a condition
 determines it (the place of the van); otherwise one individual of each symmetry class is tried. Every replayed step is checked
-(`confab.planner.hierarchical.refinement`): a method may be inapplicable in a state, but never wrong.
+(`confab.planner.hierarchical.refinement`), so an inapplicable method costs time, but never gives a wrong plan.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from confab.reasoner.memory.experience import Method, OpenRole
 from confab.reasoner.symbols import Behavior, ValueCondition
 
 METHODS, CHOICES = 6, 24
-"""Maximum number of methods kept per behaviour, and of ways to fill the open roles of one method."""
+"""Maximum number of methods kept per behaviour, and of assignments of individuals to the open roles of one method."""
 
 Roles: TypeAlias = "tuple[str | None, ...]"
 """The individuals in the roles of a method; None where the table determines the individual."""
@@ -25,7 +25,7 @@ Ranked: TypeAlias = "Callable[[Method, list[Roles]], list[Roles]]"
 
 
 def unranked(method: Method, ways: list[Roles]) -> list[Roles]:
-    """Return the ways to fill the roles of a method in the given order."""
+    """Return the role assignments of a method in the given order."""
     return ways
 
 
@@ -35,23 +35,23 @@ class Methods:
     Parameters
     ----------
     space : Workspace
-    Methods of earlier calls with the same program; new ones are added.
-        From earlier calls over the same program; grows.
+    known : dict
+        Methods of earlier calls with the same program, by behaviour; new methods are added.
     """
 
     def __init__(self, space: Workspace, known: dict[str, list[Method]]) -> None:
         self.space, self.known = space, known
         self.ranked: Ranked = unranked
-        """Returns the ways to fill the roles of a method, best first."""
+        """Function that sorts the role assignments of a method, best first."""
 
     def of(self, behavior: str, individuals: tuple[str, ...]) -> Iterator[tuple[Method, Roles]]:
-        """Yield the methods of a step, shortest first, each with the ways to fill its roles."""
+        """Yield the methods of a step, shortest first, each once for every role assignment."""
         for method in tuple(self.known.get(behavior, ())):
             for roles in self.ways(method, individuals):
                 yield method, roles
 
     def ways(self, method: Method, individuals: tuple[str, ...]) -> Iterable[Roles]:
-        """Return the ways to fill the roles of a method: the step's individuals, None for determined roles, other candidates."""
+        """Return role assignments of a method: the step's individuals, then None for determined roles and candidates for others."""
         subgoals = self.space.subgoals
         choices: list[Sequence[str | None]] = []
         for role in method.open:
@@ -80,14 +80,14 @@ class Methods:
             yield name, individuals
 
     def prefer(self, method: Method) -> None:
-        """Move a method that was just replayed before the other methods of its behaviour that aren't shorter."""
+        """Move a replayed method to the front of its behaviour's methods, unless the first of these is shorter."""
         known = self.known[method.behavior]
         if known[0] is not method and len(known[0].steps) >= len(method.steps):
             known.remove(method)
             known.insert(0, method)
 
     def learn(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> None:
-        """Keep the steps that refined a behaviour with the given individuals."""
+        """Store the steps that refined a behaviour with the given individuals as a method."""
         known = self.known.setdefault(behavior, [])
         known.append(self.lifted(behavior, steps, individuals))
         known.sort(key=lambda method: len(method.steps))
@@ -115,7 +115,7 @@ class Methods:
 def open_role(
     behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
 ) -> OpenRole:
-    """Return how to find the individual of a parameter that no earlier role fills: by a condition that determines it, if any."""
+    """Return an open role for a parameter, with the condition that determines its individual, if there is one."""
     for condition in behavior.preconditions:
         if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
             known = [places.get(terms.get(a, a)) for a in condition.arguments]

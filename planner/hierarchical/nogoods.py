@@ -1,7 +1,8 @@
 """Nogoods: targets for which the search of a scope failed, with the state of the scope, generalised over symmetric individuals.
 
-Individuals named by the targets are replaced by roles, as in a method: what failed for one parcel fails for every parcel with the
-same static facts, if the rest of the scope is in the same state. A nogood saves a search; it never proves that there is no plan.
+Individuals named by the targets are replaced by roles, as in a method: a search that failed for one parcel fails for every parcel
+with the same static facts, if the rest of the scope is in the same state. A nogood saves a search; it never proves that there is
+no plan.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class Nogoods:
         self.known: dict[object, list[list[Held]]] = {}
 
     def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> bool:
-        """Return whether the search for such targets failed with this budget in a scope in the same state."""
+        """Return whether a search for symmetric targets has failed with this budget, in a scope in the same state."""
         roles = individuals(targets)
         known = self.known.get(self.key(level, targets, roles, budget))
         if not known:
@@ -47,7 +48,7 @@ class Nogoods:
         return any(all(map(holds, nogood)) for nogood in known)
 
     def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget, around: State) -> None:
-        """Record that the search for targets failed with an budget, in a scope in the given state."""
+        """Record that the search for targets failed with a budget, in a scope in the state `around`."""
         roles = individuals(targets)
 
         def lifted(term: str) -> Term:
@@ -62,7 +63,7 @@ class Nogoods:
         self.known.setdefault(self.key(level, targets, roles, budget), []).append(held)
 
     def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], budget: SearchBudget) -> object:
-        """Return the identity of targets, the same for symmetric individuals."""
+        """Return a key of targets that is equal for targets with symmetric individuals."""
         pattern = tuple(
             (situation, tuple([roles[a] for a in arguments_of(key)]), roles.get(value, value))
             for (situation, key), value in targets.items()

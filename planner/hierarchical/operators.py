@@ -1,11 +1,11 @@
-"""Behaviours compiled to Python source, once per problem: their changes, and the bindings with which each effect gives a value.
+"""Behaviours compiled to Python source: functions for their changes, and for the bindings with which an effect achieves a value.
 
-Besides its function ``forward`` (`confab.planner.transitions`) a behaviour has a function ``achieve(key …, value)`` per effect.
-It yields each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
+Each behaviour has a function ``forward`` (`confab.planner.transitions`); each effect has a function ``achieve(key …, value)``.
+``achieve`` yields every binding with which the effect would set that symbol to that value, with the preconditions unmet now.
 
-An unbound parameter is enumerated by, in this order of preference: a static relation to a bound term; the inverse of a situation
-type that no behaviour can change for these individuals; a class. Terms that only the state determines come last and are *soft*:
-a static relation that fails on a changeable value is a subgoal, not a dead end.
+An unbound parameter is enumerated by the cheapest of these sources: a static relation to a bound term; the inverse of a situation
+type that no behaviour can change for these individuals; the members of its class. Terms that only the state determines are bound
+last. Conditions on them are *soft*: if one fails, another value of the term is a subgoal.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ from confab.reasoner.symbols import (
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
-"""Yields the arguments, the positions of unmet conditions, and the binding if there are any."""
+"""Function that yields the arguments and the positions of unmet conditions; also the binding if a condition is unmet."""
 
 
 @dataclass(frozen=True)
 class Achiever:
     """One effect of one behaviour, as an achiever of its value.
 
-    `soft` lists the conditions that the state can change, by position. `determined` maps a variable to the symbol whose value it
-    is: situation type and argument terms. For a rule, `determining` lists the conditions that do so. If `deep`, the facts inside
-    a nested witness are subgoals of a negated condition, too.
+    `soft` lists the conditions that depend on the state. `determined` maps a variable to the symbol that has the variable as its
+    value: a situation type and argument terms. For a rule, `determining` lists the conditions that determine variables. If `deep`,
+    the facts inside a nested witness are subgoals of a negated condition, too.
     """
 
     behavior: str
@@ -72,7 +72,7 @@ class BoundProgram:
 
 
 FEW = 8
-"""Maximum number of candidates that are all tried; of more candidates, one of each symmetry class is tried."""
+"""Maximum number of candidates that are all tried; if there are more, one of each symmetry class is tried."""
 
 
 class Program:
@@ -102,7 +102,7 @@ class Program:
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
     def bind(self, table: Table, few: int = FEW) -> BoundProgram:
-        """Return the functions bound to a table; of more than `few` interchangeable candidates, they try one."""
+        """Return the functions bound to a table; if a term has more than `few` candidates, they try one of each symmetry class."""
         if self._rules is not None:
             self._rules.define(table)
         return BoundProgram(*self._bind(table.now, table.holders, few))
@@ -137,7 +137,7 @@ class Program:
 
     @cached_property
     def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
-        """Map each static relation to the tuples of each individual."""
+        """Map each static relation to a dictionary from each individual to the tuples that contain the individual."""
         found: dict[str, dict[str, list[tuple[str, ...]]]] = {}
         for relation, rows in self.problem.relations.items():
             index = found.setdefault(relation, {})
@@ -178,7 +178,7 @@ class Program:
         def emit(text: str) -> None:
             lines.append("    " * depth + text)
 
-        # Hard: tests on bound terms, and enumeration of unbound ones.
+        # Hard: tests on bound terms, and enumeration of unbound terms.
         while True:
             ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentions(c) - hard]
             for condition in ready:
@@ -284,12 +284,12 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an iterable expression of the candidates; of many, free ones of each symmetry class and state."""
+        """Return an iterable expression for the candidates; of many, only free candidates of each symmetry class and state."""
         taken = next((identifier("holders", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
-        """Whether no behaviour of this level can change the truth of a condition."""
+        """Return True if no behaviour of this level can change the truth of a condition."""
         match condition:
             case ValueCondition(situation, arguments, _, _):
                 return not self.changeable(situation, arguments, kinds, behavior)
@@ -306,9 +306,9 @@ class Program:
     def changeable(
         self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str], behavior: Behavior
     ) -> bool:
-        """Whether an effect on the level of `behavior` can change a symbol with these terms."""
+        """Return whether an effect on the level of `behavior` can change a symbol with these terms."""
         if situation in self.domain.rules:
-            return True  # whatever its rules depend on
+            return True  # assumed: the rules may depend on a symbol that changes
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
             others = other.kinds

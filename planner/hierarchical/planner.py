@@ -1,15 +1,15 @@
-"""The default planner: an agenda of goals, each achieved on its level and refined at once; then the plan is shortened.
+"""The default planner: achieves the goals one after another, refines each step at once, then shortens the plan.
 
 ======  =========================================================================  =========================================
 word    meaning                                                                    module
 ======  =========================================================================  =========================================
-agenda  goals one after another, with larger budgets where goals get stuck         `confab.planner.hierarchical.agenda`
-call    achieve a goal: its steps are applied to the table and kept                `confab.planner.hierarchical.call`
-chains  relevant achievers of a value, and a few relevant steps                    `confab.planner.hierarchical.chains`
-scope   a part of the world is cut out, grounded and searched without levels       `confab.planner.hierarchical.scope`
-refine  replace a step by lower-level steps: a method, a chain, a scope            `confab.planner.hierarchical.refinement`
-prove   when the agenda gets stuck: test whether there is no plan                  `confab.planner.hierarchical.unsolvability`
-shorten other orders of the goals, windows of steps, removal of detours            `confab.planner.hierarchical.shortening`
+agenda  achieve the goals in turn; raise the search budget if all are blocked      `confab.planner.hierarchical.agenda`
+call    achieve one goal by steps of a level, which are applied to the table       `confab.planner.hierarchical.call`
+chains  search for a few steps, backwards from the wanted values                   `confab.planner.hierarchical.chains`
+scope   ground and search a part of the world, on one level                        `confab.planner.hierarchical.scope`
+refine  replace a step by steps of the next level: a method, a chain or a scope    `confab.planner.hierarchical.refinement`
+prove   test whether there is no plan, when all goals are blocked                  `confab.planner.hierarchical.unsolvability`
+shorten try other orders of the goals, replace windows of steps, remove detours    `confab.planner.hierarchical.shortening`
 ======  =========================================================================  =========================================
 
 A failed search of a level above the lowest never proves that there is no plan.
@@ -36,16 +36,16 @@ from confab.reasoner.symbols import Problem, Symbol
 __all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
 
 FLAT = 50_000_000
-"""Maximum work of planning a task of one level as a whole before goals in series, in bits of relaxed plans: some seconds."""
+"""Maximum work of searching a one-level task as a whole, before planning goal by goal, in bits of relaxed plans (some seconds)."""
 FLAT_ROWS = 30_000
-"""Maximum number of rows of a join when such a task is grounded."""
+"""Maximum number of rows of a join when a one-level task is grounded as a whole."""
 NOT_LEFT = "levels aren't to be left"
 SEARCHING = 0.93
 """Share of the time limit that is used for search; the rest is for releasing memory."""
 
 
 def alone(call: Call) -> None:
-    """Follow no advice."""
+    """Attach no advice to the call."""
 
 
 def plan(
@@ -57,18 +57,18 @@ def plan(
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
 ) -> Outcome:
-    """Plan with goals in series on a mutable state table, refining each step at once.
+    """Return a plan for a problem: achieve its goals one after another and refine each step at once.
 
     Parameters
     ----------
     problem : Problem
     limits : Limits
     improve : int
-        Work for shortening the first plan, by other orders of the goals and other means; 0 leaves it as it is.
+        Work for shortening the first plan, in sixteenths of the effort of finding it; 0 for no shortening.
     using : Compiled, optional
-        From `compiled`, for a problem with the same domain, individuals and static facts; saves the compilation.
+        The result of `compiled` for a problem with the same domain, individuals and static facts.
     leave_levels : bool
-        Whether steps of a lower level may take the place of a level that has no refinable plan.
+        Whether the plan may have steps of a lower level where the upper level has no refinable plan.
     advised : function of a call, optional
         Attaches advice to the call.
 
@@ -123,7 +123,7 @@ def _plan(
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
-    """Plan the lowest level as a whole, unless levels must not be left or the level is too large."""
+    """Search the lowest level as a whole, unless levels must not be left or the level is too large."""
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
     if upper and not leave_levels:
@@ -140,27 +140,27 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest)
     plan = next((plan for plan in plans if plan is flat.plan or not validate(problem, plan)), None)
     if plan and upper and all(step.level == upper[0] for step in plan.steps):
-        call.given_up.clear()  # the plan has steps of that level after all
+        call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up
     return call.outcome(flat.status, plan, flat.reason)
 
 
 def given_up(call: Call, why: str) -> Outcome:
-    """Return an outcome that says that planning gave up, and at which point."""
+    """Return an outcome that reports that planning gave up, with `why` and the point it had reached."""
     from confab.planner.hierarchical.stuck import gave_up
 
     return call.outcome(Status.GAVE_UP, reason=gave_up(call, why))
 
 
 def by_rules_alone(call: Call) -> bool:
-    """Achieve the goals one after another by rules, if rules exist for all of their kinds; return whether that succeeded."""
+    """Achieve all goals by learned rules, if there are rules for every kind of goal; return whether that succeeded."""
     return call.advice is not None and call.advice.expects and Agenda(call, (), solvable=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
-    """Plan a task of one level as a whole with bounded work; give up where that isn't enough.
+    """Search a task of one level as a whole with bounded work; give up when the bound is reached.
 
-    A task of one level has no refinements that could guide goals in series, and may be too large to be grounded, or have too many
-    goals.
+    In a task of one level, no refinements guide planning goal by goal, so the whole task is tried first. The work is bounded, since
+    the task may have too many goals or be too large to be grounded.
     """
     from confab.planner.grounded.best_first import plan_level
 
@@ -170,7 +170,11 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 
 
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
-    """Plan the lowest level from the initial state; if a plan leaves a touched symbol not at rest, require rest of all."""
+    """Search the lowest level from the initial state.
+
+    If the plan is invalid because a symbol that it changes isn't at rest in the end, the search is repeated with all rest values
+    as goals.
+    """
     from confab.planner.grounded.best_first import plan_level
 
     problem, deadline, lowest = call.problem, call.space.deadline, call.program.levels[-1]

@@ -1,9 +1,10 @@
 """The recursion: steps of one level achieve targets; each step is refined by achieving its effects on the level below.
 
-achieve   targets by steps of a level: replayed methods, learned rules, a few relevant steps, scopes; steps found are applied
-do        a step: on the lowest level, make its changes; on another level, achieve its effects as targets of the level below,
-                    with all symbols that its own level sees unchanged, and all touched symbols at rest in the end
-                    (docs/levels.md)
+achieve:  apply steps of a level after which the targets hold. Sources of steps, in this order: methods, learned rules, a search
+          for a few relevant steps, searches of scopes.
+do:       apply a step. On the lowest level, make its changes. On another level, achieve its effects as targets of the level below;
+          all other symbols that the step's level sees must stay unchanged, and symbols that it doesn't see must end at rest
+          (docs/levels.md).
 
 A step that can't be refined is barred in the state where it was tried, and the search continues without it. A successful
 refinement is kept as a method, a failed search of a scope as a nogood.
@@ -26,9 +27,9 @@ from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE
 
 LONG = 4
-"""Minimum number of steps of a method whose needless steps are removed after it is replayed."""
+"""Minimum number of steps of a replayed method from which needless steps are removed."""
 ATTEMPTS, FEW_ATTEMPTS = 40, 4
-"""Maximum number of searches for refinable steps; and the number while symbols that aren't at rest may block them."""
+"""Maximum number of searches for refinable steps: in general, and while symbols that aren't at rest may block steps."""
 
 
 class RefinedStep(NamedTuple):
@@ -42,7 +43,7 @@ class RefinedStep(NamedTuple):
 
 
 class RefinementTask(NamedTuple):
-    """A step to be refined: its behaviour, its arguments, the individuals of its variables, and the manner.
+    """A step to be refined: its behaviour, and the individuals of its parameters and variables.
 
     If `careful`, symbols that the level above doesn't see keep their values.
     """
@@ -53,10 +54,10 @@ class RefinementTask(NamedTuple):
 
 
 class Advice(Protocol):
-    """Learned rules, the first of the budgets."""
+    """Learned rules, which are followed before any search."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
-        """Apply steps that achieve the targets and keep the rest; on failure return None and leave the table unchanged."""
+        """Apply steps that achieve the targets and respect `keep`; on failure return None and leave the table unchanged."""
 
 
 class Refiner:
@@ -66,7 +67,7 @@ class Refiner:
     ----------
     space : Workspace
     methods : dict
-        Methods of earlier calls with the same program; new ones are added.
+        Methods of earlier calls with the same program; new methods are added.
     """
 
     def __init__(self, space: Workspace, methods: dict[str, list[Method]]) -> None:
@@ -80,9 +81,9 @@ class Refiner:
         situations = space.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
-        """Refinements by task and state: they are replayed when the agenda reaches the same state again."""
+        """Refinements by task and state; a refinement is replayed when the agenda reaches the same state again."""
         self.careful = False
-        """Whether refinements keep symbols that the level above doesn't see as they were, where possible."""
+        """Whether refinements leave symbols that the level above doesn't see unchanged, where possible."""
         self.hasty = False
         """Whether refinements are searched in small scopes only."""
         self.advice: Advice | None = None
@@ -121,7 +122,7 @@ class Refiner:
         budgets: Sequence[SearchBudget],
         task: RefinementTask | None = None,
     ) -> Sequence[RefinedStep] | None:
-        """Apply steps of a level after which the targets hold and the rest is kept; on failure return None, the table unchanged.
+        """Apply steps of a level that achieve the targets and respect `keep`; on failure return None and leave the table unchanged.
 
         Parameters
         ----------
@@ -129,9 +130,9 @@ class Refiner:
         targets : mapping of cell to value
         keep : function of a cell and its first value
         budgets : sequence of SearchBudget
-            Tried one after the other.
+            Budgets that are tried one after the other.
         task : RefinementTask, optional
-            The step to be refined; without one the targets are goals.
+            The step to be refined; None if the targets are goals.
         """
         here: object = None
         if task is not None:
@@ -202,7 +203,7 @@ class Refiner:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def targets(self, level: int, changes: Sequence[Change]) -> dict[Cell, str]:
-        """Return what a step changes, without totals that its level doesn't see."""
+        """Return the symbols that a step changes, with their new values, except totals that the level doesn't see."""
         now, totals = self.table.now, self.space.program.domain.aggregates
         found: dict[Cell, str] = {}
         for situation, key, value in changes:
@@ -228,7 +229,7 @@ class Refiner:
     def replay_method(
         self, level: int, method: Method, roles: Roles, targets: Mapping[Cell, str], keep: Keep
     ) -> list[RefinedStep] | None:
-        """Apply the steps of a method; return None, the table unchanged, if a step fails or a symbol gets a wrong value."""
+        """Apply the steps of a method; if a step fails or a value is wrong, return None and leave the table unchanged."""
         mark, steps = len(self.table.trail), list[RefinedStep]()
         for name, arguments in self.methods.filled(method, roles):
             step = self.do(level, name, arguments)
@@ -243,7 +244,7 @@ class Refiner:
         return steps
 
     def pruned(self, steps: list[RefinedStep], mark: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep]:
-        """Return the steps done since a mark without needless ones: single steps, or pairs that undo each other."""
+        """Return the steps applied since a mark without needless steps: single steps, or pairs that undo each other."""
         for dropped in self._idle(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
             if self._replayed(rest, mark) and self.wrong_value(mark, targets, keep) is None:
@@ -303,7 +304,7 @@ class Refiner:
 
 
 def begun(space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> Chain | Scope:
-    """Return the search for a budget."""
+    """Return a search with a budget: a `Chain` if the budget limits the number of steps, otherwise a `Scope`."""
     if budget.steps:
         return Chain(space, level, targets, keep, budget.steps)
     return Scope(space, level, targets, keep, budget)

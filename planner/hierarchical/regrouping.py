@@ -20,7 +20,7 @@ LONGEST = 60
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
     """Return a plan of one level with runs of its steps grouped under steps of the upper levels that have the same effect.
 
-    As few steps as possible stay ungrouped. The result may violate the rules of levels; the checker then refuses it.
+    As few steps as possible stay ungrouped. The result may violate the rules of levels; `validate` then rejects it.
     """
     steps = list(plan.steps)
     for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
@@ -35,9 +35,9 @@ def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
 
 
 def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
-    """Return the steps grouped, first as many as possible, under as few steps of a level as possible with the same effects.
+    """Return the steps grouped under steps of a level with the same effects: as many steps as possible, in the fewest groups.
 
-    At both ends of a run all touched symbols that the level doesn't see are at rest.
+    At the beginning and end of a group, all changed symbols that the level doesn't see are at rest.
     """
     try:
         task = ground(problem, level, goal={})  # the level may see none of the goals
@@ -70,7 +70,7 @@ def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
 
 
 def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
-    """Return the states before the first step and after each; None if a step isn't applicable."""
+    """Return the initial state and the state after each step; None if a step isn't applicable."""
     found: list[State] = [dict(problem.initial)]
     for step in steps:
         values = found[-1]
@@ -99,7 +99,7 @@ def _at_rest(problem: Problem, course: Sequence[State], level: int) -> Iterator[
 
 
 def _state(task: Task, values: State) -> int:
-    """Return the state of a level's task in which the symbols have some values."""
+    """Return the state of a level's task in which the symbols have the given values."""
     facts = sum(1 << bit for bit, fact in enumerate(task.facts) if values.get(fact.symbol, FALSE) == fact.value)
     absent = sum(1 << bit for bit, fact in task.complements.items() if values.get(fact.symbol, FALSE) != fact.value)
     return task.derived.completed(facts | absent)

@@ -1,7 +1,7 @@
 """Relevant behaviours: achievers of a wanted value, achievers of their unmet conditions, and so on backwards.
 
 A chain is a sequence of achievers from an applicable behaviour to a wanted value. Its length is a lower bound on the number of
-steps, each unmet condition considered alone.
+steps, because each unmet condition is considered alone.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from confab.planner.transitions import Cell, Key, arguments_of
 from confab.reasoner.symbols import TRUE
 
 Asked: TypeAlias = "set[tuple[str, Key, str]]"
-"""Values of symbols that were examined as subgoals of others."""
+"""Subgoals examined so far: situation type, key and value."""
 QUESTIONS = 1000
 """Maximum number of values on the chains towards one value."""
 
@@ -44,9 +44,8 @@ def chains(
 ) -> Iterator[tuple[int, Ground | None]]:
     """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
 
-    The search is layer by layer: achievers of the value, then achievers of their unmet conditions. None marks the start of a
-    layer.
-    Individuals on the way are added to `met`, values to `asked`.
+    The search is layer by layer: achievers of the value, then achievers of their unmet conditions. A pair with None marks the start
+    of a layer. The individuals in chains are added to `met`, the examined values to `asked`.
     """
     asked = set() if asked is None else asked
     space.subgoals.concern(frozenset((*arguments_of(cell[1]), value)))
@@ -58,7 +57,7 @@ def chains(
     while (blocked or not length) and len(asked) < questions:
         length += 1
         yield length, None
-        if blocked:  # calculated late: a caller that needs no longer chains has stopped
+        if blocked:  # calculated only for callers that need longer chains
             subgoals = _unmet_subgoals(space, level, blocked)
         blocked = []
         for situation, key, values in subgoals:

@@ -1,14 +1,14 @@
-"""A scope: a part of the world, grounded and searched without levels, where no short chain of relevant steps suffices.
+"""A scope: a part of the world that is grounded and searched on one level when no short chain of relevant steps suffices.
 
-focus      the individuals that take part: those of the targets, and those on the chains towards the targets
-frozen     other individuals that are values of those in focus or that a condition quantifies over: their state is fixed, so that
-                      conditions such as "there is an individual such that …" are evaluated as in the whole world
-targets    the symbols to be changed, with their wanted values; a function gives the values that others must keep, as for
-`confab.planner.hierarchical.chains`
+focus:    the individuals that steps may involve: individuals in the targets, and individuals in chains towards the targets
+frozen:   other individuals, with a fixed state: values of individuals in focus, and individuals that a condition quantifies over;
+          with these, conditions such as "there is an individual such that …" have the same truth as in the whole world
+targets:  the symbols to be changed, with their wanted values; a function returns the values that other symbols must keep, as in
+          `confab.planner.hierarchical.chains`
 
-The state of the individuals in focus is exact, so steps found here are applicable in the whole world; a failed search proves
-nothing. A scope has one level; the caller refines the steps and bars those that can't be refined. The package that grounds and
-searches is imported only when a scope is searched, since importing numpy takes longer than planning a small task.
+The state of the individuals in focus is exact, so steps found here are applicable in the whole world. A failed search proves
+nothing. The caller refines the steps and bars steps that can't be refined. The package that grounds and searches is imported only
+when a scope is searched, since importing numpy takes longer than planning a small task.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 4
-"""Maximum size of a class that is part of every scope (the hands), and maximum number of holders of a value in a scope."""
+"""Maximum size of a class that is part of every scope (the hands); maximum number of objects with a value that join its scope."""
 
 BITS = 20
-"""Bits processed per relaxed operator and state by a search without levels, overhead included."""
+"""Number of bits that a search processes per relaxed operator and state, including overhead."""
 LEAST, MAKING = 300, 100
-"""Minimum number of relaxed operators that a task counts as having, and the cost of grounding it, in states examined. A scope
-isn't grounded if the budget would allow fewer than a fifth of that number of states."""
+"""Minimum number of relaxed operators assumed for the cost of a task; cost of grounding a task, in examined states. A scope isn't
+grounded if the budget allows fewer than a fifth of this number of states."""
 
 
 class Scope:
@@ -76,7 +76,7 @@ class Scope:
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
-            # A symbol that isn't at rest may stay so; the caller detects steps that touch it.
+            # A symbol that isn't at rest may stay unchanged; the caller detects steps that change the symbol.
             if wanted is not None and meets(value, wanted):
                 goal.setdefault(symbol, wanted)
         for cell in space.defined:
@@ -86,7 +86,7 @@ class Scope:
         return ground(small, level, goal=goal, most=5 * budget.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` excludes one of them."""
+        """Return steps, or None if none were found; `bar` excludes one of the steps from the next search."""
         from confab.planner.grounded.best_first import search
 
         if self.task is None:
@@ -113,7 +113,7 @@ class Scope:
 
 
 def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: SearchBudget) -> set[str] | None:
-    """Return the individuals relevant to reaching the targets; None stands for all."""
+    """Return the individuals relevant to reaching the targets; None stands for all individuals."""
     if budget.questions is None:
         return None
     program, table = space.program, space.table
@@ -127,7 +127,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
     met.update(dict.fromkeys(space.subgoals.spare(met, level, budget.spares)))
-    for individual in tuple(met):  # their values, and holders of them where these are few
+    for individual in tuple(met):  # add the values of the individual, and objects that have it as value if there are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
                 continue
@@ -143,7 +143,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
 def problem_of(
     space: Workspace, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
 ) -> Problem:
-    """Return one level of the problem in the present state, without a goal, restricted to `inside`, or of all individuals."""
+    """Return one level of the problem in the present state, without a goal; parameters range over `inside` (None: all)."""
     program, table = space.program, space.table
     problem = program.problem
     situations = problem.domain.situations
@@ -177,10 +177,10 @@ def problem_of(
 
 
 def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
-    """Return the individuals together with those that their conditions depend on, though the latter don't take part.
+    """Return the individuals of `inside` and the frozen individuals that conditions on them depend on.
 
-    The latter are their values, the values of these and so on; where a behaviour quantifies over individuals, also the
-    individuals that have one of them as a value, and those in a static relation to one of them.
+    Frozen individuals are the values of the individuals, the values of these values, and so on. If a behaviour quantifies over
+    individuals, individuals that have one of them as a value, or are in a static relation to one of them, are frozen, too.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)
@@ -211,5 +211,5 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
 
 
 def depth(witness: Witness) -> int:
-    """Return how deeply witnesses are nested."""
+    """Return the depth of nesting of the witnesses inside a witness, at least 1."""
     return 1 + max([depth(inner) for inner in witness.conditions if isinstance(inner, Witness)], default=0)

@@ -17,7 +17,7 @@ class SearchBudget:
     Attributes
     ----------
     steps : int
-        Maximum number of relevant steps; 0 where a scope is searched instead.
+        Maximum number of relevant steps; 0 if a scope is searched instead.
     questions : int, optional
         Maximum number of values on the chains towards one target; None searches the whole level.
     spares : int
@@ -25,7 +25,7 @@ class SearchBudget:
     work : int
         Maximum work of one search, in states times operators.
     rules : bool
-        Whether learned rules are followed instead.
+        Whether learned rules are followed instead of a search.
     """
 
     steps: int = 0
@@ -36,13 +36,13 @@ class SearchBudget:
 
 
 BY_RULES = SearchBudget(rules=True)
-"""Learned rules, if there are any; they limit their own work."""
+"""Budget for following learned rules, which limit their own work."""
 ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), SearchBudget(steps=4)
-"""One step; maximum number of relevant steps towards goals, and in refinements: CPU time against that of scopes."""
+"""Budgets for one relevant step towards a goal, for a few steps towards a goal, and for a few steps in a refinement."""
 SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)
 WIDE, WHOLE = SearchBudget(questions=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
 
 
 def scopes(size: int) -> tuple[SearchBudget, ...]:
-    """Return the budgets that search scopes of a level with `size` quantified behaviours, cheapest first."""
+    """Return the budgets for searching scopes of a level with `size` quantified behaviours, cheapest first."""
     return (SMALL, WIDER, WHOLE if size <= MOST_OPERATORS else WIDE)

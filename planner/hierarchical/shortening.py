@@ -1,12 +1,12 @@
 """Shortening of a plan, with at most half the effort of finding it.
 
-orders   the agenda runs again with other orders of the goals and the known refinements: the objects to move away depend on it
-windows  on each level, from the top: consecutive steps are replaced by fewer (`confab.planner.hierarchical.windows`)
-detours  steps whose changes cancel out are dropped (`confab.planner.hierarchical.detours`)
+orders:   run the agenda with other orders of the goals, which decide what has to be moved away; known refinements are reused
+windows:  on each level, from the top, replace consecutive steps by fewer steps (`confab.planner.hierarchical.windows`)
+detours:  remove steps whose changes cancel out (`confab.planner.hierarchical.detours`)
 
-Orders, and windows of the first level, are tried only where a plan moves an object away or has many steps per goal; other windows
-only where it moves an object away. The shortest plan is kept; steps of the most abstract level, which explain the others, are
-dropped only where that saves enough primitives.
+Orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of the levels
+between first and lowest are tried only if the plan moves an object away. The shortest plan is kept. Steps of the first level
+explain the steps below, so they are dropped only if this saves enough primitives.
 """
 
 from __future__ import annotations
@@ -28,31 +28,35 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
 ORDERS = 8
-"""Default work for shortening, in sixteenths of the effort of the first plan: plan length against CPU time."""
+"""Default work for shortening a plan, in sixteenths of the effort of finding it; more work gives shorter plans."""
 SHUFFLES = 3
-"""Number of random orders of the goals before the best one is changed a little at a time."""
+"""Number of random orders of the goals that are tried before small changes of the best order."""
 LEAST_EFFORT = 400_000
-"""Minimum effort assumed for a first plan, in states times operators: length of plans found at once, against CPU time."""
+"""Minimum effort assumed for a first plan, in states times operators, so that a plan found at once is shortened, too."""
 DOING, BEGINNING = 20, 1_000
 """Work of replaying a primitive, and of beginning a call, in states times operators."""
 MANY = 1.25
-"""Minimum number of steps per goal from which on other orders are tried: plan length against CPU time."""
+"""Number of first-level steps per goal above which other orders of the goals are tried."""
 KEPT = 1.5
-"""Level-1 steps are kept as long as redundant primitives lengthen the plan by less than this factor."""
+"""Factor by which the number of primitives must decrease before many first-level steps are dropped."""
 
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
-    """Return the plan of a call, made shorter by work in proportion to `improve`."""
+    """Return the plan of a call, shortened with work proportional to `improve`."""
     with suppress(LimitError):  # the plan so far is kept
         shorten(call, improve, leave_levels, advised)
     plan = call.tree()
     if all(step.level == call.program.levels[0] for step in plan.steps):
-        call.given_up.clear()  # the plan has steps of that level after all
+        call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up
     return plan
 
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
-    """Shorten the steps of a call in rounds: one round without a time limit, otherwise as long as rounds pay."""
+    """Shorten the steps of a call in rounds.
+
+    Without a time limit there is one round. With a time limit, the number of rounds is twice that of the last round that saved
+    primitives.
+    """
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
     while rounds < max(1, 2 * useful):
@@ -81,7 +85,7 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
 
 
 def puts_aside(call: Call) -> bool:
-    """Return whether a step overwrites a value that no earlier step required: otherwise hardly any step is needless."""
+    """Return whether a step overwrites a value that no step has required since it was set; otherwise few steps are needless."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
@@ -137,7 +141,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
 
 
 def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
-    """Yield an order reversed, some random ones, then endlessly the current order with a few goals moved."""
+    """Yield the reversed order, a few random orders, then endlessly the current `order` with a few goals moved."""
     yield order[::-1]
     for _ in range(SHUFFLES):
         yield random.sample(order, len(order))
@@ -152,9 +156,10 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Drop steps of a level that cancel out, unless that violates more conditions of upper levels; return whether any were.
+    """Drop steps of a level that cancel out unless that violates more conditions of upper levels; return whether steps were dropped.
 
-    Steps of the most abstract level are dropped for that only if they lengthen the plan by more than a factor.
+    If dropping primitives removes steps of the most abstract level, or if more than half of these are lost, the number of
+    primitives must decrease by the factor `KEPT`.
     """
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)

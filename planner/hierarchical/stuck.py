@@ -14,7 +14,7 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
-"""Maximum number of values, and of achievers, examined between the goal and its obstacle; and of amounts reported."""
+"""Maximum number of values and of achievers that are examined to find the obstacle of a goal, and of amounts reported."""
 
 
 def gave_up(call: Call, why: str) -> Reason:
@@ -36,14 +36,14 @@ def gave_up(call: Call, why: str) -> Reason:
 
 
 def missing_amounts(call: Call) -> Iterator[str]:
-    """Yield the unmet requirements on amounts of behaviours towards the goal that was aimed at first, in the final state."""
+    """Yield the requirements on amounts that the final state doesn't meet, for behaviours towards the first goal in `aim`."""
     space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):
         return
     space.deadline, space.most_looked = (
         Limits().end(),
         space.looked + LOOKED,
-    )  # the limits of the search may be reached
+    )  # the search may have reached the previous limits
     call.replace_steps(call.steps)
     told: dict[Cell, str] = {}
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:

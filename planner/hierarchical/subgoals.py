@@ -1,7 +1,7 @@
-"""Subgoals: the values that an unmet condition of an achiever needs.
+"""Subgoals: symbols with alternative values that could satisfy an unmet condition of an achiever.
 
-A subgoal is a symbol with alternative values. Of many values one of each symmetry class is proposed, so that a thousand free
-places count as one; values in goals are proposed as well.
+If a symbol has many possible values, one value of each symmetry class is proposed, so a thousand free places count as one. Values
+in goals are proposed, too.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Subgoals:
     program : Program
     table : Table
     goal : mapping of cell to value
-        Its values are proposed for their symbols, and aren't offered to other symbols as free values.
+        Each value is proposed for its own symbol, and isn't offered to other symbols as a free value.
     """
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
@@ -63,7 +63,7 @@ class Subgoals:
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[Condition, Condition]] = {}
         self._possibles: dict[int, tuple[Condition, Condition]] = {}
-        self._entered: dict[tuple[str, Key, bool], int] | None = None  # defined situation type, and depth of nesting
+        self._entered: dict[tuple[str, Key, bool], int] | None = None  # depth of nesting of each entered defined situation
         self._depth = 0
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Subgoal]] = {}
@@ -78,7 +78,7 @@ class Subgoals:
             self.wanted.setdefault(situation, {})[value] = None
 
     def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Subgoal]:
-        """Return alternative subgoals for the soft condition `number`, as `of` does; cached until the table changes."""
+        """Return the alternative subgoals for condition `number` of `achiever.soft`, cached until the table changes."""
         self._forget()
         scope = self._scopes.get((id(achiever), number))
         if scope is None:
@@ -90,7 +90,7 @@ class Subgoals:
         return found
 
     def _forget(self) -> None:
-        """Discard what was read from the table before a change."""
+        """Clear the caches if the table has changed since they were filled."""
         if self._age != self.table.age:
             self._age = self.table.age
             self._fresh.clear()
@@ -105,7 +105,7 @@ class Subgoals:
         return tuple(found)
 
     def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Subgoal]:
-        """Yield alternative subgoals, each of which may contribute to an achiever's unmet condition."""
+        """Yield alternative subgoals, each of which may help to satisfy an unmet condition of an achiever."""
         match condition:
             case ValueCondition(situation, arguments, value, negated) if situation in self.program.rules:
                 key = self._key(arguments, env)
@@ -141,12 +141,12 @@ class Subgoals:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
             case (
                 RelationCondition() | ClassCondition() | EqualityCondition()
-            ):  # other individuals would have to be chosen
+            ):  # only a choice of other individuals could satisfy the condition
                 pass
         yield from self._redetermined(achiever, condition, env, level)
 
     def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Subgoal]:
-        """Yield the missing facts of the individuals that could satisfy a witness."""
+        """Yield the facts that individuals lack to satisfy a witness, as subgoals."""
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
         for individual in self.one_of_each(witness.kind, env.values()):
@@ -177,7 +177,7 @@ class Subgoals:
         cell = situation, key, wanted
         assert self._entered is not None
         if self._entered.get(cell, DEEPEST) <= self._depth:
-            return  # its subgoals are among those found
+            return  # the subgoals of this situation have been found already
         self._entered[cell] = self._depth
         self._depth += 1
         for parameters, rule in self.program.rules[situation]:
@@ -195,18 +195,18 @@ class Subgoals:
         self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
-        """Return the candidates for a rule's witness that the goal names, otherwise a few with the fewest unmet conditions."""
+        """Return the candidates for a rule's witness set by `concern`; if none, a few with the fewest unmet conditions."""
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 
     def concern(self, individuals: frozenset[str]) -> None:
-        """Set the individuals that are tried first where a rule needs one."""
+        """Set the individuals that are tried first in the witnesses of rules."""
         if self.program.rules and individuals != self._concern:
             self._concern = individuals
             self._fresh.clear()
 
     def _holds_so_far(self, rule: Achiever, condition: Condition, env: dict[str, str | None]) -> bool:
-        """Return whether a condition of a rule holds after the earlier ones; the variable that it determines is bound."""
+        """Return whether a condition of a rule holds; if the condition determines a variable, bind the variable in `env`."""
         if condition in rule.determining and isinstance(condition, ValueCondition):
             key = self._key(condition.arguments, env)
             found = None if key is None else self.table.now[condition.situation].get(key)
@@ -215,7 +215,7 @@ class Subgoals:
         return self.holds(rule, condition, env)
 
     def _amounts(self, condition: Comparison, env: Env) -> Iterator[Subgoal]:
-        """Yield for each amount in a comparison the value that would satisfy it if the other amounts stayed the same."""
+        """Yield for each amount in a comparison the bound that satisfies the comparison while the other amounts stay the same."""
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
         for part in dict.fromkeys((*inside(condition.left), *inside(condition.right))):
@@ -235,7 +235,7 @@ class Subgoals:
                 yield part.situation, key, (f"{flipped}{amount_written(limit)}".lstrip("="),)
 
     def worth(self, condition: Comparison, env: Env) -> Number:
-        """Return the present difference between the sides of a comparison."""
+        """Return the present value of a comparison's left side minus its right side."""
         names = self._about(condition)[2]
         function = self._worths.get(id(condition))
         if function is None:
@@ -250,8 +250,8 @@ class Subgoals:
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Subgoal]:
         """Yield subgoals for other values of the symbols that determine a condition's variables.
 
-        With another value a witness only has to be possible (that room has a door, which is shut): its unmet conditions become
-        subgoals, too.
+        Only the static part of a witness must hold for such a value (the room has a door, which is shut); the unmet rest of the
+        witness becomes further subgoals.
         """
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
@@ -274,7 +274,7 @@ class Subgoals:
                         yield from self._lacking(achiever, condition, {**env, term: value}, level)
 
     def _possible(self, condition: Condition) -> Condition:
-        """Return the static part of a witness (the same object each time), or the condition itself if it has none."""
+        """Return a witness reduced to its static conditions, always the same object; return other conditions unchanged."""
         if not isinstance(condition, Witness) or condition.negated:
             return condition
         if id(condition) not in self._possibles:
@@ -284,9 +284,9 @@ class Subgoals:
         return self._possibles[id(condition)][0]
 
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
-        """Return whether a condition is static, whether it compares, its variables, and the condition.
+        """Return whether a condition is static, whether it compares individuals, its variables, and the condition itself.
 
-        The condition is returned so that its `id` isn't reused.
+        The cache keeps the condition so that its `id` isn't reused.
         """
         found = self._conditions.get(id(condition))
         if found is None:
@@ -306,9 +306,9 @@ class Subgoals:
         return found[0]
 
     def _would_hold(self, achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
-        """Return whether a condition would hold with another value for a variable.
+        """Return whether a condition would hold if the variable `term` had the given value.
 
-        A static condition is evaluated once, unless it compares individuals that no static fact distinguishes.
+        The result for a static condition is cached for symmetric individuals, unless the condition compares individuals.
         """
         static, compares, others, _ = self._about(condition)
         if not static:
@@ -322,7 +322,7 @@ class Subgoals:
         return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
-        """Return values of a class for a symbol: its goal value, and one value of each symmetry class, free ones first."""
+        """Return values of a class for a symbol: its goal value, and one value of each symmetry class, preferably a free value."""
         members = self.program.problem.classes.get(kind, ())
         if len(members) <= FEW:
             return members
@@ -343,12 +343,12 @@ class Subgoals:
         return tuple(found)
 
     def burden(self, situation: str, value: str) -> int:
-        """Return the availability of a value: least for values that no object holds, most for values held as a goal requires."""
+        """Return 0 for a value that no object has, 2 if an object has the value as its goal requires, otherwise 1."""
         keys = self.table.holders[situation].get(value, ())
         return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
 
     def spare(self, excluded: Collection[str], level: int, number: int) -> Iterator[str]:
-        """Yield further values of the same symmetry classes, least used first."""
+        """Yield up to `number` more values of each symmetry class that `excluded` contains, least used values first."""
         for situation in self.program.changing(level):
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
@@ -366,9 +366,9 @@ class Subgoals:
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
     def one_of_each(self, kind: str, excluded: Collection[str | None] = ()) -> list[str]:
-        """Return the individuals of a class; of many, one of each symmetry class and state.
+        """Return the individuals of a class; if the class is large, one individual of each symmetry class and state.
 
-        Of a symmetry class of an individual in `excluded`, one more is returned, since a different individual may be needed.
+        For each result in `excluded`, one more individual of its symmetry class is added, since a different one may be needed.
         """
         members, symmetry = self.program.problem.classes.get(kind, ()), self.program.symmetry
         if len(members) <= FEW:
@@ -386,7 +386,7 @@ class Subgoals:
         return None if None in found else key_of(found)  # type: ignore[arg-type]
 
     def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
-        """Return whether a condition of an achiever holds now; undetermined terms have no value."""
+        """Return whether a condition of an achiever holds now; terms that `env` doesn't bind have no value."""
         test, names = self._evaluator(achiever, condition, env, False)
         return bool(test(*[env.get(name) for name in names]))
 
@@ -399,7 +399,7 @@ class Subgoals:
     def _evaluator(
         self, achiever: Achiever, condition: Condition, env: Env, individuals: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
-        """Return the function that tests a condition, or yields the individuals of a witness, and its arguments."""
+        """Return a function that tests a condition, or lists the individuals of a witness, and the names of its arguments."""
         key = id(condition), individuals, *[name in env for name in self._about(condition)[2]]
         known = self._tests.get(key)
         if known is None:

@@ -51,7 +51,7 @@ class SymmetryClasses:
         self._named = frozenset(named)
         of = {s.name: s.arguments for s in problem.domain.situations.values()}
         self._whose = {name: problem.members(kinds[0]) for name, kinds in of.items() if len(kinds) == 1}
-        """The classes of individuals that have a situation type."""
+        """Maps each situation type with one argument to the individuals that can have it."""
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:
         """Return `members` grouped by symmetry class, in their order."""
@@ -64,9 +64,9 @@ class SymmetryClasses:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return members whose state differs from that of the known members of their class, one for each state.
+        """Return the known members, and for each symmetry class one more member in each state that no known member has.
 
-        Of a large group only the first and the last few are examined, since values are used up from one end.
+        In a large class only the first and last few members are examined, since values are used up from one end.
         """
         found = list(known)
         classes = {self.class_of.get(one) for one in known}
@@ -87,7 +87,7 @@ class SymmetryClasses:
         return found
 
     def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
-        """Return the values of an individual in the situation types that behaviours use."""
+        """Return the values of an individual, one for each mapping in `cells`; None for a value that no behaviour names."""
         values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 
@@ -99,10 +99,10 @@ def representatives(
     cursors: dict[int, int] | None = None,
     burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
-    """Return one value per class: the first that no object holds and no goal requires.
+    """Return one value per group: the first value that no object has and no goal requires.
 
-    Otherwise a few that no object holds; otherwise the value of least `burden`. With `cursors` (by the group's `id`) the search
-    for the first starts where the last one ended, so that a long group isn't scanned again.
+    If a group has no such value, a few values that no object has are returned; if there are none, the value of least `burden`.
+    With `cursors` (by the group's `id`), a search starts where the previous search ended, so a long group isn't scanned again.
 
 
 

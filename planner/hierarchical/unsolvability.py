@@ -1,7 +1,7 @@
 """Tests for unsolvability, run when a search gets stuck, cheapest first.
 
 All tests examine the lowest level only: a failure of an upper level proves nothing, since the level below may find other steps.
-A positive test stops the search; the proof is the certificate, which `confab.planner.solve` requires and checks.
+A positive test stops the search. Its proof is a certificate, which `confab.planner.solve` requires and checks.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 LOOKING = 1_800_000
-"""Work of examining all states that is allowed before any search, in states times relaxed operators."""
+"""Work that is always allowed for examining all states, in states times relaxed operators."""
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
-"""Maximum number of tests of conditions for a certificate: before a search, in the paper's mode, and after searches have failed."""
+"""Maximum number of conditions tested for a certificate: before a search, in the paper's mode, and after failed searches."""
 TEST = 8
 """Work of a test, in the unit of `Workspace.effort`."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
@@ -31,7 +31,7 @@ MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 
 
 def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
-    """Return the error that a problem has no plan, with a certificate, if at most `most` tests until a deadline show it."""
+    """Return an `UnsolvableError` with a certificate if at most `most` tests before a deadline prove that there is no plan."""
     if deadline is not None and perf_counter() >= deadline:
         return None
     from confab.planner.certificate_reasons import told
@@ -55,7 +55,7 @@ def closed(problem: Problem, level: int, deadline: float | None, initial: State 
 
 
 def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
-    """Return why a level must not be grounded, if it would need too much memory: an effect on a symbol touches all its values."""
+    """Return the reason if grounding a level would take too much memory: an effect makes one change per value of its symbol."""
     values = {}
     for name, situation in reached.situations.items():
         rows = len(reached.tables["situation", name])
@@ -97,7 +97,7 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
     """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of states examined.
 
-    The examination may cost as much as the searches so far. It is skipped unless these have doubled since `before`.
+    The work is limited to that of the searches so far. The examination is skipped unless it allows twice `before` states.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state

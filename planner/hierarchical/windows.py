@@ -1,4 +1,4 @@
-"""Windows: consecutive steps of a level are replaced by fewer, by searching windows of the plan in a small grounded level.
+"""Windows: consecutive steps of a level are replaced by fewer steps, which are searched on the grounded level.
 
 The preconditions of upper levels apply to the new steps, too (`confab.planner.hierarchical.inherited_preconditions`). The new
 steps are refined on the table and grouped under steps of the upper levels wherever a run has the effect of such a step.
@@ -25,14 +25,13 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""Maximum number of level-1 steps given up per primitive saved: level-1 steps explain the primitives."""
+"""Divisor for comparing saved primitives with lost level-1 steps: a plan may lose fewer than this number per saved primitive."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
-"""Maximum size of a level that is grounded to shorten a plan, in rows of a join, in total and per step: length against CPU
-time."""
+"""Maximum number of rows of a join when a level is grounded to shorten a plan: in total, and per step of the plan."""
 
 
 def windowed(call: Call, level: int, work: int) -> None:
-    """Replace steps of a level in a call's plan by fewer, if the plan gets shorter and violates no more conditions."""
+    """Replace steps of a level in a call's plan by fewer steps, unless the new plan violates more conditions of upper levels."""
     new = fewer(call, level, work)
     if new is None:
         return
@@ -42,7 +41,7 @@ def windowed(call: Call, level: int, work: int) -> None:
         if step is None:
             return
         other.steps.append(step)
-    if not all(map(other.met, other.goal)):  # goals that the level doesn't see
+    if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
         Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level):
@@ -54,7 +53,7 @@ def windowed(call: Call, level: int, work: int) -> None:
 
 
 def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
-    """Return fewer unrefined steps of a level than a call's plan has; None if none are found or the level is large."""
+    """Return a shorter sequence of unrefined steps of a level for a call's plan; None if none is found or the level is large."""
     steps = [part for step in call.steps for part in parts(step, level)]
     if any(step.level != level for step in steps):
         return None
@@ -84,7 +83,7 @@ def small(problem: Problem, level: int, deadline: float | None, most: int) -> Ta
 
 
 def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
-    """Return a plan of a level grouped under the upper levels, and ungrouped."""
+    """Return a plan of a level in two versions: grouped under steps of the upper levels, and ungrouped."""
     if level == problem.domain.levels[0]:
         return (plan,)
     from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -93,7 +92,7 @@ def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
 
 
 def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
-    """Return steps of a plan in the form that a call uses."""
+    """Convert steps of a plan to the `RefinedStep` of a call."""
     names = call.program.variables
     return [
         RefinedStep(

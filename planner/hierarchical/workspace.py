@@ -1,10 +1,10 @@
 """The state shared by all searches of one call: the table of current values, the behaviours bound to it, and the budget.
 
-table     the present values of all symbols; it is changed in place and undone
-forward   per behaviour, a function of its arguments that returns its changes, or None where it isn't applicable
-achieve   per behaviour and effect, a function of a symbol and a value that yields the arguments with which the effect gives it
-keep      a function of a symbol and its first value that returns its required final value, or None if any value is allowed
-budget    all searches are charged in one unit, about a microsecond: states times operators, or 100 for an expansion
+table:    the present values of all symbols; changes are made in place and can be undone
+forward:  for each behaviour, a function of its arguments that returns its changes, or None if the behaviour isn't applicable
+achieve:  for each effect, a function of a symbol and a value that yields the arguments with which the effect achieves the value
+keep:     a function of a symbol and its first value that returns the required final value, or None if any value is allowed
+budget:   one unit (about a microsecond) for all searches; a search of a scope costs states times operators, an expansion 100
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import FALSE
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
-"""Returns the required final value of a touched symbol, given its first one; None if any value is allowed."""
+"""Function that returns the required final value of a changed symbol, given its first value; None if any value is allowed."""
 EXPANSION = 100
 """The cost of an expansion in the unit of the budget."""
 
@@ -43,9 +43,9 @@ class Workspace:
     program : Program
     table : Table
     goal : mapping of cell to value
-        The task's goal, whose values are proposed for subgoals.
+        The task's goal; its values are proposed for subgoals.
     deadline : float, optional
-        The time at which `LimitError` is raised, on the clock of `perf_counter`; by default that of `confab.reasoner.limits`.
+        Time at which `LimitError` is raised, on the clock of `perf_counter`; by default the deadline of `confab.reasoner.limits`.
     most : int
         Maximum number of expansions of all searches together; more raise `LimitError`.
     most_work : float
@@ -66,7 +66,7 @@ class Workspace:
     def __post_init__(self) -> None:
         self.expanded = self.worked = self.checked_at = self.looked = 0
         self.most_looked = EXPANSION * self.most
-        """Maximum number of achievers that are examined, inapplicable ones included."""
+        """Maximum number of achievers that are examined, including inapplicable achievers."""
         if self.deadline is None:
             self.deadline = Limits().end()
         bound = self.program.bind(self.table)
@@ -93,7 +93,7 @@ class Workspace:
                 put(situation, key, value)
 
     def exists(self, situation: str, key: object) -> bool:
-        """Return whether a boolean symbol exists that isn't in the table."""
+        """Return True if a symbol without a value exists: its type is boolean and its arguments belong to the type's classes."""
         kind = self.program.domain.situations[situation]
         return kind.boolean and all(
             argument in self.program.members.get(of, ())
@@ -101,7 +101,7 @@ class Workspace:
         )
 
     def visible(self, level: int, cell: Cell) -> bool:
-        """Return whether a level sees a symbol: its situation type and its individuals exist there."""
+        """Return whether a level sees a symbol: its situation type and its individuals exist on that level."""
         levels = self.program.problem.value_levels
         return self.program.domain.situations[cell[0]].level <= level and (
             not levels or all(levels.get(argument, 1) <= level for argument in arguments_of(cell[1]))
@@ -110,32 +110,32 @@ class Workspace:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def refining(self, level: int, careful: bool = False) -> Keep:
-        """Return the values that the refinement of a step must keep: symbols that its level sees unchanged, others at rest.
+        """Return the required final values in a refinement: symbols that the level sees are unchanged, all others are at rest.
 
-        If `careful`, symbols without a rest value, which otherwise may have any value, are unchanged, too.
+        Other symbols without a rest value may have any final value; if `careful`, they are unchanged, too.
         """
         rest = self.rest
         return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
-        """Return the values that steps towards a goal must keep: the goals achieved before, and all other symbols at rest."""
+        """Return the required final values for steps towards a goal: achieved goals hold, all other symbols are at rest."""
         return lambda cell, first: kept.get(cell) or self.rest.get(cell[0])
 
     # ----------------------------------------------------------------------------------------------------------- the budget
 
     @property
     def effort(self) -> int:
-        """The search effort so far, about in microseconds."""
+        """Search effort so far, in units of about a microsecond."""
         return self.worked + EXPANSION * self.expanded
 
     def expand(self, level: int) -> None:
-        """Count an expansion; raise `LimitError` where a limit is reached."""
+        """Count an expansion; raise `LimitError` if a limit is reached."""
         self.counts[level].expanded += 1
         self.expanded += 1
         self._limited()
 
     def spend(self, level: int, counts: Counts, work: int) -> None:
-        """Charge a search of a scope, with its work in states times operators; raise `LimitError` where a limit is reached."""
+        """Charge the search of a scope, with its work in states times operators; raise `LimitError` if a limit is reached."""
         self.counts[level].add(counts)
         self.expanded += counts.expanded
         self.worked += work
@@ -144,7 +144,7 @@ class Workspace:
             raise LimitError(f"{self.most_work:.0f} states times operators")
 
     def look(self) -> None:
-        """Count an examined achiever; raise `LimitError` where a limit is reached."""
+        """Count an examined achiever; raise `LimitError` if a limit is reached."""
         self.looked += 1
         if self.looked > self.most_looked:
             raise LimitError(f"{self.most_looked:,} ways to achieve values")
