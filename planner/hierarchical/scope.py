@@ -127,7 +127,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
     met.update(dict.fromkeys(space.subgoals.spare(met, level, budget.spares)))
-    for individual in tuple(met):  # add the values of the individual, and objects that have it as value if there are few
+    for individual in tuple(met):  # add values of the individual, and objects with it as value if there are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
                 continue

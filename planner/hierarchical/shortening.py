@@ -156,7 +156,7 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Drop steps of a level that cancel out unless that violates more conditions of upper levels; return whether steps were dropped.
+    """Drop steps of a level that cancel out unless that violates more conditions of upper levels; return whether any were dropped.
 
     If dropping primitives removes steps of the most abstract level, or if more than half of these are lost, the number of
     primitives must decrease by the factor `KEPT`.

@@ -63,7 +63,7 @@ class Subgoals:
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[Condition, Condition]] = {}
         self._possibles: dict[int, tuple[Condition, Condition]] = {}
-        self._entered: dict[tuple[str, Key, bool], int] | None = None  # depth of nesting of each entered defined situation
+        self._entered: dict[tuple[str, Key, bool], int] | None = None  # depth of each entered situation
         self._depth = 0
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Subgoal]] = {}
