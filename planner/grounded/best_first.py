@@ -1,11 +1,11 @@
-"""Search of one level of a problem, or of any grounded task, without levels: two orders of one search loop take turns.
+"""Search of one level of a problem, or of any grounded task, without refinement: two search orders of one loop take turns.
 
-It plans imported domains that have only one level and scopes cut out of a world, and it is the last resort where refinement fails.
+This search plans domains of one level (such as imported ones) and scopes, and is the last resort when refinement fails.
 
-loop      `confab.planner.grounded.exploring`
-orders    by h_FF, with preferred operators and lookahead (`confab.planner.grounded.greedy`), which follows the needs of the goals;
-                    by novelty (`confab.planner.grounded.novelty`), which is fast and leaves plateaus of h
-shorter   shortens the plan found (`confab.planner.grounded.plan_windows`)
+loop:     `confab.planner.grounded.exploring`
+orders:   by h_FF, with preferred operators and lookahead (`confab.planner.grounded.greedy`), which is directed to the goals;
+          by novelty (`confab.planner.grounded.novelty`), which is fast and escapes plateaus of h
+shorter:  shortening of the plan (`confab.planner.grounded.plan_windows`)
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
 SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
-"""Operators examined to shorten a plan: in total, per step for at most `STEPS` steps, and as a share of the search's work."""
+"""The operators examined to shorten a plan: `SHORTEN`, plus `STEP` for each of the first `STEPS` steps, plus the work of the search
+divided by `SHORTENING`."""
 
 
 @dataclass(frozen=True)
 class Flat:
-    """The result of a search without levels: `plan`, operators of the task, if `status` is solved; and the work, in bits."""
+    """The result of a search of a task: if `status` is solved, `plan` contains the operators; `work` is counted in bits."""
 
     status: Status
     plan: tuple[int, ...] = ()
@@ -53,20 +54,20 @@ def plan_level(
     most_work: float = math.inf,
     most_rows: int | None = None,
 ) -> Outcome:
-    """Plan one level of a problem, the lowest if none is given.
+    """Plan one level of a problem, by default the lowest level.
 
     Parameters
     ----------
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        In place of the problem's own. By default symbols at rest in the initial state must be at rest in the end.
+        By default those of the problem; then symbols at rest in the initial state must be at rest in the end.
     limits : Limits
-        The time includes grounding.
+        Maximum number of expansions by h_FF, and seconds, including grounding.
     most_work : float
-        As for `search`.
+        Maximum work, in bits processed by relaxed plans.
     most_rows : int, optional
-        As for `ground`.
+        Maximum number of rows of one join when the level is grounded.
 
     Returns
     -------
@@ -102,14 +103,14 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan; a deadline can only end the
-    search early.
+    Work is counted, not timed, so the same limit of expansions always gives the same plan. A deadline can only end the search
+    early.
 
     Parameters
     ----------
     task : Task
     limits : Limits
-        The caller turns their seconds into a deadline.
+        Maximum number of expansions by h_FF; the seconds aren't used (see `deadline`).
     deadline : float, optional
         On the clock of `time.perf_counter`.
     found : function of a plan, optional
@@ -136,7 +137,7 @@ def search(
     greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
     going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
     spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
-    del novelty, greedy  # releases the states of an order that ran out of memory
+    del novelty, greedy  # so that an order that runs out of memory is released
     while True:
         order = min(going, key=spent.__getitem__)
         try:
@@ -163,6 +164,6 @@ def search(
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:
         found(plan)
-    with suppress(MemoryError):  # then the plan isn't shortened
+    with suppress(MemoryError):  # the plan stays as it is
         plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING, deadline)
     return Flat(Status.SOLVED, tuple(plan), None, counts, total)

@@ -1,12 +1,12 @@
 """Derived bits: disjunctions in conditions, and facts of defined situation types.
 
-part          bits that depend on each other, mostly a single one; parts are ordered by dependency
-alternatives  a bit is set if all bits of one of its alternatives are set; an opposite, if the one bit that it names isn't set
+part:          bits that depend on each other, usually one bit; a part comes after the parts that it depends on
+alternatives:  a bit is set if all bits of one alternative are set; an opposite bit is set if the bit that it negates isn't set
 
 After a change only the parts that depend on a changed bit are recalculated. A part of several bits is calculated from scratch
 by counting the missing bits of each alternative: Dowling and Gallier, Journal of Logic Programming 1 (1984). If a change affects
-more alternatives than arrays would process in the same time, all derived bits are calculated by arrays (examples: which places
-are reachable in a large map; the ferry becomes empty, so that every car may board).
+so much that arrays are faster, arrays calculate all derived bits (examples: which places are reachable in a large map; the ferry
+becomes empty, so every car may board).
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from functools import cached_property, partial
 from confab.planner.grounded.derived_arrays import Bit, by_arrays
 
 AT_ONCE, CALLS = 50, 60
-"""Number of alternatives that arrays process while Python processes one; and the cost of the calls for a layer, in alternatives."""
+"""Number of alternatives that arrays process while Python processes one; cost of the calls for a layer, in alternatives."""
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The derived bits of a task, in parts; each part follows those on which it depends."""
+    """The derived bits of a task, in parts; each part comes after the parts that it depends on."""
 
     parts: tuple[tuple[Bit, ...], ...] = ()
 
     @cached_property
     def mask(self) -> int:
-        """All derived bits."""
+        """Mask of all derived bits."""
         return sum(bit.mask for part in self.parts for bit in part)
 
     @cached_property
     def ways(self) -> Sequence[tuple[Sequence[int], int]]:
-        """The required bits and the resulting bit of each alternative, by number; opposites of bits cost nothing."""
+        """For each alternative, the numbers of the required bits and of the resulting bit; an opposite bit requires nothing."""
         return [
             ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
             for part in self.parts
@@ -46,12 +46,12 @@ class Derived:
 
     @cached_property
     def needed(self) -> int:
-        """All bits that some alternative requires."""
+        """Mask of the bits that alternatives require."""
         return _union(way for part in self.parts for bit in part for way in bit.alternatives)
 
     @cached_property
     def effort(self) -> int:
-        """Maximum number of alternatives examined after a change, except those of small parts of one bit."""
+        """Maximum number of alternatives examined after a change; without arrays, parts of one bit don't count."""
         return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 
     def completed(self, state: int) -> int:
@@ -63,7 +63,7 @@ class Derived:
         return state
 
     def after(self, state: int, before: int) -> int:
-        """Return a state with derived bits updated after changes of a complete state."""
+        """Return `state` with its derived bits updated, given the complete state `before` the changes."""
         users, woken = self._users, self._woken
         waiting: list[int] = []
         seen: set[int] = set()
@@ -89,7 +89,7 @@ class Derived:
             changed, state = new ^ state, new
 
     def fresh(self, state: int, bits: int) -> int:
-        """Return a state with some derived bits computed; the other ones may be those of another state."""
+        """Return a state with the derived bits in `bits` computed; other derived bits may be those of another state."""
         support = self._support(bits & self.mask)
         if len(support) > self._few:
             return self._by_arrays(state)
@@ -99,17 +99,17 @@ class Derived:
 
     @cached_property
     def _all(self) -> int:
-        """The alternatives of all bits."""
+        """Number of alternatives of all bits."""
         return sum(map(_ways, self.parts))
 
     @cached_property
     def _few(self) -> int:
-        """Maximum number of alternatives that are faster one by one than all of them by arrays."""
+        """Maximum number of alternatives that are faster to examine one by one than to process all of them by arrays."""
         return self._all // AT_ONCE + CALLS * len(self._layers)
 
     @cached_property
     def _layers(self) -> Sequence[Sequence[Bit]]:
-        """The bits, by the number of parts below theirs."""
+        """The bits in layers; a bit depends only on bits of earlier layers and of its own part."""
         height: dict[int, int] = {}  # by bit
         found: list[list[Bit]] = []
         for part in self.parts:
@@ -137,7 +137,7 @@ class Derived:
         return {}
 
     def _support(self, bits: int) -> Sequence[int]:
-        """Return the parts on which some bits depend, in order."""
+        """Return the numbers of the parts that the given bits depend on, in order."""
         known = self._supports.get(bits)
         if known is None:
             found: set[int] = set()
@@ -160,7 +160,7 @@ class Derived:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
     def within(self, state: int, changing: int, wanted: int) -> Derived:
-        """Return the derivation of some bits, simplified for states that differ from a given one only in the bits `changing`."""
+        """Return the derivation of the bits `wanted`, simplified for states that differ from `state` only in `changing`."""
         parts = []
         for number in self._support(wanted & self.mask):
             part = self.parts[number]
@@ -177,7 +177,7 @@ class Derived:
         return Derived(tuple(tuple(map(left, part)) for part in parts))
 
     def renamed(self, small: Callable[[int], int]) -> Derived:
-        """Return the same condition over other bits."""
+        """Return the same derivation with every mask converted by `small`."""
         return Derived(
             tuple(
                 tuple(Bit(small(bit.mask), tuple(map(small, bit.alternatives)), bit.opposite) for bit in part)
@@ -187,7 +187,7 @@ class Derived:
 
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
-        """For each required bit, the parts that require it, except its own: for a part of one bit, that bit and its sign."""
+        """For each required bit, the other parts that require it, as number, mask and sign; the mask is 0 for several bits."""
         found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)
@@ -202,7 +202,7 @@ class Derived:
 
     @cached_property
     def _woken(self) -> Mapping[int, int]:
-        """For each required bit, the alternatives of the parts that require it."""
+        """For each required bit, the number of alternatives in the parts that require it."""
         ways = [_ways(part) for part in self.parts]
         return {low: sum(ways[number] for number, _, _ in users) for low, users in self._users.items()}
 
@@ -238,14 +238,14 @@ def _alone(bit: Bit, state: int) -> int:
 
 def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
     own = sum(bit.mask for bit in part)
-    ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # by what they need of other parts
+    ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # by their required bits of other parts
     for bit in part:
         for way in bit.alternatives:
             ways[way & ~own].append((tuple(_single(way & own)), bit.mask))
 
     def work(state: int) -> int:
         state &= ~own
-        lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: missing bits, by alternative
+        lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit: [missing bits, result] of alternatives
         waiting: list[int] = []
         for outside, of_these in ways.items():
             if state & outside == outside:
@@ -271,9 +271,9 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return bits, by number, in parts that depend on each other, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
+    """Return derived bits in parts that depend on each other, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
 
-    An alternative of a bit that requires the bit itself is dropped: with it, a part of one bit would stay set once it was set.
+    An alternative that requires its own bit is dropped; otherwise a part of one bit would stay set once the bit is set.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}

@@ -13,18 +13,18 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
 
 
 class FactBits:
-    """The numbers of facts and symbols.
+    """The numbers of a level's facts (their bits) and symbols.
 
     Attributes
     ----------
     fact_bit : mapping of situation type to array
-        The bit of each row of its table, -1 if the fact never changes.
+        For each row of the situation type's table, the bit of the fact, or -1 if the fact never changes.
     facts : list of Fact
         The fact of each bit.
     constants : mapping of Symbol to value
         The symbols that never change.
     symbol_of : mapping of situation type to array
-        The number of the symbol of each row of its table.
+        For each row of the situation type's table, the number of the symbol.
     symbols : int
         The number of symbols.
     """
@@ -73,7 +73,7 @@ class FactBits:
         amounts = reached.amounts
         self.constants |= {symbol: amounts.text(symbol) for symbol in amounts.now if symbol not in amounts.place}
         size = len(self.facts)
-        for name in sorted(reached.defined):  # after all stated facts
+        for name in sorted(reached.defined):  # their bits follow the bits of stated facts
             table = reached.tables["situation", name]
             self.fact_bit[name] = np.arange(size, size + len(table))
             rows = (tuple(names[i] for i in row) for row in table.rows.tolist())

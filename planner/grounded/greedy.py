@@ -1,11 +1,11 @@
 """The order by h_FF: successors of the state with the least h first, with preferred operators and lookahead.
 
-open list   states with their untried operators, by h: one queue with all applicable operators, one with those of the relaxed
-                        plan
-least       a new least h gives the preferred operators turns in advance and starts a lookahead
+open list:  two queues of states by h, with operators that haven't been tried: one with all applicable operators, one with the
+            preferred operators, which are in the relaxed plan
+least:      when a state has a smaller h than all states before, preferred operators get extra turns and a lookahead starts
 
-A state is evaluated when it is reached and its operators are applied one by one: Richter and Helmert, "Preferred operators and
-deferred evaluation in satisficing planning", ICAPS 2009.
+A state is evaluated when it is reached, and its operators are applied one at a time: Richter and Helmert, "Preferred operators
+and deferred evaluation in satisficing planning", ICAPS 2009.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 BOOST = 1000
-"""Number of turns given to the preferred operators after a new least h."""
+"""Number of extra turns for the preferred operators after a new least h."""
 ALL, PREFERRED = 0, 1
 
 Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
@@ -27,7 +27,7 @@ Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
 
 
 class Greedy:
-    """The order by h of a task; `counts` is updated."""
+    """The search order by h_FF for a task; `counts` is updated."""
 
     def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
         self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts
@@ -39,7 +39,7 @@ class Greedy:
         self.best: int | None = None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield the results of lookaheads, and of operators in the states with the least h."""
+        """Yield states reached by lookaheads, and states reached by one operator from the state with the least h."""
         while self.best is None:
             if self.ahead is not None:
                 candidate, self.ahead = self.ahead, None

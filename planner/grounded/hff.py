@@ -1,10 +1,10 @@
 """The relaxed-plan heuristic h_FF, which also yields the applicable and the preferred operators.
 
-layer      bits that are reached together; a relaxed operator is reached with the last of its required bits
-cost       of a bit: the repetitions of the cheapest operator that sets it plus the costs of that operator's required bits
-repeated   an operator that moves an amount towards a comparison counts as often as the comparison needs it: the difference
-                      divided by the operator's change; once where that change depends on the state
-plan       the supporters of the goal; those of the first layer are applicable
+layer:     bits that are reached at the same time; a relaxed operator is reached when its last required bit is reached
+cost:      of a bit: the repetitions of the cheapest operator that sets the bit, plus the costs of that operator's required bits
+repeated:  an operator that changes an amount until a comparison holds; it counts as often as it must be applied (the difference
+           divided by the operator's change), or once if the change depends on the state
+plan:      the supporters of the goal; supporters in the first layer are applicable
 
 A goal that is unreachable in the relaxed task is unreachable.
 
@@ -25,13 +25,13 @@ from confab.planner.grounded.amounts import Exact, Linear, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
-"""Maximum number of repetitions that count, enough to distinguish distances."""
+"""Maximum number of repetitions of an operator that are counted."""
 AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
-"""A difference, its required sign, and how far an operator moves it; None if that depends on the state."""
+"""A difference, its required sign, and the change of the difference by an operator (None if the change depends on the state)."""
 
 
 class Evaluation(NamedTuple):
-    """h of a state, its relaxed plan by layers, the applicable operators, and the work of finding these, in bits."""
+    """The evaluation of a state: h, a relaxed plan in the order of layers, the applicable operators, and the work in bits."""
 
     h: int
     plan: list[int]
@@ -40,7 +40,7 @@ class Evaluation(NamedTuple):
 
 
 Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
-"""Maps a state to its evaluation; None if the goal isn't reachable from it."""
+"""Maps a state to its evaluation; None if the goal isn't reachable from the state."""
 
 
 def heuristic(task: Task) -> Evaluate:
@@ -61,7 +61,7 @@ def heuristic(task: Task) -> Evaluate:
     of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
     def counted(state: int) -> tuple[list[int], set[int]]:
-        """Return the number of repetitions of each relaxed operator, and the operators that never help."""
+        """Return the number of repetitions of each relaxed operator, and the operators that can't make their comparison true."""
         times, useless = once[:], set[int]()
         if amounts is not None:
             vector = amounts.vector(state)
@@ -135,9 +135,9 @@ def heuristic(task: Task) -> Evaluate:
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:
-    """Return the required and added bits of the relaxed operators, their owners, and by how far they move amounts.
+    """Return the required and added bits of the relaxed operators, their owners, and the relaxed operators of each `AmountPush`.
 
-    An operator that moves amounts towards a comparison is a separate relaxed operator.
+    For each comparison that an operator may make true, there is a separate relaxed operator.
     """
     needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
     repeated = defaultdict[AmountPush, list[int]](list)
@@ -156,7 +156,7 @@ def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], d
 
 
 def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
-    """Return how far a relaxed operator moves a difference; None if that depends on the state."""
+    """Return the change of a difference by a relaxed operator; None if the change depends on the state."""
     amounts, owner = task.amounts, task.owners[relaxed]
     assert amounts is not None
     own = sum(1 << bit for bit in task.needs[relaxed])

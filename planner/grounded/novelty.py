@@ -1,11 +1,12 @@
-"""The order by novelty: states first that have a fact which no earlier state had at the same distance from the goal.
+"""The order by novelty: states first that have a fact that no earlier state at the same distance from the goal had.
 
-open        goals that don't hold, and landmarks that haven't been met yet
-distance    the open goals and landmarks, and the number of facts met of the relaxed plan made when the last of these was met
-novel       a fact is new among the states of the same distance: one "and" of two integers
-open list   states by novelty, then by the number of open goals and landmarks; among equals the last comes first
+open:       goals that don't hold, and landmarks that haven't been reached
+distance:   a pair: the number of open goals and landmarks, and the number of facts of the last relaxed plan that have been reached;
+            a relaxed plan is made after a goal or landmark has been reached
+novel:      a state is novel if no earlier state of the same distance had one of its facts (tested by an "and" of two integers)
+open list:  states by novelty, then by the number of open goals and landmarks; among equal states the newest comes first
 
-Relaxed plans are made only for expanded states that meet an open goal or landmark, so that the order ranks a hundred thousand
+Since relaxed plans are made only for expanded states that reach an open goal or landmark, the order ranks a hundred thousand
 states a second. No state is dropped: if the open list is exhausted, there is no plan.
 
 Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
@@ -24,11 +25,14 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 CHILD, VISIT = 20, 2
-"""Number of bits that h_FF processes in the time of making one successor, and of visiting a tree node."""
+"""Number of bits that h_FF processes in the time that making a successor takes, and that visiting a tree node takes."""
 
 
 class Progress(NamedTuple):
-    """The progress of a state: open goals, landmarks ahead, facts of its relaxed plan (-1: not made yet), and facts met."""
+    """The progress of a state: number of open goals and landmarks, landmarks ahead, facts of the relaxed plan, and reached facts.
+
+    `wanted`, the facts of the relaxed plan, is -1 until the plan is made.
+    """
 
     state: int
     open: int
@@ -38,7 +42,7 @@ class Progress(NamedTuple):
 
 
 class Novelty:
-    """The order by novelty of a task; a relaxed plan costs `relaxing` bits; `marks` are landmarks; `counts` is updated."""
+    """The search order by novelty for a task. `marks` are landmarks; a relaxed plan costs `relaxing` bits; `counts` is updated."""
 
     def __init__(self, task: Task, evaluate: Evaluate, relaxing: int, marks: int, counts: Counts) -> None:
         self.task, self.evaluate, self.counts = task, evaluate, counts
@@ -46,8 +50,8 @@ class Novelty:
         self.work, self.turn, self.bytes = 0, relaxing, 0
         self.open = OpenList[Progress]()
         self.best: int | None = None
-        above = -1 << task.size if task.amounts else 0  # the number of the amounts is no fact
-        self.known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # facts met, by distance
+        above = -1 << task.size if task.amounts else 0  # bits above the facts, for amounts
+        self.known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # reached facts, by distance
         self.begin = Progress(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
 
     def candidates(self) -> Iterator[Candidate]:
@@ -106,7 +110,7 @@ class Novelty:
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
-    """Return the bits of a state that an operator keeps, and the bits that it sets; None if that depends on the state."""
+    """Return the bits that an operator keeps, and the bits that it sets; None if these depend on the state."""
     changes = task.changes_of(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None

@@ -1,8 +1,8 @@
-"""Behaviours in the form in which they are joined: a conjunction of atoms, filters, and conditions that depend on the state.
+"""Behaviours prepared for joins: conjunctions of atoms, filters, and other conditions that depend on the state.
 
-Atom        a condition that a row of a table must match: a positive value or relation, a class
-filter      a condition that static facts decide once its variables are bound
-residue     the other conditions: negated values, disjunctions, "no object such that"
+Atom:       a condition that rows of a table match: a positive value condition or relation condition, a class condition
+filter:     a condition that static facts decide once its variables are bound
+residue:    all other conditions: negated values, disjunctions, "no object such that"
 
 A positive `Witness` becomes a separate variable. Variables that no atom binds are local to the condition in which they occur.
 
@@ -49,8 +49,8 @@ class Atom:
 class Schema:
     """A behaviour, or one of its conditional effects, as a join.
 
-    `terms` identify an operator; other variables are joined over and dropped. A conditional effect has the terms of its
-    behaviour first. `effects` and `amounts` are pairs of position and effect, in order of execution.
+    `terms` identify an operator; other variables are used in the join, then dropped. The terms of a conditional effect begin with
+    the terms of its behaviour. `effects` and `amounts` are pairs of position and effect, in order of execution.
 
     """
 
@@ -67,10 +67,10 @@ class Schema:
 
 
 def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[list[Behavior], dict[str, SituationType]]:
-    """Return rules as behaviours in which a witness is joined with nothing else, with the auxiliary situation types for that.
+    """Return rules with an auxiliary rule for each witness, so that witnesses are joined separately; and auxiliary situation types.
 
-    Joining "there is a full cup, and there is a free shelf" at once would give all pairs. So a rule's witness becomes an auxiliary
-    situation type over the terms that it shares with the rest, unless no other condition of the rule can change.
+    Joining "there is a full cup, and there is a free shelf" at once would give all pairs. So a witness becomes an auxiliary
+    situation type over the terms that it shares with other conditions, unless no other condition of the rule can change.
     """
     found: list[Behavior] = []
     made: dict[str, SituationType] = {}
@@ -127,13 +127,13 @@ def schemas(
     behavior : Behavior
     situations : mapping of name to SituationType
     changed : set of situation types
-        The situation types that some behaviour of the level changes; the others are static there.
+        The situation types that some behaviour of the level changes; all others are static on the level.
     members : function of a class to its individuals
 
     Raises
     ------
     DomainError
-        Nothing determines a variable that an effect or a negated condition names.
+        No condition determines a variable that an effect or a negated condition names.
     """
     kinds = dict(behavior.kinds)
     parameters = tuple(parameter.name for parameter in behavior.parameters)
@@ -235,7 +235,7 @@ class _Compiler:
         kinds: dict[str, str],
         fresh: Iterator[int],
     ) -> Iterator[Condition]:
-        """Yield the conjuncts of a group, its own variables renamed."""
+        """Yield the conjuncts of a group, with unique names for the variables that only the group uses."""
         own = {name: kinds[name] for name in sorted(plain_variables(group) - shared - witness.keys())} | {**witness}
         names = {name: f"?{next(fresh)}{name[1:]}" for name in own}
         kinds |= {names[name]: kind for name, kind in own.items()}
@@ -243,7 +243,7 @@ class _Compiler:
         yield from self._flat([substituted(c, names) for c in group], shared | set(names.values()), kinds, fresh)
 
     def _plain(self, condition: ValueCondition, kinds: Mapping[str, str]) -> Iterator[Condition]:
-        """Yield a condition on a boolean symbol as a condition that it is true, and one that it exists."""
+        """Yield a condition on a boolean symbol as conditions that the symbol is true or not true, and that it exists."""
         situation = self.situations[condition.situation]
         if not situation.boolean or condition.value == TRUE:
             yield condition
@@ -273,7 +273,7 @@ class _Compiler:
                 yield Atom(("relation", relation), arguments)
             case ClassCondition(term, kind, False):
                 yield Atom(("class", kind), (term,))
-            case _:  # is evaluated row by row
+            case _:  # other conditions are evaluated row by row
                 pass
 
     def _fluent(self, condition: Condition) -> bool:
@@ -281,8 +281,5 @@ class _Compiler:
 
 
 def plain_variables(group: Sequence[Condition]) -> set[str]:
-    """Return the variables of a group that are bound outside or that it determines.
-
-    Variables inside nested conditions don't count.
-    """
+    """Return the variables of a group's conditions, except variables inside nested witnesses and disjunctions."""
     return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

@@ -1,9 +1,10 @@
 """Proof of unsolvability by shortage: a sum of amounts that no operator increases is less than the goal requires.
 
-The sum covers the amounts of a situation type, over all its symbols or for one, and the facts that consumed some of them. A fact
-counts as the least amount consumed by any operator that sets it (divided among the facts set together). An operator that returns
-an amount (returning a lent book frees its place) doesn't increase the sum if it also clears facts of at least that worth. The
-requirement is the worth of the facts in the goal plus the amount that must remain, by the goal or by the bounds.
+The sum has two kinds of terms: amounts of a situation type (of all symbols or of one symbol), and facts set by operators that
+consume such amounts. The worth of a fact is the least amount that an operator consumes to set it (divided among the facts that
+the operator sets together). An operator that returns an amount (returning a lent book frees its place) doesn't increase the sum
+if it also clears facts of at least that worth. The goal requires the worth of its facts, plus the amount that must remain
+because of the goal or the bounds.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class _Sums:
     moves: Mapping[int, Sequence[Move]]
 
     def short(self) -> Reason | None:
-        """Return the reason if some sum can't reach the goal."""
+        """Return the reason if some sum is less than the goal requires."""
         places = defaultdict[str, list[int]](list)
         for place, symbol in enumerate(self.amounts.symbols):
             places[symbol.situation].append(place)
@@ -66,7 +67,7 @@ class _Sums:
         return None
 
     def wanted_of(self, places: Sequence[int], left: Fraction) -> Reason | None:
-        """Return the reason if some amounts together can't reach what the goals consume and require."""
+        """Return the reason if the sum over the amounts at `places` is less than the goal requires; `left` is what must remain."""
         touched = {o for place in places for o, _ in self.of[place]}
         most = {o: _change(self.moves[o], places) for o in touched}
         used = {o: -change for o, change in most.items() if change is not None and change < 0}
@@ -109,7 +110,7 @@ class _Sums:
         return found
 
     def counted(self, used: Mapping[int, Exact]) -> Iterator[Set[int]]:
-        """Yield sets of bits that may stand for consumed amounts: open goals; the facts of one situation type."""
+        """Yield sets of facts that may count as consumed amounts: the open goals, then the facts of each situation type."""
         task = self.task
         yield {bit for bit in bits_of(task.goal & ~task.initial) if not self.amounts.compared >> bit & 1}
         kinds = {task.facts[bit].symbol.situation for o in used for bit in self.sets[o] if bit < len(task.facts)}
@@ -134,7 +135,7 @@ class _Sums:
         return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))
 
     def least(self, worth: Mapping[int, Fraction]) -> Fraction:
-        """Return the least worth that the goals require; bits that can serve two goals count once."""
+        """Return the least worth of the facts that the goals require; a fact that can satisfy two goals counts once."""
         least, serving = dict(worth), {bit: 1 << bit for bit in worth}
         for part in self.task.derived.parts:
             for one in part if len(part) == 1 and not part[0].opposite else ():
@@ -166,7 +167,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """The amount and the bound of each bit that is a lower bound on one amount."""
+        """Maps the bit of each lower bound on a single amount to the amount's place and the bound."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()
@@ -174,12 +175,12 @@ class _Sums:
         }
 
     def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
-        """Return the greatest lower bound that the comparisons among some bits set on an amount."""
+        """Return the greatest lower bound on an amount among the comparisons in `bits`; None if there is none."""
         found = (self.limits[bit] for bit in bits if bit in self.limits)
         return max((wanted for of, wanted in found if of == place), default=None)
 
     def kept(self, place: int) -> Fraction | None:
-        """Return the part of an amount that no operator consumes, since each requires more than it consumes."""
+        """Return the part of an amount that no operator can consume, since each requires more than it consumes; None if unknown."""
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:
             if move.operation == "increase" and move.by is not None and not move.by.terms and move.by.constant >= 0:
@@ -191,7 +192,7 @@ class _Sums:
         return least
 
     def left(self, place: int) -> Fraction | None:
-        """Return the least amount left in any goal state; None if unbounded."""
+        """Return a lower bound on the amount that is left in any goal state; None if there is no bound."""
         wanted = self.asked(bits_of(self.task.goal), place)
         found = (self.amounts.quantities[place].least, self.kept(place), wanted)
         floor = [limit for limit in found if limit is not None]
@@ -201,7 +202,7 @@ class _Sums:
 def _extent(
     amounts: Amounts, place: int, vector: Vector, moves: Mapping[int, Sequence[Move]]
 ) -> tuple[Fraction | None, Fraction | None]:
-    """Return the bounds of an amount over all operators; None for no bound."""
+    """Return the minimum and maximum that an amount can reach by the operators; None for no limit."""
     low: Fraction | None = Fraction(vector[place])
     high: Fraction | None = Fraction(vector[place])
     for move in (move for its in moves.values() for move in its if move.place == place):
@@ -223,7 +224,7 @@ def _extent(
 def _change(moves: Sequence[Move], places: Sequence[int]) -> Exact | None:
     """Return the maximum by which an operator increases a sum: conditional increases count, conditional decreases don't.
 
-    Return None where it depends on the state.
+    Return None if the increase depends on the state.
     """
     total: Exact = 0
     for move in moves:

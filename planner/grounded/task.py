@@ -3,8 +3,8 @@
 ==============================  =================================================================
 in `confab.reasoner.symbols`           here
 ==============================  =================================================================
-`Fact`                          a bit; none if it is always true or never reachable
-a fact that must not hold       a separate bit, its complement, if a condition requires it
+`Fact`                          a bit, unless the fact is always true or never reachable
+a fact that must not hold       a complement bit, if a condition requires that
 `AnyOf`, a negated `Witness`    a derived bit, unless static facts decide it
 `Behavior` with all its terms   an operator
 conditional effect              a change of an operator, and a separate relaxed operator
@@ -75,23 +75,23 @@ class Task:
     complements : mapping of bit to Fact
         The bits that represent the negation of a fact.
     size : int
-        Number of bits: facts, their complements, derived ones.
+        Number of bits: facts, complements and derived bits.
     initial, goal : int
-        A state; the required bits.
+        The initial state; the mask of the bits that the goal requires.
     constants : mapping of Symbol to value
         The symbols that no operator changes.
     costs : list of float
-        Per operator; the minimum cost if the cost depends on amounts.
+        The cost of each operator; its minimum if the cost depends on amounts.
     owners : list of int
-        Per relaxed operator, the operator that it represents as a whole or by a conditional effect.
+        For each relaxed operator, the operator that it is made from; -1 for an alternative of a derived bit.
     needs, adds : Grouped
-        Per relaxed operator, the bits that it requires and those that it may set.
+        For each relaxed operator, the bits that it requires, and the bits that it may set.
     derived : Derived
-        The bits that are derived from others.
+        The bits that are derived from other bits.
     change : function of an operator
-        Returns its precondition and its changes, in order of execution.
+        Returns the operator's precondition and changes, in order of execution.
     describe : function of an operator
-        Returns its behaviour, arguments and bindings.
+        Returns the operator's behaviour, arguments and bindings.
     amounts : Amounts, optional
         Present if some operator changes amounts.
     prices : mapping of operator to Linear
@@ -140,9 +140,9 @@ class Task:
         return total
 
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
-        """Return the state after an operator, or None where it isn't applicable.
+        """Return the state after an operator, or None if the operator isn't applicable.
 
-        Derived bits are updated only if `follow`.
+        Derived bits are updated only if `follow` is true.
         """
         precondition, changes = self._changes.get(operator) or self.changes_of(operator)
         if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
@@ -159,9 +159,9 @@ class Task:
         return self.derived.after(after, state) if follow and self.derived.parts else after
 
     def carried_out(self, state: int, plan: Sequence[int]) -> tuple[int, list[int]]:
-        """Return the state after executing each operator of a plan if it is applicable in its turn, and the executed operators.
+        """Execute the operators of a plan, skipping inapplicable ones; return the final state and the executed operators.
 
-        In between, only the derived bits that an operator requires are calculated.
+        Before each operator, only the derived bits that the operator requires are calculated.
         """
         follow = bool(self.barred) or not self.derived.parts  # barred pairs contain complete states
         kept = []
@@ -197,7 +197,7 @@ class Task:
         return known
 
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
-        """Return the operators of behaviours with arguments, executed in sequence; None if one isn't applicable."""
+        """Return the operators of `steps` (behaviours with arguments), executed in sequence; None if a step isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
         for operator in range(len(self)):
             step = self.describe(operator)[:2]
@@ -236,7 +236,7 @@ class Task:
 
 
 def bits_of(mask: int) -> list[int]:
-    """Return the bits that are set.
+    """Return the numbers of the bits that are set in a mask.
 
     >>> bits_of(0b1010)
     [1, 3]
