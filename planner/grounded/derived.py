@@ -5,8 +5,8 @@ alternatives:  a bit is set if all bits of one alternative are set; an opposite 
 
 After a change only the parts that depend on a changed bit are recalculated. A part of several bits is calculated from scratch
 by counting the missing bits of each alternative: Dowling and Gallier, Journal of Logic Programming 1 (1984). If a change affects
-so much that arrays are faster, arrays calculate all derived bits (examples: which places are reachable in a large map; the ferry
-becomes empty, so every car may board).
+more alternatives than arrays process in the same time, arrays calculate all derived bits (examples: which places are reachable in
+a large map; the ferry becomes empty, so every car may board).
 """
 
 from __future__ import annotations
