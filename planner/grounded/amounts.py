@@ -1,8 +1,8 @@
-"""Amounts of a grounded level: above its bits, a state contains the number of a tuple of amounts.
+"""Amounts of a grounded level: above the bits of its facts, a state contains the number of a tuple of amounts.
 
 A ground comparison is a bit derived from the tuple. So an operator's conditions, the goal, and all functions that read bits are
-the same with and without amounts. Which comparisons an operator may make true follows from how far it moves each of them, where
-that is the same in every state (`Push`).
+the same with and without amounts. An operator may make a comparison true if it changes the difference of both sides in the right
+direction (`Push`), or if the change depends on the state.
 
 Comparisons are linear: sums of amounts times constants. Numbers are exact; whole numbers are Python integers, which are fast.
 """
@@ -33,7 +33,7 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 Exact: TypeAlias = "int | Fraction"
 Vector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
-"""How far an operator moves the amount of a comparison; None if that depends on the state."""
+"""The change that an operator makes to the difference of a comparison; None if the change depends on the state."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ class Linear:
 
 @dataclass(frozen=True)
 class Move:
-    """One change of an amount: the operation, its amount (None: undefined), and the bits under which it happens.
+    """One change of an amount: the operation, its operand `by` (None: undefined), and the bits `when` that it requires.
 
-    Changes with the same `position` are alternatives in which the condition of one effect holds; the first one applies.
+    Changes with the same `position` are alternatives of one effect; only the first change whose bits are set is made.
     """
 
     position: int
@@ -93,7 +93,7 @@ class Move:
 
 
 class AmountTable:
-    """The amounts of a level during grounding: changing amounts get positions, comparisons of them get bits.
+    """The amounts of a level during grounding: each changing amount gets a place in the tuple, each comparison gets a bit.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class AmountTable:
     ) -> tuple[tuple[int, ...] | None, ...]:
         """Return the alternatives under which a comparison holds (negated: doesn't hold), each as literals.
 
-        `fresh` returns the next free bit. Bits state that a difference is at least zero, more than zero, or zero.
+        `fresh` returns the next free bit. Each bit states that a difference is at least zero, more than zero, or zero.
         """
         if left is None or right is None:
             return ((),) if negated else (None,)
@@ -188,7 +188,7 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return whether a comparison is always true, or never, for all values of its amounts; None if that depends on them."""
+        """Return True or False if a comparison is always or never true within the bounds of its amounts; otherwise None."""
         least, most = difference.bounds(self.quantities)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
@@ -197,7 +197,7 @@ class AmountTable:
         return None
 
     def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
-        """Return the alternatives for a comparison's bit not to be set; None if the bit is no comparison's."""
+        """Return the alternatives under which the bit of a comparison isn't set; None if the bit belongs to no comparison."""
         for (difference, sign), its in self.bits.items():
             if its == bit:
                 return list(self.comparison(difference, sign, Linear((), 0), True, fresh))
@@ -211,17 +211,17 @@ class Amounts:
     Parameters
     ----------
     symbols : sequence of Symbol
-        What the places of a tuple stand for.
+        The symbol of each place of a tuple.
     first : tuple of numbers
-        In the initial state.
+        The tuple of the initial state.
     quantities : sequence of Quantity
-        What each of them can be.
+        The bounds of the amount at each place.
     bits : mapping of (difference, sign) to bit
-        The bit is set where the difference is ``>=``, ``>`` or ``=`` 0.
+        The bit is set if the difference is ``>=``, ``>`` or ``=`` 0.
     size : int
-        Number of bits below the number of a tuple.
+        Number of bits of a state below the number of its tuple.
     moves : function of an operator
-        To the changes that it makes.
+        Returns the changes of amounts that the operator makes.
     """
 
     symbols: Sequence[Symbol]
@@ -236,14 +236,14 @@ class Amounts:
     _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Begin with the initial tuple."""
+        """Give number 0 to the initial tuple."""
         self.compared = sum(1 << bit for bit in self.bits.values())
         self.keep = ~self.compared & (1 << self.size) - 1
         self.numbered(self.first, 0, range(len(self.symbols)))
 
     @cached_property
     def at(self) -> Mapping[int, Sequence[tuple[int, Linear, str]]]:
-        """For each position the comparisons in which it occurs."""
+        """Maps each place to the comparisons that contain its amount."""
         found = defaultdict[int, list[tuple[int, Linear, str]]](list)
         for (difference, sign), bit in self.bits.items():
             for place, _ in difference.terms:
@@ -251,7 +251,7 @@ class Amounts:
         return found
 
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
-        """Return the number of a tuple; for a new tuple, its bits are derived from another one by the differences."""
+        """Return the number of a tuple; for a new tuple, store `mask` (another tuple's bits), updated at the `changed` places."""
         number = self._number.get(vector)
         if number is None:
             for place in changed:
@@ -280,7 +280,7 @@ class Amounts:
         return moves
 
     def applied(self, before: int, after: int, operator: int) -> int | None:
-        """Return a state with its amounts changed by an operator; None if an amount can't have its new value."""
+        """Return a state with the amounts changed by an operator; None if a new value is undefined or out of bounds."""
         moves = self.made(operator)
         if not moves:
             return after
@@ -320,7 +320,7 @@ class Amounts:
 
 
 def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
-    """Return the value of a difference after changes that assign a number to each of its amounts; None unless they do."""
+    """Return the value of a difference after changes that assign constants to all its amounts; None if one isn't assigned."""
     given = {
         move.place: move.by.constant
         for move in moves
@@ -332,7 +332,7 @@ def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
 
 
 def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
-    """Return how far some changes move a difference: False if they don't, None if that depends on the state."""
+    """Return the total change of a difference by `moves`: False if no move changes it, None if the total depends on the state."""
     factors = dict(difference.terms)
     concerned = [move for move in moves if move.place in factors]
     if not concerned:

@@ -1,4 +1,4 @@
-"""All derived bits of a task calculated together: in layers, each by arrays over all its alternatives."""
+"""Calculation of all derived bits of a state, layer by layer, by arrays over the alternatives of each layer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Bit:
-    """A bit, as a mask, that is set where a state has all bits of one of the masks; `opposite`: where it has none of them."""
+    """A derived bit, as a mask: set if a state has all bits of one of the `alternatives`; if `opposite`, if it has all of none."""
 
     mask: int
     alternatives: tuple[int, ...]
@@ -27,7 +27,7 @@ class Bit:
 
 
 def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
-    """Return a function that computes all bits of some layers; a layer depends on earlier ones only."""
+    """Return a function that computes all bits of some layers; a layer depends only on earlier layers and on itself."""
     bits = list(chain(*layers))
     own = reduce(or_, (bit.mask for bit in bits))
     size = reduce(or_, (way for bit in bits for way in bit.alternatives), own).bit_length()
@@ -47,7 +47,7 @@ def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """The alternatives of a layer: required bits of earlier layers and of this one in columns, resulting bits, and opposites."""
+    """The alternatives of a layer: columns of required bits of earlier layers and of this layer, resulting bits, and opposites."""
 
     before: Sequence[Ints]
     inside: Sequence[Ints]
@@ -85,7 +85,7 @@ class _Layer:
 
 
 def _columns(masks: Sequence[int], always: int) -> list[Ints]:
-    """Return the first bit of each mask, the second, and so on."""
+    """Return an array of the first bits of all masks, an array of the second bits, and so on, filled up with `always`."""
     lists = [_numbers(mask) for mask in masks]
     found = np.full((max(map(len, lists), default=0), len(lists)), always)
     for which, bits in enumerate(lists):
@@ -103,7 +103,7 @@ def _numbers(mask: int) -> list[int]:
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
-    """Return the rows of which all bits are set; only the first column has an entry per row, the others cover the first rows."""
+    """Return for each row whether all of its bits are set; the columns after the first may cover only the first rows."""
     found: Flags = flags[columns[0]]
     for column in columns[1:]:
         found[: len(column)] &= flags[column]

@@ -1,9 +1,9 @@
 """The search loop: states are reached one after another, in a given order, until the goal holds.
 
-order       selects the next candidate: by h_FF (`confab.planner.grounded.greedy`), by novelty (`confab.planner.grounded.novelty`),
+order:      selects the next candidate: by h_FF (`confab.planner.grounded.greedy`), by novelty (`confab.planner.grounded.novelty`),
             by cost and a bound (`confab.planner.grounded.shortest`)
-candidate   a successor of a reached state; it is accepted unless the state was reached before at no higher cost
-open list   queues of entries, each ordered by rank; the queues take turns, and one may be given turns in advance
+candidate:  a successor of a reached state; it is accepted unless the state was reached before at no higher cost
+open list:  queues of entries, each ordered by rank; the queues take turns, and a queue may get extra turns
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Candidate(NamedTuple):
 
 
 class SearchOrder(Protocol):
-    """An order of search. `work` counts bits processed by relaxed plans; a turn ends after `turn` of it.
+    """An order of search. `work` counts the bits processed by relaxed plans; a turn ends when `work` reaches `turn`.
 
     `reached` maps each state to the candidate that reached it last; `bytes` is the memory used besides these states; `best` is the
     final state of the best plan found, if any.
@@ -43,7 +43,7 @@ class SearchOrder(Protocol):
     best: int | None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield candidates until none are left or a sufficiently good plan was found."""
+        """Yield candidates until there are none left or a sufficiently good plan has been found."""
 
     def put(self, candidate: Candidate) -> None:
         """Rank a newly reached state; discard it if the goal is unreachable from it."""
@@ -55,7 +55,7 @@ def explore(task: Task, order: SearchOrder) -> Iterator[int]:
     Raises
     ------
     MemoryError
-        The number of states exceeds the maximum.
+        The states need more than `MOST_BYTES`.
     """
     reached, each = order.reached, STATE_BYTES + task.size // 4
     first = Candidate(task.initial, (), task.initial, 0.0)
@@ -97,7 +97,7 @@ class OpenList(Generic[Entry]):
         heapq.heappush(self.queues[queue], (rank, self.number, entry))
 
     def first(self) -> tuple[int, Entry] | None:
-        """Return the queue whose turn it is, and its first entry; None if all are empty."""
+        """Return the queue whose turn it is, and its first entry; None if all queues are empty."""
         filled = [which for which, queue in enumerate(self.queues) if queue]
         if not filled:
             return None

@@ -1,7 +1,7 @@
 """Ground conditions as conjunctions of bits.
 
-Conditions that don't mention a witness's variable are split from it: "the ferry is here, and some car waits there" is the ferry's
-bit and one bit for the car, which is derived once for each place.
+Conditions that don't mention the variable of a witness are split from the witness: "the ferry is here, and some car waits there"
+becomes the bit of the ferry and a bit "some car waits there", which is derived once for each place.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from confab.reasoner.symbols import (
 )
 
 CONDITIONS_PER_ROW = 20
-"""Maximum number of groundings of a condition per row of a join: nested groups multiply them."""
+"""Maximum number of ground conditions per permitted row of a join; nested groups multiply ground conditions."""
 
 Literals = tuple[int, ...] | None
-"""A conjunction of bits; the empty one is true, None is false."""
+"""A conjunction of bits; the empty conjunction is true, None is false."""
 
 
 class ReachableFacts(Protocol):
-    """The reachable facts, as far as conditions read them (`confab.planner.grounded.reachability.Reached`)."""
+    """The reachable facts, with the members that conditions read (`confab.planner.grounded.reachability.Reached`)."""
 
     problem: Problem
     most: int
@@ -63,7 +63,7 @@ class ReachableFacts(Protocol):
 
 @dataclass(frozen=True)
 class _Part:
-    """Conditions connected by shared free variables, the variables bound outside, and the classes of all."""
+    """Conditions connected by shared free variables, the variables bound outside, and the classes of all variables."""
 
     conditions: tuple[Condition, ...]
     unbound: tuple[str, ...]
@@ -74,15 +74,15 @@ class _Part:
 class Formulas:
     """Ground conditions as conjunctions of bits. Disjunctions become derived bits, each created once.
 
-    Until `facts` is filled, changeable situation types have no bits, so that only static conditions can be evaluated.
+    Until `bits` is filled, changeable situation types have no bits, so only static conditions can be evaluated.
     """
 
     def __init__(self, reached: ReachableFacts) -> None:
         self.reached = reached
-        self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
+        self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # bit of each fact; -1: always true
         self.size = 0
         self.complements: dict[int, int] = {}
-        self.facts_of: dict[int, int] = {}  # their opposite
+        self.facts_of: dict[int, int] = {}  # the inverse of `complements`
         self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
         self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # alternatives of disjunctions, by bit
         self.asked = 0
@@ -125,14 +125,14 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return the formula for some group to hold for some individuals as its variables (negated: for none)."""
+        """Return the formula that some group holds for some individuals as its variables (negated: that no group does)."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
     def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
-        """Return the formula for some individuals to satisfy all conditions of a part (negated: for none to)."""
+        """Return the formula that some individuals satisfy all conditions of a part (negated: that no individuals do)."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
         if key not in self._known:
@@ -175,7 +175,7 @@ class Formulas:
     def _opened(
         self, group: Sequence[Condition], shared: set[str] | frozenset[str], kinds: dict[str, str]
     ) -> Iterator[Condition]:
-        """Yield the conditions of a group, including those of witnesses, with unique names for their variables."""
+        """Yield the conditions of a group, with witnesses replaced by their conditions on uniquely named variables."""
         for c in group:
             if not isinstance(c, Witness) or c.negated:
                 yield c
@@ -202,7 +202,7 @@ class Formulas:
             yield from self._solutions(part, rest, {**terms, name: value})
 
     def _candidates(self, name: str, part: _Part, terms: Mapping[str, str]) -> Sequence[str]:
-        """Return individuals for a variable: those that a positive condition of the part allows, otherwise its whole class."""
+        """Return the individuals that a positive condition of the part allows for a variable, otherwise all of its class."""
         members = self.members(part.kinds[name])
         for c in part.conditions:
             if isinstance(c, ValueCondition) and not c.negated and c.value == name:
@@ -218,7 +218,7 @@ class Formulas:
     def _related(
         self, relation: str, arity: int, place: int, fixed: tuple[int, ...]
     ) -> Mapping[tuple[str, ...], Mapping[str, None]]:
-        """Return the individuals at one position of a relation's tuples, by those at other positions."""
+        """Map the individuals at the `fixed` positions of a relation's tuples to the individuals at position `place`."""
         key = relation, arity, place, fixed
         if key not in self._relations:
             found = self._relations[key] = {}
@@ -244,7 +244,7 @@ class Formulas:
         return self._members[kind]
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return the formula for a symbol to have a value (negated: not to have it)."""
+        """Return the formula that a symbol has a value (negated: that it doesn't have the value)."""
         kind = self.reached.situations.get(situation)
         if kind is None:  # the situation type doesn't exist on this level
             return () if negated else None
@@ -262,7 +262,7 @@ class Formulas:
         return (self.complement(bit) if negated else bit,)
 
     def complement(self, bit: int) -> int:
-        """Return the bit for a fact's negation, or the fact's bit if that is a complement."""
+        """Return the bit of the negation of a fact; for the bit of a negation, the bit of the fact."""
         if bit in self.facts_of:
             return self.facts_of[bit]
         if bit not in self.complements:
@@ -271,7 +271,7 @@ class Formulas:
         return self.complements[bit]
 
     def opposite(self, bit: int) -> Literals:
-        """Return the formula for a bit not to be set."""
+        """Return the formula that a bit isn't set."""
         groups = self._groups.get(bit)
         if groups is not None:
             return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)
@@ -284,14 +284,14 @@ class Formulas:
         return self.size - 1
 
     def wanted(self, symbol: Symbol, value: str) -> Literals:
-        """Return the formula for a goal about a symbol."""
+        """Return the formula that a symbol has the value, or satisfies the bounds, of a goal."""
         if self.reached.problem.domain.situations[symbol.situation].quantity is None:
             return self.value(symbol.situation, symbol.arguments, value, False)
         amount = Amount(symbol.situation, symbol.arguments)
         return self.all_of(self.condition(Comparison(amount, sign, limit), {}, {}) for sign, limit in bounds(value))
 
     def all_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the conjunction."""
+        """Return the conjunction of formulas."""
         found: set[int] = set()
         for part in parts:
             if part is None:
@@ -309,7 +309,7 @@ class Formulas:
         return (self.derived[literals,],)
 
     def any_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the disjunction: one derived bit, unless it has a simpler form."""
+        """Return the disjunction of formulas: one derived bit, unless the disjunction has a simpler form."""
         found: set[tuple[int, ...]] = set()
         for part in parts:
             if part == ():

@@ -1,12 +1,12 @@
 """Grounding: one level of a problem becomes a `Task`, by joins in rounds of relaxed reachability.
 
-reach      facts that can become true under delete relaxation (`confab.planner.grounded.reachability`)
-assemble   bits for the facts that can change, operators for the joined rows
-goal       an unreachable goal proves that there is no plan
+reach:     find the facts that can become true under delete relaxation (`confab.planner.grounded.reachability`)
+assemble:  make bits for the facts that can change, and operators from the joined rows
+goal:      an unreachable goal proves that there is no plan
 
-Conditions that depend on the state are left out of the joins, so reachability is overestimated; they become conjunctions of
-literals, once per combination of individuals, when operators are assembled
-(`confab.planner.grounded.reachability`).
+Conditions that aren't atoms but depend on the state are left out of the joins, so reachability is overestimated. When operators are
+assembled, each of these conditions becomes a conjunction of bits, once per combination of individuals
+(`confab.planner.grounded.formulas`).
 
 Semi-naive grounding as in databases: Helmert, "Concise finite-domain representations for PDDL planning tasks",
 Artificial Intelligence 173 (2009), section 6. Here arrays are joined instead of tuples, and each symbol has one value from the
@@ -38,7 +38,7 @@ from confab.reasoner.language import mentions
 from confab.reasoner.symbols import Fact, Problem, State
 
 MOST_ROWS = 20_000_000
-"""Maximum size of one join: about 1 GB."""
+"""Maximum number of rows of one join (about 1 GB)."""
 
 
 def ground(
@@ -56,29 +56,29 @@ def ground(
     ----------
     problem : Problem
     level : int, optional
-        The lowest level if not given.
+        By default the lowest level.
     initial, goal : State, optional
-        In place of the problem's own.
+        By default those of the problem.
     most : int
         Maximum number of rows of one join.
     deadline : float, optional
         On the clock of `time.perf_counter`.
     apart : bool
-        Whether operators may be identified by arguments and effects alone: "some crane is free", whichever crane it is.
+        Whether operators are identified by arguments and effects only; then "some crane is free" isn't one operator per crane.
 
     Returns
     -------
     Task or Reason
-        A reason proves that no behaviours of this level lead from `initial` to `goal`, and states the cause.
+        A reason if no behaviours of this level lead from `initial` to `goal`, otherwise the task.
 
     Raises
     ------
     UngroundableError
-        A join would exceed `most` rows, or an amount that changes is a divisor or is multiplied by another.
+        A join would exceed `most` rows, or a changing amount is a divisor or is multiplied by another changing amount.
     OutOfTimeError
         The deadline has passed.
     DomainError
-        A behaviour names a variable that nothing determines.
+        A behaviour names a variable that no condition determines.
     """
     level = problem.domain.levels[-1] if level is None else level
     reached = Reached(problem, level, problem.initial if initial is None else initial, most, deadline, apart)
@@ -92,7 +92,7 @@ def ground(
 
 
 class _Assembly:
-    """Operators and bits, made from the reachable facts."""
+    """Makes the operators and bits of a task from the reachable facts."""
 
     def __init__(self, reached: Reached) -> None:
         self.reached = reached
@@ -138,7 +138,7 @@ class _Assembly:
         return self._build(rows, needs, owners, first, operators, count, wanted, derived, cases)
 
     def _needs(self, schema: Schema, rows: Ints) -> tuple[Ints, tuple[Ints, Ints]]:
-        """Return the rows of a schema that can ever hold, and pairs of a row and a bit that it requires."""
+        """Return the rows of a schema whose conditions are satisfiable, and pairs of a row and a bit that the row requires."""
         place = {name: column for column, name in enumerate(schema.terms)}
         columns = {name: rows[:, column] for name, column in place.items()}
         keep = np.ones(len(rows), bool)
@@ -295,8 +295,8 @@ class _Assembly:
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
         costs, prices = self._costs(bases, rows, first)
-        # In the relaxed task a conditional effect that sets no bit is useless. An alternative of a derived bit is an
-        # operator of cost 0 there, without an owner.
+        # In the relaxed task a conditional effect that sets no bit is useless, and an alternative of a derived bit is an
+        # operator of cost 0 without an owner.
         telling = (np.arange(count) < operators) | (np.diff(add.starts) > 0)
         relaxed_needs, relaxed_adds, owner = with_derived(
             only(need, telling), only(add, telling), owner[telling], [*cases, *left]

@@ -1,8 +1,7 @@
 """Tables of small integers and their joins, which take most of the time of grounding.
 
-A `JoinTable` is append-only, so the rows known before a round are a prefix of its rows: semi-naive evaluation
-needs no second table. An index sorts the rows by some columns once per size of the table; a match is then a binary
-search.
+A `JoinTable` is append-only, so the rows known before a round are a prefix of its rows, and semi-naive evaluation needs no second
+table. An index sorts the rows by some columns, again only after the table has grown; a lookup is then a binary search.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from confab.reasoner.limits import check
 
 Ints = NDArray[np.int64]
 PAIR = 1e-7
-"""Minimum time of a row of a join, in seconds. A join can't be interrupted, so one that would exceed the deadline isn't begun."""
+"""Minimum time per row of a join, in seconds. A join can't be interrupted, so it isn't begun if it would exceed the deadline."""
 
 
 class JoinTable:
@@ -44,7 +43,7 @@ class JoinTable:
             self.rows = np.concatenate([self.rows, new])
 
     def find(self, rows: Ints) -> Ints:
-        """Return the position of each row, -1 where it isn't in the table."""
+        """Return the position of each row in the table, or -1 if the row isn't in the table."""
         keys, order = self._index(tuple(range(self.arity)))
         if not len(order):
             return np.full(len(rows), -1)
@@ -95,9 +94,9 @@ _NONE: Ints = np.empty(0, np.int64)
 
 
 def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
-    """Return one key per row, equal where the rows are and in their lexicographic order.
+    """Return one key per row; keys compare as the rows do in lexicographic order.
 
-    The key is an integer where the row fits into 63 bits, otherwise its bytes, most significant first.
+    A key is an integer if the row fits into 63 bits, otherwise the bytes of the row, most significant first.
 
     >>> pack(np.array([[1, 2], [0, 3]]), 10).tolist()
     [12, 3]
@@ -114,7 +113,7 @@ def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
 
 
 def ranges(starts: Ints, counts: Ints) -> Ints:
-    """Return start, start + 1, … for each start, as many as its count."""
+    """Return start, start + 1, … for each start, with as many numbers as the start's count."""
     ends = np.cumsum(counts)
     total = int(ends[-1]) if len(ends) else 0
     result: Ints = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(starts, counts)

@@ -1,6 +1,7 @@
 """Landmarks: facts that every plan makes true at some time.
 
-The landmarks of an operator are those of its required bits; the landmarks of a fact are common to all operators that set it.
+The landmarks of an operator are its required bits and their landmarks. The landmarks of a fact are the landmarks that all operators
+that set the fact have in common.
 
 Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
 """
@@ -16,13 +17,13 @@ LOOK = 1_000
 
 
 def landmarks(task: Task, deadline: float | None = None) -> int:
-    """Return facts that every plan makes true at some time, the goals included; after the deadline, the goals alone.
+    """Return the mask of facts that every plan makes true at some time, including the goals; after the deadline, only the goals.
 
-    The deadline is on the clock of `time.perf_counter`: thousands of achievers for each of thousands of facts take seconds.
+    The deadline is on the clock of `time.perf_counter`. Thousands of facts with thousands of achievers each take seconds.
     """
     behind = [
         0 if task.initial >> bit & 1 else -1 for bit in range(task.size)
-    ]  # landmarks of each bit; -1: not reached yet
+    ]  # mask of the landmarks of each bit; -1 until the bit is reached
     ways = list(zip(task.needs.lists(), task.adds.lists(), strict=True))
     before = None
     while before != behind:

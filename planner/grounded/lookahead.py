@@ -1,4 +1,4 @@
-"""Lookahead: execute a relaxed plan as far as possible, and replace operators where no operator of it is applicable.
+"""Lookahead: execute a relaxed plan as far as possible; if none of its operators is applicable, replace or insert an operator.
 
 Vidal, "A lookahead strategy for heuristic search planning", ICAPS 2004.
 """
@@ -15,7 +15,7 @@ from typing import TypeAlias
 from confab.planner.grounded.task import Task, bits_of
 
 ENABLING = 8
-"""Maximum number of missing bits for which a replacement is tried where no operator is applicable."""
+"""Maximum number of missing bits for which an inserted operator is tried."""
 Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""
 
@@ -23,10 +23,10 @@ Path: TypeAlias = "tuple[int, list[int]]"
 def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
     """Return a function that executes a relaxed plan from a state as far as possible and returns the final state and its operators.
 
-    Where none of its operators is applicable, one is replaced by an applicable operator that sets the same bit for a later operator
-    or the goal: a truck that has moved north meanwhile starts from there. Otherwise an operator is inserted that sets the one bit
-    which others lack: the truck drives back, so that the next parcel can be loaded. Of several such operators, the one is chosen
-    after which most goals hold when the rest has been executed.
+    If no operator of the plan is applicable, one of them is replaced by an applicable operator that sets the same bit for a later
+    operator or the goal (a truck that has moved north starts from there). If there is no replacement, an operator is inserted that
+    sets the only missing bit of other operators (the truck drives back, so the next parcel can be loaded). Of several such
+    operators, the one after which the rest of the plan achieves the most goals is inserted.
     """
 
     @cache
@@ -52,7 +52,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
         return found
 
     def replaced(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
-        needed = [task.goal]  # required by the goal and by the later operators, from the last one
+        needed = [task.goal]  # bits that the goal and the later operators require, beginning at the end
         for operator in reversed(stuck):
             needed.append(needed[-1] | task.changes_of(operator)[0])
         for i, operator in enumerate(stuck):
@@ -66,7 +66,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
     def in_turn(state: int, left: Sequence[int]) -> tuple[int, list[int], list[int]]:
         done, stuck = [], []
         for operator in left:
-            if set_by(operator) & ~state:  # otherwise its effects hold already
+            if set_by(operator) & ~state:  # otherwise the operator's effects hold already
                 after = task.applied(state, operator)
                 if after is None:
                     stuck.append(operator)

@@ -1,4 +1,4 @@
-"""What the bits of defined situation types and of shared conditions mean: other bits, or alternatives of them."""
+"""The meanings of the bits of defined situation types and of shared conditions: conjunctions of other bits, or alternatives."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import Rule
 
 SAID_ONCE = 20_000
-"""Minimum number of conditions saved, over all operators, before a shared condition is evaluated once per state: evaluating that
-number of conditions for one relaxed plan takes a millisecond."""
+"""Minimum number of conditions saved, over all operators, before shared conditions are evaluated once per state. Evaluating this
+number of conditions for a relaxed plan takes a millisecond."""
 
 
 class Meanings:
@@ -82,7 +82,7 @@ class Meanings:
         return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
-        """Add the conditions under which a defined fact doesn't hold, where required and unless the definition is recursive."""
+        """Add the meanings of the negations of defined facts that conditions require, except for recursive definitions."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
         for bit in waiting:  # the list grows
@@ -95,7 +95,7 @@ class Meanings:
             waiting += [other for other in list(formulas.complements)[known:] if other in ways]
 
     def _circular(self) -> set[int]:
-        """Return the bits of recursively defined situation types, and of those that depend on them."""
+        """Return the bits of recursively defined situation types, and of situation types that depend on these."""
         rules: dict[str, list[Rule]] = {name: [] for name in self.reached.defined}
         for schema in self.reached.schemas:
             if schema.rule:
@@ -110,7 +110,7 @@ def _meaning(
     circular: AbstractSet[int],
     means: dict[int, tuple[int, ...]],
 ) -> None:
-    """Enter the meaning of a bit into `means`: the bits of its only alternative if it has just one, otherwise the bit itself."""
+    """Enter the meaning of a bit into `means`: the bits of its alternative if there is only one, otherwise the bit itself."""
     waiting = [bit]
     while waiting:
         one = waiting[-1]

@@ -13,8 +13,8 @@ from confab.reasoner.symbols import Parameter, Problem, RelationCondition, Situa
 def lifted(problem: Problem, level: int) -> Problem:
     """Return a problem in which conditional effects of the same shape are one effect, over the rows of an auxiliary relation.
 
-    An effect on every member of a class is one effect per individual in a problem: a cube of 26 faces has thousands, and each
-    would need a join of its own.
+    In a problem, an effect on every member of a class is one effect per individual. A cube of 26 faces has thousands of effects,
+    and each would need a separate join.
     """
     relations: dict[str, frozenset[tuple[str, ...]]] = {}
     behaviors = dict(problem.domain.behaviors)
@@ -56,7 +56,7 @@ def _parts(effect: ValueEffect) -> list[ValueEffect | ValueCondition]:
 def _shape(effect: ValueEffect) -> object:
     """Return the common shape of effects that differ only in individuals.
 
-    Conditions other than value conditions are part of the shape as they are.
+    Conditions other than value conditions are part of the shape unchanged.
     """
     values = tuple(
         (type(p), p.situation, tuple(t if is_variable(t) else "" for t in p.arguments), p.value) for p in _parts(effect)

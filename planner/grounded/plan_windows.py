@@ -1,11 +1,11 @@
 """Shorter plans: a window of steps is replaced if a bounded search finds fewer steps with the effects that later steps need.
 
-window      consecutive steps, from the state before them to the bits that the later steps and the goal need; amounts must only
-                        allow the later steps to lead to the goal
-operators   those nearest to the window: reachable early from its start and useful late for its end
-search      A* with h_FF on these operators alone (`confab.planner.grounded.shortest`); branches that can't be shorter by h are cut
-whole       finally the whole plan is one window, with all operators and a greater weight of h, for the remaining work
-order       windows are tried on the plan as it is and regrouped, so that a step follows one that it depends on
+window:     consecutive steps; a replacement starts in the same state and sets the bits that the later steps and the goal require,
+            with amounts that still let the later steps reach the goal
+operators:  the operators nearest to the window: reachable in few steps from its start, and useful in few steps before its end
+search:     A* with h_FF on these operators (`confab.planner.grounded.shortest`); states from which h allows no shorter plan are cut
+whole:      in the end the remaining work is spent on the whole plan as one window, with all operators and a greater weight of h
+order:      windows are tried on the given plan and on a regrouped plan, where a step follows a step that it depends on
 
 Work is counted in operators examined and never in seconds, so that the same plan is shortened in the same way on any machine.
 
@@ -32,15 +32,15 @@ from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
-"""Maximum number of states and steps for the search of a cheapest plan, instead of windows."""
+"""Maximum number of states, and of steps of the given plan, for a search of a cheapest plan before windows are tried."""
 WAYS = 20
 """Number of alternatives of derived bits processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
-"""Lengths of windows in steps; long windows find round trips that one step can save."""
+"""Lengths of windows in steps; long windows contain round trips that a single step makes needless."""
 OPERATORS, EVALUATIONS = 150, 100
-"""Maximum work of the search of a window."""
+"""Maximum number of operators, and of evaluations of h_FF, in the search of a window."""
 WEIGHT = 3
-"""Maximum evaluations of h_FF when the whole plan is searched again with all operators."""
+"""Weight of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
 """Maximum number of replayed operators when removing needless steps."""
 LOOK = 50
@@ -48,15 +48,15 @@ LOOK = 50
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
-    """Return a plan that costs no more than a given one: a cheapest plan if few states suffice, otherwise by replacing windows.
+    """Return a plan that costs at most as much: a cheapest plan if few states suffice to prove it, otherwise with windows replaced.
 
     Parameters
     ----------
     task : Task
     plan : sequence of int
         Operators that lead from the task's initial state to its goal.
-    Maximum number of operators examined; a second covers half a million to a million.
-        Operators that may be looked at, half a million to a million per second.
+    work : int
+        Maximum number of operators examined; half a million to a million are examined per second.
     deadline : float, optional
         On the clock of `time.perf_counter`.
     """
@@ -82,7 +82,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
-    """Return a cheapest plan, or the given one if few states don't suffice; and whether it is proved cheapest."""
+    """Return a cheapest plan, or the given plan if a few states don't suffice, and whether the plan is proved cheapest."""
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
@@ -91,9 +91,9 @@ def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> 
 
 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
-    """Return a plan without the steps that neither the goal nor a remaining step needs.
+    """Return a plan without the steps that neither the goal nor a remaining step requires.
 
-    Of a very long plan only the first steps are tested.
+    In a very long plan only the first steps are tested.
     """
     plan = list(plan)
     state, i, work = task.initial, 0, TRIALS
@@ -112,7 +112,7 @@ def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) ->
 
 
 def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
-    """Return a plan's steps reordered so that a step follows the latest step that it depends on, as far as the goal is still met.
+    """Return a plan reordered so that a step follows the latest step that it depends on; the same plan if the order is invalid.
 
     Steps keep their order if one depends on the other or would undo the other's precondition.
     """
@@ -168,7 +168,7 @@ def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
 
 
 def _states(task: Task, plan: Sequence[int]) -> list[int]:
-    """Return the states that a plan goes through."""
+    """Return the initial state and the state after each step of a plan."""
     found = [task.initial]
     for operator in plan:
         after = task.applied(found[-1], operator)
@@ -191,7 +191,7 @@ class _Windows:
     work: int
     deadline: float | None
     failed: set[tuple[int, int, int]] = field(default_factory=set)
-    """Windows without a shorter replacement: state, required bits, steps."""
+    """Windows without a shorter replacement: state, required bits, number of steps."""
 
     @property
     def over(self) -> bool:
@@ -204,7 +204,7 @@ class _Windows:
         return self.deadline is not None and perf_counter() > self.deadline
 
     def pass_over(self, plan: list[int], size: int) -> list[int]:
-        """Return the plan after one pass of windows, half overlapping."""
+        """Return the plan after windows of `size` steps have been tried, each overlapping the previous window by half."""
         states, needed = _states(self.task, plan), self.needed(plan)
         start = 0
         while start < len(plan) - 1 and not self.over:
@@ -221,7 +221,7 @@ class _Windows:
         return plan
 
     def needed(self, plan: Sequence[int]) -> list[int]:
-        """Return for each position the bits that the steps from there on, and the goal, need."""
+        """Return for each position of a plan the bits that the steps after the position and the goal require."""
         states = _states(self.task, plan)
         wanted = self.task.goal
         found = [wanted]
@@ -237,7 +237,7 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
-        """Search fewer steps from a state to the required bits; applicable as far as the window's operators determine."""
+        """Search fewer steps from a state to the required bits, with operators near the window; None if none are found."""
         if (state, wanted, len(steps)) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
@@ -256,7 +256,7 @@ class _Windows:
         return plan if found is None else shortened(self.task, found, self.deadline)
 
     def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
-        """Search a plan cheaper than `upper`: A*, cut off where cost plus h_FF reaches that."""
+        """Search a plan cheaper than `upper` by A*; states whose cost plus h_FF reaches `upper` are cut."""
         evaluate, costs = heuristic(task), task.costs
 
         def left(state: int) -> float:
@@ -269,7 +269,7 @@ class _Windows:
 
     @cached_property
     def arrays(self) -> tuple[Ints, Ints, Ints]:
-        """Arrays of the relaxed operators: owner, and row per required bit and per added bit."""
+        """Arrays: the owner of each relaxed operator, and the relaxed operator of each entry of the needs and of the adds."""
         task = self.task
         number = np.arange(len(task.owners))
         return (
@@ -284,9 +284,10 @@ class _Windows:
         return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
 
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
-        """Return the operators nearest to a window, in ascending order, including its own.
+        """Return the operators nearest to a window, in ascending order, including the window's own operators.
 
-        Operators that clear a required bit that no step of the window clears are left out: their effect would have to be undone.
+        Operators that clear a required bit that no step of the window clears are left out, since their effect would have to be
+        undone.
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
@@ -334,9 +335,9 @@ class _Windows:
         return sorted(chosen)
 
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
-        """Return the task of reaching the required bits from a state by some operators, and those of them that it contains.
+        """Return the task of reaching the required bits from a state by some operators, and the operators that the task has.
 
-        Symbols that these operators don't change have no bits; operators that require another value of them are left out.
+        Symbols that these operators don't change have no bits; operators that require another value of such symbols are left out.
         """
         task = self.task
         if task.amounts is not None:
@@ -389,7 +390,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the same task with all bits, which identify amounts."""
+        """Return the task of a window with all bits of the whole task, since the amounts in a state are numbered with them."""
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]

@@ -42,7 +42,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 
 class Reached:
-    """The tables of a level, and the facts reachable in them.
+    """The tables of a level, with all facts that are reachable under delete relaxation.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Reached:
         Kind is situation, relation or class; a row of a situation type has the arguments and the value (no value if it is
         boolean, since only true facts are listed).
     rows : list of Ints
-        Per schema, the individuals of its terms.
+        For each schema, the rows that match it, with a column of individuals for each of its terms.
     changed : set of situation types
-        Those that behaviours change or rules define.
+        Situation types that behaviours change or rules define.
     together : set of relations
         Auxiliary relations for effects of the same shape.
     made : set of situation types
@@ -146,7 +146,7 @@ class Reached:
         table.add(np.array(flat, np.int64).reshape(len(rows), arity))
 
     def close(self) -> None:
-        """Join every schema with the new rows, until there are none."""
+        """Join every schema with the rows that the last round added, until a round adds none."""
         fluents = [("situation", name) for name in self.situations]
         before = dict.fromkeys(fluents, 0)
         found: list[list[Ints]] = [[] for _ in self.schemas]
@@ -191,7 +191,7 @@ class Reached:
     def joined(
         self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
     ) -> Iterator[Ints]:
-        """Yield the rows of a schema's terms, at most once, that match every atom inside its range of rows."""
+        """Yield at most one array: the rows of a schema's terms that match every atom within the atom's range of table rows."""
         columns: dict[str, Ints] = {}
         count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
         while waiting:
@@ -235,7 +235,7 @@ class Reached:
         check("grounding")
 
     def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
-        """Return the atom that matches the fewest rows, the first among equals; an atom without new variables is always taken."""
+        """Return the atom that matches the fewest rows, the first among equals; atoms without unbound variables come first."""
         best, least = -1, float("inf")
         for i in waiting:
             rows = self._fan_out(schema.atoms[i], columns)
@@ -253,7 +253,7 @@ class Reached:
     def _step(
         self, atom: Atom, columns: dict[str, Ints], count: int, limits: tuple[int, int] | None
     ) -> tuple[dict[str, Ints], int]:
-        """Join `columns` with an atom."""
+        """Join `columns` with an atom; return the joined columns and their number of rows."""
         table = self.tables[atom.table]
         if table.arity != len(atom.terms):
             return {name: column[:0] for name, column in columns.items()} | {
@@ -329,11 +329,11 @@ class Reached:
 
     @cached_property
     def formulas(self) -> Formulas:
-        """Evaluates conditions; before bits are assigned, static ones only."""
+        """Evaluates conditions; before bits are assigned, only static conditions."""
         return Formulas(self)
 
     def effect_rows(self, schema: Schema, effect: ValueEffect, rows: Ints, value: bool = True) -> Ints:
-        """Return the table rows (the symbols' only, without `value`) that an effect makes true, one per row of the schema."""
+        """Return the table row that an effect makes true for each row of a schema; without `value`, only the row's symbol."""
         boolean = self.situations[effect.situation].boolean
         terms = effect.arguments if boolean or not value else (*effect.arguments, effect.value)
         place = {name: column for column, name in enumerate(schema.terms)}
@@ -341,7 +341,7 @@ class Reached:
         return np.stack(columns, axis=1) if columns else np.zeros((len(rows), 0), np.int64)
 
     def _exists(self, name: str, rows: Ints) -> Flags:
-        """Return for each row of a situation type's table whether such a symbol exists."""
+        """Return for each row of a situation type's table whether the row's symbol exists."""
         situation = self.situations[name]
         if not situation.boolean:
             return self.symbols[name].find(rows[:, :-1]) >= 0

@@ -1,4 +1,4 @@
-"""What relaxed operators change: facts, amounts, and the bits that become true by them."""
+"""Changes by relaxed operators: effects on facts, changes of amounts, and the bits that these may set."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class RelaxedChanges:
         self.reached, self.formulas, self.bits = reached, formulas, bits
 
     def effects(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> Ints:
-        """Return relaxed operator, position, symbol and bit (-1: false) of each effect on a fact."""
+        """Return a row for each effect on a fact: relaxed operator, position of the effect, symbol, and bit (-1: false)."""
         parts = []
         for i, begin in first.items():
             schema = self.reached.schemas[i]
@@ -98,10 +98,10 @@ class RelaxedChanges:
         count: int,
         pushed: tuple[Ints, Ints],
     ) -> tuple[Grouped, list[tuple[tuple[int, ...], int]]]:
-        """Return the bits that each relaxed operator may set: complements only of values that the symbol may have had.
+        """Return the bits that each relaxed operator may set, and pairs of bits implied by auxiliary bits.
 
-        Where these are many, operators set one auxiliary bit "changed" of the relaxed task; the bits implied by it are returned,
-        too.
+        An effect sets complements only of values that its symbol may have had. If these are many, the effect sets one auxiliary bit
+        "changed" of the symbol instead, which implies the complements in the relaxed task.
         """
         changed: dict[int, int] = {}
         opposites: dict[int, dict[int, int]] = {}
@@ -139,7 +139,7 @@ class RelaxedChanges:
 
 
 def only(groups: Grouped, wanted: Flags) -> Grouped:
-    """Return the groups that are wanted."""
+    """Return the groups whose flag in `wanted` is set."""
     sizes = np.diff(groups.starts)
     items = groups.items[np.repeat(wanted, sizes)]
     return Grouped(np.concatenate([[0], np.cumsum(sizes[wanted])]), items)
@@ -148,7 +148,7 @@ def only(groups: Grouped, wanted: Flags) -> Grouped:
 def with_derived(
     need: Grouped, add: Grouped, owner: Ints, cases: Sequence[tuple[tuple[int, ...], int]]
 ) -> tuple[Grouped, Grouped, Ints]:
-    """Return needs, additions and owners with an operator for each alternative of a derived bit."""
+    """Return needs, additions and owners, with one more relaxed operator for each alternative of a derived bit."""
     if not cases:
         return need, add, owner
     more = np.array([bit for group, _ in cases for bit in group], np.int64)

@@ -1,7 +1,7 @@
-"""Schemas without the variables that no effect names: a move with some crane is one operator instead of one per crane.
+"""Removal of variables that no effect names from schemas: a move with some crane is one operator instead of one per crane.
 
-The conditions on such a variable become an auxiliary rule over its neighbouring terms. Each join then has the rows of one part,
-instead of all pairs of both.
+The conditions on such a variable become an auxiliary rule over its neighbouring terms. Each join then has the rows of one part
+instead of all pairs of rows of both parts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
     Parameters
     ----------
     schema : Schema
-        Of a behaviour without conditional effects.
+        The schema of a behaviour without conditional effects.
     members : function of a class to its individuals
     """
     named = {parameter.name for parameter in schema.behavior.parameters}
@@ -65,9 +65,9 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
 def _separable(
     schema: Schema, named: set[str], members: Members
 ) -> tuple[int, str, tuple[str, ...], tuple[str, ...]] | None:
-    """Return the maximum number of rows without a variable, the variable, its neighbours and the other terms.
+    """Select the variable whose removal leaves the fewest rows; return that number, the variable, its neighbours, the other terms.
 
-    Return None if that saves nothing.
+    Return None if no removal saves rows.
     """
     every = {term for atom in schema.atoms for term in atom.terms if is_variable(term)}
 

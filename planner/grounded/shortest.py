@@ -1,11 +1,11 @@
-"""Shortest plans of a grounded task: the order of A*, with a given estimate of the remaining cost.
+"""Cheapest plans of a grounded task: A* with a given estimate of the remaining cost.
 
-g        cost of the operators from the start to a state
-h        estimated cost from a state to the goal, infinite where it is unreachable. With a lower bound the plan found is a
-                  cheapest one: `nothing`, which gives breadth-first search, `ways` of the single goals, or LM-cut
-         (`confab.planner.hierarchical.bounds`)
-f        g + weight h, the least of which is expanded next; with weight 1 no plan is cheaper than the least open f
-upper    the cost that a plan must stay below: states with g + h at or above it are dropped
+g:       cost of the operators from the start to a state
+h:       estimated cost from a state to the goal, infinite if the goal is unreachable. If h is a lower bound, the plan is a cheapest
+         one. Lower bounds are `nothing` (breadth-first search), `ways` (each goal alone) and LM-cut
+         (`confab.planner.hierarchical.bounds`).
+f:       g + weight · h; the state with the least f is expanded next. With weight 1, no plan is cheaper than the least open f.
+upper:   the cost that a plan must stay below; states with g + h at or above it are dropped
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Bound: TypeAlias = "Callable[[int], float]"
 
 @dataclass(frozen=True)
 class Shortest:
-    """The result: no plan is cheaper than `bound`; if that is infinite, no plan is cheaper than `upper`.
+    """The result of a search: no plan is cheaper than `bound`, which is infinite if there is no plan.
 
-    `plan` are the operators of the cheapest plan found; `states` were reached.
+    `plan` has the operators of the cheapest plan found; `states` has the states that were reached.
     """
 
     bound: float
@@ -44,7 +44,7 @@ def nothing(state: int) -> float:
 
 
 class Cheapest:
-    """The order of A* by a bound on the remaining cost; `lower` is the least open f, `counts` is updated."""
+    """The search order of A* by a bound on the remaining cost; `lower` is the proved lower bound, `counts` is updated."""
 
     def __init__(self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1) -> None:
         self.task, self.bound, self.upper, self.weight, self.counts = task, bound, upper, weight, counts
@@ -72,7 +72,7 @@ class Cheapest:
                     yield Candidate(state, (operator,), after, cost + spent)
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by f, unless no cheaper plan leads through it; a goal state lowers the upper bound."""
+        """Rank a state by f, or drop it if no plan through it is cheaper than `upper`; a goal state lowers `upper`."""
         cost = candidate.cost
         h = self.bound(candidate.state)
         if cost + h >= self.upper:
@@ -93,7 +93,7 @@ def shortest(
     known: float = math.inf,
     weight: int = 1,
 ) -> Shortest:
-    """Return a cheapest plan among those cheaper than `upper`, as far as the limits allow.
+    """Return a cheapest plan among the plans cheaper than `upper`; at a limit, a lower bound and the cheapest plan found so far.
 
     Parameters
     ----------
@@ -101,15 +101,15 @@ def shortest(
     bound : function of a state
     upper : float
     most : int
-        Maximum number of expansions; at the limit, or at the deadline (of `time.perf_counter`), the bound and the cheapest plan
-        so far are returned.
+        Maximum number of expansions.
     deadline : float, optional
+        On the clock of `time.perf_counter`.
     counts : Counts, optional
-        Updated with the generated and expanded states.
+        The numbers of generated and expanded states are added.
     known : float
-        Maximum number of states reached; at the limit only a bound is returned, since all of them would have to be expanded.
+        Maximum number of states reached.
     weight : int
-        Weight of the bound in f; with more than 1 a plan is found sooner but may cost more, and `bound` is meaningless.
+        Weight of h in f. With a weight above 1, a plan is found sooner but may cost more, and the returned bound is meaningless.
     """
     order = Cheapest(task, bound, upper, counts or Counts(), weight)
     expanded, lower = 0, None
@@ -123,17 +123,16 @@ def shortest(
 
 
 def ways(task: Task) -> Bound:
-    """Return a lower bound: the sum of the costs of giving every goal's symbol its value separately.
+    """Return a lower bound on the cost of a plan: the sum over the goals of the least cost of achieving the goal alone.
 
-    Each operator counts for one symbol only, so no plan is cheaper. A goal on a symbol without alternative values counts for
-    nothing.
+    Each operator counts for one symbol only, so no plan is cheaper. A goal on a symbol with a single bit adds 0.
     """
     of_symbol: dict[object, list[int]] = {}
     for bit, fact in enumerate(task.facts):
         of_symbol.setdefault(fact.symbol, []).append(bit)
     wanted = [(bits, at) for bits in of_symbol.values() if len(bits) > 1 for at in bits if task.goal >> at & 1]
     wanted.sort(key=lambda pair: -len(pair[0]))
-    symbol = np.full(task.size, -1)  # symbol of each bit, by its position in the goal
+    symbol = np.full(task.size, -1)  # for each bit, the position of its symbol in `wanted`
     for number, (bits, _) in enumerate(wanted):
         symbol[bits] = number
     operator, before, after = _steps(task, symbol)
@@ -165,9 +164,9 @@ def ways(task: Task) -> Bound:
 
 
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the operators that set bits of symbols.
+    """Return three arrays with an entry for each bit that an operator sets.
 
-    The columns are the operator, the required bit of that symbol (-1: none), and the bit that it sets.
+    They are the operator, the bit of the same symbol that the operator requires (-1: none), and the bit that the operator sets.
     """
     owner = np.array(task.owners, np.int64)
     setter = owner[np.repeat(np.arange(len(owner)), np.diff(task.adds.starts))]

@@ -1,7 +1,7 @@
 """Applicable operators of a state: a decision tree over symbols, whose branches are created when a state reaches them.
 
-Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search visits few of the branches, so the others
-aren't created.
+Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search visits few branches, and only these are
+created.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ Waiting = tuple[int, list[int], int]
 
 
 class SuccessorTree:
-    """Operators by the values that they require, symbol by symbol.
+    """A node of a decision tree: operators by the value that they require of one symbol.
 
-    `mask` has the bits of a symbol; `by_value` has the subtree of each of its values, `otherwise` that of operators that don't test
-    the symbol; `waiting` are operators that aren't in a branch yet.
+    `mask` has the symbol's bits. `by_value` maps each value of the symbol to a subtree; `otherwise` is the subtree of operators
+    without a test of the symbol. `operators` need no further test; `waiting` has operators that aren't in a subtree yet.
     """
 
     __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")
@@ -83,7 +83,7 @@ def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:
     starts, items : array of int
         Operator `i` requires the bits ``items[starts[i]:starts[i + 1]]``.
     masks : sequence of int
-        Per bit, all bits of its symbol.
+        For each bit, the mask of all bits of its symbol.
     """
     numbers = {mask: i for i, mask in enumerate(dict.fromkeys(masks))}
     symbol_of = np.array([numbers[mask] for mask in masks], np.int64)

@@ -1,13 +1,13 @@
 """A* as intended by Algorithm 1 of the paper, with the cogency ranking score of eqs. (3) and (5) in f.
 
 g    cost of the behaviours from the start to a node
-h    estimated cost from a node to the goal: the number of situated object symbols that don't match it
+h    estimated cost from a node to the goal: the number of situated object symbols that don't match the goal
 c    cogency term of the behaviour that led to a node, computed in the state before it; not accumulated along the path
-f    g + h + c; the node with the least f is expanded next, ties in the order of generation
+f    g + h + c; the node with the least f is expanded next, and among ties the node that was generated first
 n    depth of a node
 
 Algorithm 1 as printed never puts the start into the open set, has no closed set and overwrites parents without comparing g;
-here a state is reached again only by a smaller g. The goal test takes the goal's symbols only, as Table I's goal is partial.
+here a state is reached again only by a smaller g. The goal test compares only the goal's symbols, as Table I's goal is partial.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ def a_star(
     ----------
     start : Values
     goal : Goal
-    successors : function from a state to the behaviours applied there; raises `OutOfTimeError` to end the search
-    cost : function from a state and a behaviour applied there to its cost
-    rank : function from a state to the ranking scores (eq. 4), in [0, 1], of behaviours applied there; None leaves c at 0
+    successors : function from a state to the behaviours applied in it; raises `OutOfTimeError` to end the search
+    cost : function from a state and a behaviour applied in the state to the behaviour's cost
+    rank : function from a state to the ranking scores (eq. 4), in [0, 1], of behaviours applied in it; without `rank`, c is 0
     bonus : function from ranking score and depth to the term c of eq. (3)
     limits : Limits
 
     Returns
     -------
-    Found
-        Unsolvable means that no state reachable by `successors` has the goal's values.
+    SearchResult
+        The status unsolvable means that no state reachable by `successors` has the goal's values.
     """
     counts = Counts(generated=1, evaluated=1)
     g = {start: 0.0}

@@ -20,7 +20,7 @@ class PaperConstants:
     """The constants of eqs. (2) and (5)."""
 
     k: float = 3.0
-    anticipated_length: int = 100  # N; the paper gives no value, and one near the plan's length does harm
+    anticipated_length: int = 100  # N; the paper gives no value; a value near the plan's length does harm
     learning: float = 0.1  # λ
 
     def bonus(self, c_m: float, n: int) -> float:
@@ -32,7 +32,7 @@ PAPER = PaperConstants()
 
 
 def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, str, tuple[str, ...]]]:
-    """Return the facts of a state that a level sees, each with the values that its symbol can have there.
+    """Return the facts of a state that a level sees, each with the values that its symbol can have on that level.
 
     Each fact is a factor of the cogency, relevant or not (section III-D of the paper).
     """
@@ -50,7 +50,7 @@ def cogencies(
 ) -> dict[Conclusion, float]:
     """Return ln cogency(b) of each conclusion: the sum of ln p(fact | b) over the facts of a state.
 
-    Facts are treated as independent given the behaviour, eq. (1); its factor k is common to all behaviours and dropped.
+    Facts are treated as independent given the behaviour, eq. (1). The factor k of eq. (1) is common to all behaviours and left out.
 
     Returns
     -------

@@ -1,10 +1,12 @@
 """The hierarchical planner: search on the most abstract level, then refine each behaviour on the level below, down to primitives.
 
-docs/levels.md defines the goal of a refinement: the values after the refined behaviour of all symbols that its level sees, and rest
-values of the symbols that the lower level adds, if it changed them (hands empty, raised and upright). The next behaviour begins in
-the state in which this refinement ended. The result of each behaviour in each state is stored; if it can't be refined there, or the
-rest of the plan isn't applicable after it, the level above is searched again with that knowledge. If a level has no plan at all,
-the level below gets the goal itself.
+docs/levels.md defines the goal of a refinement. Symbols that the refined behaviour's level sees must have their values after the
+behaviour. Symbols that only the lower level sees must be at rest if the refinement changed them (hands empty, raised and upright).
+The next behaviour begins in the state in which the refinement ended.
+
+The refinement of each behaviour in each state is stored. If a behaviour can't be refined, or the rest of the plan isn't applicable
+after its refinement, the level above is searched again with the stored results. If a level has no plan, the level below gets the
+goal itself.
 """
 
 from __future__ import annotations
@@ -23,15 +25,15 @@ from confab.reasoner.memory.links import Links
 from confab.reasoner.symbols import Fact, GroundBehavior, Problem
 
 SETTLED, UNSETTLED = "settled", "unsettled"
-"""Marks of a symbol that did not have its rest value in the beginning: at rest or unchanged, or changed; see `Target`."""
+"""Marks of a symbol that isn't at rest in the beginning: settled while unchanged or at rest, otherwise unsettled (see `Target`)."""
 
 DOUBT = 1_000
-"""Number of expansions before the first proof of unsolvability is tried; it is tried again each time the number has quadrupled."""
+"""Number of expansions before a proof of unsolvability is tried; a proof is tried again each time the number has quadrupled."""
 Proof: TypeAlias = "Callable[[Problem, int, float | None], UnsolvableError | None]"
-"""Function of a problem, a number of states and a deadline: returns why the problem has no plan, or None if it finds no proof."""
+"""Function of a problem, a number of states and a deadline; returns an `UnsolvableError` if the problem is proved unsolvable."""
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
-"""A step with its refinement and the state at the refinement's end; None if there is no refinement."""
+"""A step with its refinement, and the state after the refinement; None if there is no refinement."""
 
 
 @dataclass
@@ -54,7 +56,7 @@ class PaperCall:
 
 
 def unproved(problem: Problem, states: int, deadline: float | None) -> None:
-    """Return no proof."""
+    """Return None: no proof is tried."""
 
 
 def plan(
@@ -72,7 +74,7 @@ def plan(
     ----------
     problem : Problem
     links : Links, optional
-        The confabulation memory; by default an empty one.
+        The confabulation memory, by default empty.
     constants : PaperConstants
     limits : Limits
         Maximum number of expansions of each search, and seconds of the whole call.
@@ -118,7 +120,7 @@ def flat(
     constants: PaperConstants = PAPER,
     limits: Limits = Limits(),  # noqa: B008 - frozen
 ) -> Outcome:
-    """Search one level with the same f but without the hierarchy, for comparison."""
+    """Search one level with the same f as in the paper's mode, but without refinement, for comparison."""
     begin = perf_counter()
     call = _call(problem, (level,), links, constants, limits, None, unproved)
     return _outcome(call, task(call, level), perf_counter() - begin)
@@ -165,7 +167,7 @@ class Target:
     restless: Goal
 
     def marks(self, before: Values, after: Values, marks: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the marks of the restless symbols after a step, given the states around it and the marks before it."""
+        """Return the marks of the restless symbols after a step, given the states before and after it and the marks before it."""
         return tuple(
             SETTLED if after[i] == rest else mark if after[i] == before[i] else UNSETTLED
             for (i, rest), mark in zip(self.restless.items(), marks, strict=True)
@@ -177,7 +179,7 @@ class Target:
 
 
 def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
-    """Return the target of a level: the values `said` by the level above, and rest values of the symbols that the level adds."""
+    """Return the target of a level: the values `said` by the level above, and rest values of symbols that appear on this level."""
     values, restless = dict(said), dict[int, str]()
     for i, symbol in enumerate(model.symbols):
         rest = model.problem.domain.situations[symbol.situation].rest
@@ -189,7 +191,7 @@ def target(model: Model, above: int, level: int, before: Values, said: Goal) -> 
 def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[list[Step], Values] | None:
     """Return refined steps of one level and the state after them, or None if there are none.
 
-    Each pass either succeeds or stores the result of one more behaviour in one more state, of which there are finitely many.
+    Each pass either succeeds or stores the result of a behaviour in a state that has no stored result. So the loop ends.
     """
     while True:
         found = search(call, level, start, wanted)
@@ -213,7 +215,7 @@ def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[l
 
 
 def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -> Refined:
-    """Return a behaviour as a step with its refinement, and the state after that; None if it is impossible in this state."""
+    """Return a step with its refinement, and the state after it; None if the behaviour isn't applicable or has no refinement."""
     if (state, ground) in call.known:
         return call.known[state, ground]
     applied = call.model.apply(ground, state)
@@ -235,9 +237,9 @@ def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -
 
 
 def search(call: PaperCall, level: int, start: Values, wanted: Target) -> SearchResult:
-    """Search one level with eq. (5), without the behaviours known to have no refinement.
+    """Search one level with eq. (5), without behaviours that are known to have no refinement in a state.
 
-    The searched states are those of the model, followed by the marks of the target.
+    A searched state is a state of the model, followed by the marks of the target.
     """
     grounds, size = call.grounds[level], len(start)
     rank = ranker(call, level)
@@ -280,7 +282,7 @@ def timely(grounds: Iterable[GroundBehavior], deadline: float | None) -> Iterato
 
 
 def ranker(call: PaperCall, level: int) -> Callable[[Values], Callable[[Applied], float]]:
-    """Return a function from a state to the ranking scores c_m (eq. 4) of the behaviours applicable there."""
+    """Return a function from a state to the ranking scores c_m (eq. 4) of the behaviours applicable in the state."""
     conclusions = [(g.behavior, g.arguments) for g in call.grounds[level]]
     learned = any(conclusion in call.links.tables for conclusion in conclusions)
 

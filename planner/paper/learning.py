@@ -21,7 +21,7 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
     problem : Problem
         Its initial state is the state before the plan.
     plan : Plan
-        Any depth: a demonstration of the abstract level alone teaches that level.
+        A plan of any depth; a demonstration of the abstract level alone teaches that level.
     links : Links
     constants : PaperConstants
         λ of eq. (2).
@@ -63,9 +63,9 @@ def reinforce(
     state : State
         The situation in which it was chosen; the paper does not specify which state that is.
     problem : Problem
-        Gives the values that each symbol can have.
+        Defines the values that each symbol can have.
     level : int
-        Symbols and values of later levels aren't part of the situation.
+        The behaviour's level; symbols and values of lower levels aren't part of the situation.
     learning : float
         λ of eq. (2).
     """

@@ -16,7 +16,7 @@ Values = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Applied:
-    """A ground behaviour that is applicable, the individuals of its variables, and the state that it leads to."""
+    """An applicable quantified behaviour, the individuals of its variables, and the state after it."""
 
     ground: GroundBehavior
     bindings: Mapping[str, str]
@@ -29,7 +29,7 @@ class Model:
     Parameters
     ----------
     problem : Problem
-        Its `initial` gives the symbols; boolean symbols are completed. Defined symbols follow them if they are goals.
+        The symbols are those of its initial state and all boolean symbols, followed by the defined symbols of its goal.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -61,7 +61,7 @@ class Model:
         return dict(zip(self.symbols[: len(self.cells)], values, strict=False))
 
     def completed(self, stated: Values) -> Values:
-        """Return the values of the stated symbols, followed by those of the defined goals."""
+        """Return the values of the stated symbols, followed by the values of the goal's defined symbols."""
         if not self.defined:
             return stated
         self._move(stated)
@@ -76,7 +76,7 @@ class Model:
         self.table.trail.clear()
 
     def apply(self, ground: GroundBehavior, values: Values) -> Applied | None:
-        """Return the application of a ground behaviour in a state, or None if it isn't applicable there."""
+        """Return the application of a quantified behaviour in a state, or None if the behaviour isn't applicable."""
         self._move(values)
         done = self.forward[ground.behavior](*ground.arguments)
         if done is None:
@@ -89,7 +89,7 @@ class Model:
         return Applied(ground, bindings, self.completed(tuple(after)))
 
     def cost(self, values: Values, applied: Applied) -> float:
-        """Return the cost of an applied behaviour in the state before it."""
+        """Return the cost of an applied behaviour, given the state before it."""
         name = applied.ground.behavior
         if name not in self.prices:
             return self.problem.domain.behaviors[name].cost
@@ -98,7 +98,7 @@ class Model:
         return float(self.prices[name](*applied.ground.arguments, *variables))
 
     def successors(self, grounds: Iterable[GroundBehavior], values: Values) -> Iterator[Applied]:
-        """Yield the application of each ground behaviour that is applicable and changes the state, in their order."""
+        """Yield the application of each quantified behaviour that is applicable and changes the state, in the given order."""
         for ground in grounds:
             applied = self.apply(ground, values)
             if applied is not None and applied.after != values:
@@ -118,8 +118,8 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
     """Return all quantified behaviours of a level in the order of their IDs.
 
-    They equal the results of the SPARQL queries of `confab.reasoner.reading.quantification`, but are computed from the problem's
-    classes.
+    The SPARQL queries of `confab.reasoner.reading.quantification` return the same behaviours; here they are computed from the
+    problem's classes.
     """
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []
