@@ -118,7 +118,7 @@ class AmountTable:
         self._measures: dict[str, Mapping[tuple[str, ...], Exact]] = {}
 
     def text(self, symbol: Symbol) -> str:
-        """Return a symbol's amount as a value."""
+        """Return a symbol's amount as the text of a value."""
         return written(Fraction(self.now[symbol]))
 
     def linear(self, expression: Expression, terms: Mapping[str, str]) -> Linear | None:
@@ -147,7 +147,7 @@ class AmountTable:
                 if other.terms and (one.terms or sign == "/"):
                     one_of, by = (" and ".join(sorted(situations_in(side))) for side in (left, right))
                     did = f"multiplies {one_of} by {by}, which both" if sign == "*" else f"divides by {by}, which"
-                    raise UngroundableError(f"a calculation {did} change; a flat search takes linear ones alone")
+                    raise UngroundableError(f"a calculation {did} change; a flat search requires linear calculations")
                 if sign == "/":
                     return one.times(_exact(Fraction(1) / other.constant)) if other.constant else None
                 return other.times(one.constant) if other.terms else one.times(other.constant)
@@ -269,7 +269,7 @@ class Amounts:
         return self.vectors[state >> self.size]
 
     def begun(self, state: int) -> int:
-        """Return a state's bits with the initial amounts."""
+        """Return a state's bits with the comparison bits of the initial amounts."""
         return state & self.keep | self._masks[0]
 
     def made(self, operator: int) -> tuple[Move, ...]:

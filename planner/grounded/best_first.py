@@ -101,7 +101,7 @@ def search(
     found: Callable[[Sequence[int]], None] | None = None,
     most_work: float = math.inf,
 ) -> Flat:
-    """Search a plan for a grounded task.
+    """Search for a plan of a grounded task.
 
     Work is counted, not timed, so the same limit of expansions always gives the same plan. A deadline can only end the search
     early.

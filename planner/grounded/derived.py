@@ -187,7 +187,7 @@ class Derived:
 
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
-        """For each required bit, the other parts that require it, as number, mask and sign; the mask is 0 for several bits."""
+        """For each required bit, the other parts that require it: number, mask (0 for a part of several bits), and sign."""
         found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)

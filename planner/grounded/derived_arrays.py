@@ -19,7 +19,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Bit:
-    """A derived bit, as a mask: set if a state has all bits of one of the `alternatives`; if `opposite`, if it has all of none."""
+    """A derived bit, as a mask: set if a state has all bits of one alternative; if `opposite`, set if there is none."""
 
     mask: int
     alternatives: tuple[int, ...]

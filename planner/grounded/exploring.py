@@ -50,7 +50,7 @@ class SearchOrder(Protocol):
 
 
 def explore(task: Task, order: SearchOrder) -> Iterator[int]:
-    """Reach states until the order has no more candidates; yield the work of each turn.
+    """Explore states until the order has no more candidates; yield the work of each turn.
 
     Raises
     ------

@@ -23,7 +23,7 @@ BOOST = 1000
 ALL, PREFERRED = 0, 1
 
 Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
-"""Maps a state and its relaxed plan to a later state and the operators that lead to it."""
+"""Maps a state and its relaxed plan to a later state, with the operators that lead to the later state."""
 
 
 class Greedy:

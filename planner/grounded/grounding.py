@@ -177,7 +177,7 @@ class _Assembly:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
     def _excluded(self, goal: State) -> Reason:
-        """Return the reason that a goal holds in no state; if each goal alone is satisfiable, the goals exclude one another."""
+        """Return the reason why no state satisfies the goal: one goal is impossible, or the goals exclude one another."""
         for symbol, value in sorted(goal.items()):
             if self.formulas.wanted(symbol, value) is None:
                 quantity = self.reached.problem.domain.situations[symbol.situation].quantity
@@ -185,7 +185,7 @@ class _Assembly:
                 stays = ", ".join(f"{word} {written(limit)}" for word, limit in limits if limit is not None)
                 text = f"{Fact(symbol, value)} can't be" + (f": it is {stays}" if stays else "")
                 return Reason(text, (symbol.situation, *symbol.arguments))
-        return Reason("the goals exclude one another, or what is wanted to end can't")
+        return Reason("the goals exclude one another, or a fact that has to end can't end")
 
     def _build(
         self,

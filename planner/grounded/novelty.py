@@ -3,7 +3,7 @@
 open:       goals that don't hold, and landmarks that haven't been reached
 distance:   a pair: the number of open goals and landmarks, and the number of facts of the last relaxed plan that have been reached;
             a relaxed plan is made after a goal or landmark has been reached
-novel:      a state is novel if no earlier state of the same distance had one of its facts (tested by an "and" of two integers)
+novel:      a state is novel if it has a fact that no earlier state of the same distance had: one "and" of two integers
 open list:  states by novelty, then by the number of open goals and landmarks; among equal states the newest comes first
 
 Since relaxed plans are made only for expanded states that reach an open goal or landmark, the order ranks a hundred thousand

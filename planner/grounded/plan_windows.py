@@ -36,7 +36,7 @@ STATES, STEPS = 400, 12
 WAYS = 20
 """Number of alternatives of derived bits processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
-"""Lengths of windows in steps; long windows contain round trips that a single step makes needless."""
+"""Lengths of windows in steps; long windows can contain whole round trips that a shorter plan avoids."""
 OPERATORS, EVALUATIONS = 150, 100
 """Maximum number of operators, and of evaluations of h_FF, in the search of a window."""
 WEIGHT = 3
@@ -237,7 +237,7 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
-        """Search fewer steps from a state to the required bits, with operators near the window; None if none are found."""
+        """Search for fewer steps from a state to the required bits, with operators near the window; None if none are found."""
         if (state, wanted, len(steps)) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
@@ -256,7 +256,7 @@ class _Windows:
         return plan if found is None else shortened(self.task, found, self.deadline)
 
     def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
-        """Search a plan cheaper than `upper` by A*; states whose cost plus h_FF reaches `upper` are cut."""
+        """Search for a plan cheaper than `upper` by A*; states whose cost plus h_FF reaches `upper` are cut."""
         evaluate, costs = heuristic(task), task.costs
 
         def left(state: int) -> float:

@@ -212,14 +212,14 @@ class Reached:
             )
             columns, count = self._projected(columns, count, wanted)
         self.check_time()
-        for condition in filters:  # without atoms, or with local variables only
+        for condition in filters:  # remaining filters: there are no atoms, or only local variables
             keep = self._decide(condition, columns, count, schema.kinds)
             columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
         if count:
             yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
 
     def _projected(self, columns: dict[str, Ints], count: int, wanted: Set[str]) -> tuple[dict[str, Ints], int]:
-        """Return columns without unused variables, each distinct row once."""
+        """Return the columns of the variables in `wanted`, each distinct row once, and the number of rows."""
         left = {name: column for name, column in columns.items() if name in wanted}
         if len(left) == len(columns):
             return columns, count

@@ -48,7 +48,7 @@ class RelaxedChanges:
         return np.concatenate(parts) if parts else np.empty((0, 4), np.int64)
 
     def moves(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> dict[int, list[Move]]:
-        """Return the changes of amounts by each relaxed operator that has any."""
+        """Return the changes of amounts for each relaxed operator that changes amounts."""
         names, table = self.reached.individuals, self.reached.amounts
         found = defaultdict[int, list[Move]](list)
         for i, begin in first.items():

@@ -67,7 +67,7 @@ class Schema:
 
 
 def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[list[Behavior], dict[str, SituationType]]:
-    """Return rules with an auxiliary rule for each witness, so that witnesses are joined separately; and auxiliary situation types.
+    """Return rules in which each witness has a separate auxiliary rule, and the auxiliary situation types.
 
     Joining "there is a full cup, and there is a free shelf" at once would give all pairs. So a witness becomes an auxiliary
     situation type over the terms that it shares with other conditions, unless no other condition of the rule can change.

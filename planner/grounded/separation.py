@@ -1,4 +1,4 @@
-"""Removal of variables that no effect names from schemas: a move with some crane is one operator instead of one per crane.
+"""Removal from schemas of variables that no effect names: a move with some crane is one operator instead of one per crane.
 
 The conditions on such a variable become an auxiliary rule over its neighbouring terms. Each join then has the rows of one part
 instead of all pairs of rows of both parts.

@@ -3,7 +3,7 @@
 open:    goals to be tried in one step of the most abstract level
 asleep:  blocked goals; a goal wakes when a symbol that it waits for changes
 kept:    achieved goals; later steps may violate them temporarily, but must restore them
-before:  ordering constraints; a goal that would make another goal unreachable waits for it (a full cup can't be moved)
+before:  ordering constraints; a goal waits for the goals that it would make unreachable (a cup is moved before it is filled)
 
 If no goal can be achieved in one step, the search budget is raised gradually, on each level from the top. A failed attempt is
 repeated only after a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""Number of lowest-level states whose examination must cost less than the searches so far before unsolvability is tested there."""
+"""The lowest level is tested for unsolvability once the searches have cost as much as examining this number of its states."""
 
 
 @dataclass
@@ -111,7 +111,7 @@ class Agenda:
         return True
 
     def begin(self) -> None:
-        """Open all goals that don't hold."""
+        """Put all goals that don't hold into the queue of open goals."""
         call = self.call
         self._before, self._asleep, self._waiting = order(call), {}, {}
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
@@ -209,7 +209,7 @@ class Agenda:
         return False
 
     def _ready(self) -> Iterator[Cell]:
-        """Yield the sleeping goals whose predecessors are all achieved; all sleeping goals if they wait for each other."""
+        """Yield the sleeping goals whose predecessors are all achieved; if there are none, yield all sleeping goals."""
         call = self.call
         ready = [c for c in self._asleep if all(other in call.kept for other in self._before.get(c, ()))]
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
@@ -244,7 +244,7 @@ class Agenda:
         return False
 
     def restart(self, level: int) -> bool:
-        """Achieve all goals together from the initial state, after planning goal by goal met a dead end; undo all if that fails.
+        """Achieve all goals together from the initial state, after a dead end; if that fails, restore the previous steps.
 
         Refinements then leave symbols that no upper level sees unchanged, where possible. Otherwise a goal could become unreachable
         without a change that an upper level sees.
@@ -282,7 +282,7 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------------------ proofs
 
     def check_unsolvable(self) -> None:
-        """Raise `UnsolvableError` if about as much work as the searches so far have taken proves that there is no plan."""
+        """Test for unsolvability with about as much work as the searches so far; raise `UnsolvableError` if there is no plan."""
         call = self.call
         if not self.solvable:
             if call.space.effort >= TEST * FIRST_TESTS:
@@ -296,7 +296,7 @@ class Agenda:
         self._examine()
 
     def _certify(self) -> None:
-        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, and at its limit."""
+        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, up to a limit."""
         call = self.call
         tests = max(FIRST_TESTS, min(call.space.effort // TEST, PAIRS))
         if self._tested < tests >= min(2 * self._tested, PAIRS) and not self._expects_a_plan():

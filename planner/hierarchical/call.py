@@ -131,7 +131,7 @@ class Call:
             goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())
             self.given_up.append(
                 f"level {first} was given up for {goals}: no steps of it were found that can be refined; "
-                f"steps of level {level} stand there"
+                f"steps of level {level} replace them"
             )
         return True
 

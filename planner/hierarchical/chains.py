@@ -42,7 +42,7 @@ class Chain:
         return found
 
     def bar(self, position: int) -> None:
-        """Bar one of the steps found last in the state where it couldn't be refined."""
+        """Bar the step at `position` of the last result in the state in which the step couldn't be refined."""
         self.barred.add((self.found[position], frozenset(self.space.table.since(self.mark).items())))
 
 
@@ -112,7 +112,7 @@ def _step(
     targets: Mapping[Cell, str],
     keep: Keep,
 ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
-    """Apply a behaviour to the table; return the symbols off target and changed after it, or None if it isn't applicable."""
+    """Apply a behaviour to the table; return `off` and `changed` after the behaviour, or None if it isn't applicable."""
     now = space.table.now
     done = space.forward[ground[0]](*ground[1])
     if done is None:

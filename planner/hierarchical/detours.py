@@ -36,7 +36,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
     steps : sequence of RefinedStep
         Steps that are applicable from the initial state.
     level : int
-        Steps of this level are removed with their refinements; where the plan has left this level, steps of a lower level.
+        Steps of this level are removed with their refinements; where the plan has left this level, steps of a lower level are.
     """
     table = refiner.table
     owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
@@ -133,8 +133,8 @@ def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bo
 class _Assembly:
     """Assembles steps from their remaining parts, by number, and replays each part on the table.
 
-    A step is kept whole if all of its parts remain, it still has its effect, and it begins with all symbols at rest that its level
-    doesn't see. Otherwise its remaining parts replace it.
+    A step is kept whole if all of its parts remain, the step still has its effect, and before the step all symbols are at rest that
+    its level doesn't see. Otherwise its remaining parts replace the step.
     """
 
     def __init__(self, refiner: Refiner, level: int, kept: Mapping[int, RefinedStep]) -> None:

@@ -94,7 +94,7 @@ class Methods:
         del known[METHODS:]
 
     def lifted(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Method:
-        """Return the steps that refined a behaviour as a method: its individuals become the first roles, others open roles."""
+        """Return steps that refined a behaviour as a method: `individuals` become the first roles, all others become open roles."""
         behaviors = self.space.program.domain.behaviors
         places: dict[str, int] = {}
         for place, individual in enumerate(individuals):

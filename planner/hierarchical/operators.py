@@ -1,7 +1,7 @@
 """Behaviours compiled to Python source: functions for their changes, and for the bindings with which an effect achieves a value.
 
 Each behaviour has a function ``forward`` (`confab.planner.transitions`); each effect has a function ``achieve(key …, value)``.
-``achieve`` yields every binding with which the effect would set that symbol to that value, with the preconditions unmet now.
+``achieve`` yields every binding with which the effect would set that symbol to that value, with the unmet preconditions.
 
 An unbound parameter is enumerated by the cheapest of these sources: a static relation to a bound term; the inverse of a situation
 type that no behaviour can change for these individuals; the members of its class. Terms that only the state determines are bound
@@ -332,7 +332,7 @@ class Program:
 
 
 def named(problem: Problem, rests: bool = True) -> list[str]:
-    """Return the individuals in behaviours and rules, and in default and rest values."""
+    """Return the individuals that behaviours and rules name, and (if `rests`) the default values and rest values."""
     every: set[str] = set()
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
     for behavior in (*problem.domain.behaviors.values(), *rules):

@@ -39,7 +39,7 @@ FLAT = 50_000_000
 """Maximum work of searching a one-level task as a whole, before planning goal by goal, in bits of relaxed plans (some seconds)."""
 FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a one-level task is grounded as a whole."""
-NOT_LEFT = "levels aren't to be left"
+NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
 """Share of the time limit that is used for search; the rest is for releasing memory."""
 
@@ -113,7 +113,7 @@ def _plan(
             call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
             if not leave_levels and any(step.level != levels[0] for step in plan.steps):
-                return given_up(call, f"a goal that level {levels[0]} doesn't see takes steps below it: {NOT_LEFT}")
+                return given_up(call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}")
             return call.outcome(Status.SOLVED, plan)
         return last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
@@ -133,7 +133,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
         )
     if agenda.too_large is not None:
-        return given_up(call, f"goals in series found no plan, and {agenda.too_large.text}")
+        return given_up(call, f"planning goal by goal found no plan, and {agenda.too_large.text}")
     flat = lowest_alone(call, limits, BITS * limits.work)
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
@@ -190,6 +190,6 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
             break
     if wanted is not goal and flat.status is Status.UNSOLVABLE:  # a plan that touches fewer symbols may still exist
         return replace(
-            flat, status=Status.GAVE_UP, reason=Reason("plans were found that leave what they touch not at rest")
+            flat, status=Status.GAVE_UP, reason=Reason("each plan that was found leaves a changed symbol not at rest")
         )
     return flat

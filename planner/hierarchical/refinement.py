@@ -162,9 +162,9 @@ class Refiner:
     def searched(
         self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
     ) -> list[RefinedStep] | None:
-        """Search steps of a level with one budget and apply them; on failure return None and leave the table unchanged.
+        """Search for steps of a level with one budget and apply them; on failure return None and leave the table unchanged.
 
-        If steps leave a touched symbol with a wrong value, the search is repeated with that symbol as an additional target.
+        If the steps leave a changed symbol with a wrong value, the search is repeated with that symbol as an additional target.
         """
         if budget.rules:
             return self.advice.follow(level, targets, keep) if self.advice is not None else None
@@ -214,7 +214,7 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a target, or a symbol touched since a mark, that doesn't have its required value; None if all have it."""
+        """Return a target, or a symbol changed since a mark, that doesn't have its required value; None if there is none."""
         now = self.table.now
         for cell, first in self.table.before(mark).items():
             wanted = targets.get(cell) or keep(cell, first)
@@ -258,7 +258,7 @@ class Refiner:
         return all(self.replay_checked(step) is not None for step in steps)
 
     def _idle(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
-        """Return single steps that change only symbols whose final values don't matter, and pairs that undo each other."""
+        """Return positions of single steps that change only symbols with arbitrary final values, and of pairs that cancel out."""
         self.table.undo(mark)
         changes: list[Changes] = []
         for step in steps:

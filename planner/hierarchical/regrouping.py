@@ -14,7 +14,7 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LONGEST = 60
-"""Maximum number of steps below one step of the level above."""
+"""Maximum number of steps that are grouped under one step of the level above."""
 
 
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:

@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 4
-"""Maximum size of a class that is part of every scope (the hands); maximum number of objects with a value that join its scope."""
+"""Maximum size of a class that is part of every scope (the hands). Objects with a value in the scope are added if there are at most
+this many."""
 
 BITS = 20
 """Number of bits that a search processes per relaxed operator and state, including overhead."""
@@ -103,7 +104,7 @@ class Scope:
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
     def bar(self, position: int) -> None:
-        """Exclude the plan that was found last because one of its steps can't be refined at its position."""
+        """Bar the step at `position` of the last plan in its state, because the step can't be refined there."""
         assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:

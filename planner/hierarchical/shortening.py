@@ -54,7 +54,7 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
     """Shorten the steps of a call in rounds.
 
-    Without a time limit there is one round. With a time limit, the number of rounds is twice that of the last round that saved
+    Without a time limit there is one round. With a time limit, rounds continue up to twice the number of the last round that saved
     primitives.
     """
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
@@ -85,7 +85,7 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
 
 
 def puts_aside(call: Call) -> bool:
-    """Return whether a step overwrites a value that no step has required since it was set; otherwise few steps are needless."""
+    """Return whether a step overwrites a value that no step required after it was set; if not, hardly any step is needless."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)

@@ -146,7 +146,7 @@ class Subgoals:
         yield from self._redetermined(achiever, condition, env, level)
 
     def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Subgoal]:
-        """Yield the facts that individuals lack to satisfy a witness, as subgoals."""
+        """Yield subgoals: facts that would make some individual satisfy a witness."""
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
         for individual in self.one_of_each(witness.kind, env.values()):
@@ -195,7 +195,7 @@ class Subgoals:
         self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
-        """Return the candidates for a rule's witness set by `concern`; if none, a few with the fewest unmet conditions."""
+        """Return the candidates that `concern` has set; if there are none, a few candidates with the fewest unmet conditions."""
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 

@@ -64,7 +64,7 @@ class SymmetryClasses:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return the known members, and for each symmetry class one more member in each state that no known member has.
+        """Return the known members, and one more member for each other state that members of a symmetry class have.
 
         In a large class only the first and last few members are examined, since values are used up from one end.
         """

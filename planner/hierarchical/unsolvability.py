@@ -46,7 +46,7 @@ def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = N
 
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
-    """Return the facts reachable on a level from the problem's initial state, or another, under delete relaxation."""
+    """Return the facts reachable on a level under delete relaxation, from `initial` or the problem's initial state."""
     from confab.planner.grounded import reachability
 
     reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
@@ -55,7 +55,7 @@ def closed(problem: Problem, level: int, deadline: float | None, initial: State 
 
 
 def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
-    """Return the reason if grounding a level would take too much memory: an effect makes one change per value of its symbol."""
+    """Return the reason if grounding a level would take too much memory, since an effect makes a change per value of its symbol."""
     values = {}
     for name, situation in reached.situations.items():
         rows = len(reached.tables["situation", name])
@@ -72,7 +72,7 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
 def proved(problem: Problem, level: int, deadline: float | None = None) -> Task | Reason:
     """Raise `UnsolvableError` if a goal is unreachable on a level under delete relaxation.
 
-    Otherwise return the grounded level, or the reason why it is too large for that.
+    Otherwise return the grounded level, or the reason why the level is too large to be grounded.
     """
     from confab.planner.grounded.grounding import ground
 
@@ -97,7 +97,7 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
     """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of states examined.
 
-    The work is limited to that of the searches so far. The examination is skipped unless it allows twice `before` states.
+    The work is limited to that of the searches so far. No states are examined unless this work suffices for twice `before` states.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state
@@ -109,7 +109,7 @@ def looked_at(task: Task, space: Workspace, before: int) -> int:
 
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
-    """Return the reason that no reachable state satisfies the goal, if examining at most `most` states shows it."""
+    """Return the reason that no reachable state satisfies the goal, if examining at most `most` states proves this."""
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""Divisor for comparing saved primitives with lost level-1 steps: a plan may lose fewer than this number per saved primitive."""
+"""A shortened plan must lose fewer than this number of level-1 steps for each primitive that it saves."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
 """Maximum number of rows of a join when a level is grounded to shorten a plan: in total, and per step of the plan."""
 
@@ -107,7 +107,7 @@ def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
 
 
 def length(steps: Sequence[RefinedStep]) -> int:
-    """Return the number of primitives."""
+    """Return the number of primitives in steps."""
     return sum(length(step.steps) if step.steps else 1 for step in steps)
 
 

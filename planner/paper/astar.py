@@ -49,7 +49,7 @@ def a_star(
     bonus: Callable[[float, int], float] = lambda c, n: 0.0,
     limits: Limits = Limits(),  # noqa: B008 - frozen
 ) -> SearchResult:
-    """Search a path from `start` to a state with the values of `goal`.
+    """Search for a path from `start` to a state with the values of `goal`.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class PaperConstants:
 
     k: float = 3.0
     anticipated_length: int = 100  # N; the paper gives no value; a value near the plan's length does harm
-    learning: float = 0.1  # λ
+    learning: float = 0.1  # λ of eq. (2)
 
     def bonus(self, c_m: float, n: int) -> float:
         """Return the term c of eq. (5): ``(c_m - 1) k w`` with ``w = max(1 - n/N, 0)``."""

@@ -79,7 +79,7 @@ def plan(
     limits : Limits
         Maximum number of expansions of each search, and seconds of the whole call.
     grounds : mapping of level to quantified behaviours, optional
-        As `confab.reasoner.reading.quantification` returns them; by default quantified from the problem's classes.
+        Results of `confab.reasoner.reading.quantification`; by default the behaviours are quantified from the problem's classes.
     leave_levels : bool
         Whether the level below gets the goal if a level has no plan that can be refined.
     proof : Proof
@@ -104,7 +104,7 @@ def plan(
         if steps is not None or call.gave_up:
             break
         if not leave_levels and level != levels[-1]:
-            reason = Reason(f"no plan of level {level} was found that can be refined, and levels aren't to be left")
+            reason = Reason(f"no plan of level {level} was found that can be refined, and levels must not be left")
             return Outcome(Status.GAVE_UP, None, reason, call.counts, 0, perf_counter() - begin)
         if level != levels[-1]:
             unseen = [str(Fact(s, value)) for s, value in problem.goal.items() if not problem.sees(level, s, value)]

@@ -1,4 +1,4 @@
-"""Learning from an executed plan: eq. (2) for every behaviour of every level, in the situation in which it was chosen."""
+"""Learning from an executed plan: eq. (2) for each behaviour of each level, in the situation in which the behaviour was chosen."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def reinforce(
     conclusion : Conclusion
         The behaviour that was planned and executed successfully.
     state : State
-        The situation in which it was chosen; the paper does not specify which state that is.
+        The situation in which the behaviour was chosen; the paper does not specify which state that is.
     problem : Problem
         Defines the values that each symbol can have.
     level : int

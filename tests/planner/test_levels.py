@@ -83,7 +83,7 @@ def test_a_level_that_may_not_be_left_is_not() -> None:
     outcome = paper(served("beverage1", "location7"), leave_levels=False)
     assert outcome.status is Status.GAVE_UP
     assert outcome.reason is not None
-    assert outcome.reason.text == "no plan of level 1 was found that can be refined, and levels aren't to be left"
+    assert outcome.reason.text == "no plan of level 1 was found that can be refined, and levels must not be left"
     assert paper(served("no_beverage", "location7"), leave_levels=False).status is Status.SOLVED
 
 
