@@ -113,7 +113,9 @@ def _plan(
             call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
             if not leave_levels and any(step.level != levels[0] for step in plan.steps):
-                return given_up(call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}")
+                return given_up(
+                    call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}"
+                )
             return call.outcome(Status.SOLVED, plan)
         return last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
@@ -130,7 +132,8 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
         return given_up(call, f"no plan of level {upper[0]} was found that can be refined, and {NOT_LEFT}")
     if upper:
         call.given_up.append(
-            f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
+            f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} "
+            f"{'were' if len(upper) > 1 else 'was'} given up for the whole task"
         )
     if agenda.too_large is not None:
         return given_up(call, f"planning goal by goal found no plan, and {agenda.too_large.text}")
