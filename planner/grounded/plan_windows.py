@@ -390,7 +390,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the task of a window with all bits of the whole task, since the amounts in a state are numbered with them."""
+        """Return the task of a window with all bits of the whole task, since a state's amounts are numbered above these bits."""
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]

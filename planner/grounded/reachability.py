@@ -47,8 +47,8 @@ class Reached:
     Attributes
     ----------
     tables : mapping of (kind, name) to JoinTable
-        Kind is situation, relation or class; a row of a situation type has the arguments and the value (no value if it is
-        boolean, since only true facts are listed).
+        The kind is situation, relation or class. A row of a situation type has the arguments and the value. A row of a boolean
+        situation type has no value, since only true facts are listed.
     rows : list of Ints
         For each schema, the rows that match it, with a column of individuals for each of its terms.
     changed : set of situation types

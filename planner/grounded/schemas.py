@@ -38,7 +38,7 @@ from confab.reasoner.symbols import (
 
 @dataclass(frozen=True)
 class Atom:
-    """A row of a table: of a situation type (its arguments, then its value unless it is boolean), a relation or a class."""
+    """A row of a table of a situation type (arguments, then the value unless the type is boolean), a relation or a class."""
 
     table: tuple[str, str]
     terms: tuple[str, ...]

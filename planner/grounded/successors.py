@@ -56,7 +56,7 @@ class SuccessorTree:
         return found, visited
 
     def _branch(self) -> None:
-        """Distribute the waiting operators by the value of the symbol that the first of them tests."""
+        """Distribute the waiting operators over subtrees, by the value of the symbol that the first waiting operator tests."""
         masks, others = self.masks, []
         by_value: dict[int, list[Waiting]] = {}
         for one in self.waiting:

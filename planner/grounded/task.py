@@ -30,7 +30,7 @@ from confab.planner.plan import Step
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 BitChange = tuple[int, int, int]
-"""If all bits of the first mask are set, the bits of the second are cleared and then those of the third are set."""
+"""Three masks: if all bits of the first mask are set, the bits of the second are cleared, then the bits of the third are set."""
 
 
 @dataclass(frozen=True)

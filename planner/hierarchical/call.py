@@ -46,7 +46,7 @@ class GoalAdvice(Advice, Protocol):
         """Return whether the planner should follow advice now."""
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if a rule achieves the goal in one step, 2 if in more steps, 0 if no rule achieves it."""
+        """Return 1 if a rule achieves the goal in one step, 2 if a rule needs more steps, 0 if no rule achieves the goal."""
 
     def waits(self, cell: Cell) -> bool:
         """Return whether another open goal should be achieved first."""
@@ -144,7 +144,7 @@ class Call:
         return not any(self.restless(level) for level in self.program.levels[1:])
 
     def restless(self, level: int) -> dict[Cell, str]:
-        """Return the rest values of a level's symbols that aren't at rest."""
+        """Return the symbols of a level that aren't at rest, with their rest values."""
         return {
             (name, key): situation.rest
             for name, situation in self.problem.domain.situations.items()

@@ -27,7 +27,7 @@ MOST_EXPANSIONS = 150
 
 
 class Chain:
-    """A search for a few relevant steps, repeated as long as one of the steps can't be refined."""
+    """A search for a few relevant steps; the search is repeated as long as one of the steps can't be refined."""
 
     def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, longest: int) -> None:
         self.space, self.level, self.targets, self.keep, self.longest = space, level, targets, keep, longest

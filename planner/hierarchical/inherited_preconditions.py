@@ -8,7 +8,7 @@ of that behaviour on the changed individuals must hold.
 Two kinds of conditions aren't inherited:
 
 - conditions on other individuals of the upper behaviour (the other vessel);
-- conditions on the old value of a symbol whose present value the upper level doesn't see (the place from which a held object came).
+- conditions on the old value of the changed symbol, if the upper level doesn't see all of its values (the place of a held object).
 """
 
 from __future__ import annotations

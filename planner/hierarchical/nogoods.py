@@ -18,7 +18,7 @@ from confab.reasoner.symbols import State
 Term: TypeAlias = "str | int"
 """An individual, or the number of a role."""
 Held: TypeAlias = "tuple[str, tuple[Term, ...], Term, Term | None]"
-"""A situation type and its arguments, the value that held, and the value to be kept, if any."""
+"""A situation type and its arguments, their value when the search failed, and the value to be kept (None: any value)."""
 
 
 class Nogoods:

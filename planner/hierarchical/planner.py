@@ -191,7 +191,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
         call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break
-    if wanted is not goal and flat.status is Status.UNSOLVABLE:  # a plan that touches fewer symbols may still exist
+    if wanted is not goal and flat.status is Status.UNSOLVABLE:  # a plan that changes fewer symbols may still exist
         return replace(
             flat, status=Status.GAVE_UP, reason=Reason("each plan that was found leaves a changed symbol not at rest")
         )

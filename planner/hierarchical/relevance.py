@@ -18,7 +18,7 @@ from confab.reasoner.symbols import TRUE
 Asked: TypeAlias = "set[tuple[str, Key, str]]"
 """Subgoals examined so far: situation type, key and value."""
 QUESTIONS = 1000
-"""Maximum number of values on the chains towards one value."""
+"""Maximum number of values that are examined on the chains towards one value."""
 
 
 def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:

@@ -54,7 +54,7 @@ grounded if the budget allows fewer than a fifth of this number of states."""
 
 
 class Scope:
-    """A scope on one level in the present state: a grounded task, searched again whenever a step can't be refined."""
+    """A scope on one level in the present state: a grounded task that is searched again whenever a step can't be refined."""
 
     def __init__(
         self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
