@@ -1,7 +1,8 @@
 """Planning a level with an external planner through unified-planning: export, plan, read back, order.
 
 The result is one of our plans: each step stands behind the steps on which it depends, and below a behaviour of a higher level
-wherever a run of steps has exactly the effect of that behaviour. `confab.planner.validation` has to accept it.
+wherever a run of steps has exactly the effect of that behaviour. Every plan of an engine must be accepted by
+`confab.planner.validation`.
 """
 
 from __future__ import annotations

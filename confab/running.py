@@ -66,8 +66,8 @@ class Job:
 def run(job: Job) -> int:
     """Do the main job, print its results, and write its files.
 
-    A scene without a robot's body is planned in and the plan is checked. The same is done where PyBullet isn't installed: a
-    remark first names the obstacle, and the exit code is that of misuse.
+    For a scene without a robot's body, the plan is made and checked, and not executed in physics. The same holds if PyBullet
+    isn't installed: a remark first names the obstacle, and the exit code is that of misuse.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Amounts in generated Python: comparisons, changes by behaviours, and tests whether a change approaches a goal.
+"""Amounts in generated Python: comparisons, changes by behaviours, and tests of whether a change approaches a goal.
 
 A table stores an amount as text; generated code calls functions of this module with the numbers of the texts.
 """
@@ -28,11 +28,11 @@ from confab.reasoner.symbols import AmountEffect, Comparison
 
 Rows: TypeAlias = "frozenset[tuple[str, ...]]"
 Constant: TypeAlias = "Callable[[tuple[str, str], object], str]"
-"""Makes a value available to generated code, and returns its name there."""
+"""Makes a value available to generated code, and returns its name in this code."""
 
 
 def amount(expression: Expression, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return an amount as a Python expression; a missing one is `NOTHING`."""
+    """Return an amount as a Python expression; a missing amount is `NOTHING`."""
     match expression:
         case Amount(situation, arguments):
             return _now(situation, key_written(arguments), constant)
@@ -64,7 +64,7 @@ def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Consta
 
 
 def approaches_goal(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return the test that an effect brings its amount nearer to a goal, which is in a variable."""
+    """Return a test of whether an effect brings its amount nearer to a goal; the goal is in a variable."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     after = (
         f"{constant(('amounts', 'done'), done)}({effect.operation!r}, {_now(effect.situation, key, constant)}, {by})"

@@ -1,11 +1,12 @@
 """A plan as a reactive behaviour tree, which recovers by itself after a disturbance that undoes a step.
 
-Each step becomes a fallback: either *its effects hold already*, or *its conditions hold and it is executed*. The required facts are
-the causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that requires them. A
-link is satisfied if the fact holds, or once the later primitive is done itself. So a primitive is repeated exactly if a primitive
-still to come requires it. At the beginning of each tick the primitives that are done are marked, the last one first; after
-each primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps whose primitives neither require
-nor disturb one another, and that have different workers, are parallel. The steps below an abstract step are a subtree.
+Each step becomes a fallback: either *its effects hold already*, or *its conditions hold and it is executed*. The required facts
+are the causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that requires them.
+A link is satisfied if the fact holds, or if the later primitive has been executed. So a primitive is repeated exactly if a
+later primitive still requires its effects. At the beginning of each tick the completed primitives are marked, the last one
+first. After each primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps whose primitives
+neither require nor disturb one another, and that have different workers, are parallel. The steps below an abstract step are a
+subtree.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Marked:
 
 @dataclass(frozen=True)
 class Mark:
-    """Marks the step of a path as done if the child succeeds, as not done otherwise; succeeds."""
+    """Marks the step of a path as done if the child succeeds, and as not done otherwise; it always succeeds."""
 
     path: Path
     child: Node
@@ -80,7 +81,7 @@ class Together:
 
 @dataclass(frozen=True)
 class Subtree:
-    """A tree with a name: the whole, the marking, or the steps below a step."""
+    """A tree with a name: the whole tree, the marks, or the steps below a step."""
 
     name: str
     child: Node
@@ -173,7 +174,7 @@ class _Tree:
         return First((guard, Subtree(f"{step} at {_dotted(step.path)}", All(self.in_order(step.steps)))))
 
     def independent(self, one: Step, other: Step) -> bool:
-        """Return whether no primitive of one step waits for one of the other, and their workers differ."""
+        """Return whether no primitive of one step waits for a primitive of the other, and their workers differ."""
         ours, theirs = Plan((one,)).primitives, Plan((other,)).primitives
         busy = {worker_of(step, self.workers) for step in ours} & {worker_of(step, self.workers) for step in theirs}
         if busy or not self.workers:
@@ -201,7 +202,7 @@ class _Tree:
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
     def wanted(self, change: FactChange, kind: Kind) -> Fact:
-        """Return the fact of a change; for an amount, that it is at least, or at most, the planned value where it is required."""
+        """Return the fact that a change makes true. For an amount, the fact is a bound: at least, or at most, the planned value."""
         symbol, value = change.fact.symbol, change.fact.value
         if kind is Kind.GOAL and symbol in self.problem.goal:
             return Fact(symbol, self.problem.goal[symbol])

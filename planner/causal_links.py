@@ -1,12 +1,11 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step of the same level needs an earlier one if, in the same state but with one fact that the earlier step gave restored to
-its previous value, it isn't applicable or no longer has the effects that are needed. So a link is found for any kind of condition
-("no object stands there" as well as "the hand holds it"), and without the earlier step `confab.planner.validation` rejects the
-rest of the plan. Each level has its own sequence of steps; where a plan leaves a level, the lower steps take their place.
-
-The facts that a step reads are recorded, and only these are restored: the effort grows with the number of facts read by the steps,
-and not with the square of the plan's length.
+A later step needs an earlier step of the same level if it depends on a fact of the earlier step: with the previous value of
+that fact, the later step isn't applicable, or lacks a needed effect. This test finds links for any kind of condition ("no
+object stands there", "the hand holds it"). Without the earlier step, `confab.planner.validation` rejects the rest of the plan.
+Each level has its own sequence of steps; lower steps stand in for it where a plan leaves the level. The facts that a step reads
+are recorded, and only these are restored. So the effort grows with the number of facts that the steps read, and not with the
+square of the plan's length.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class FactChange:
-    """A fact that a step makes true, with the symbol's previous value."""
+    """A fact that a step makes true, with the previous value of its symbol."""
 
     fact: Fact
     before: str
@@ -62,7 +61,7 @@ class Need:
 class Purpose:
     """The facts that a step gives, as its level sees them, and their needs, nearest first.
 
-    Without a need, the goal is reached without the step.
+    A step without needs is superfluous.
     """
 
     gives: tuple[FactChange, ...]
@@ -118,7 +117,7 @@ class _Written:
 
 
 class _Noting(Facts):
-    """Facts that record which cells are read, and which holders of which value."""
+    """Facts that record the cells, and the holders of values, that are read."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -149,7 +148,7 @@ class _Course:
         self.whole = plan.steps if _least(plan.steps) == level else ()
 
     def links(self) -> Iterator[tuple[Path, Need]]:
-        """Yield each step that is needed, with the need."""
+        """Yield each needed step with its need."""
         found: list[tuple[Path, Need]] = []
         deeds: list[tuple[int, int, tuple[FactChange, ...], frozenset[Cell]]] = []
         open_: dict[Path, tuple[int, int, dict[Cell, str]]] = {}
@@ -188,7 +187,7 @@ class _Course:
     def needs_of(
         self, step: Step
     ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
-        """Yield the givers of a step's needs, with the conditions that fail without them or the cells that would differ."""
+        """Yield the steps that a step needs, each with the conditions that fail, or the cells that differ, without it."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
@@ -217,7 +216,7 @@ class _Course:
     def failures_without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
-        """Return what fails for a step if cells have their previous values; None if nothing does."""
+        """Return the conditions of a step that fail if cells have their previous values; None if the step is unaffected."""
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
         now = {cell: str(facts.value(*cell)) for cell in cells}
@@ -245,7 +244,7 @@ class _Course:
         return (changes, (), differs) if differs else None
 
     def givers_of_amount(self, cell: Cell, before: str) -> _Written | None:
-        """Return the givers of an amount that was consumed: without any of them it would have been less."""
+        """Return the steps that provided a consumed amount: without any of them it would have been less."""
         if cell not in self.written or not self.counted(cell):
             return None
         less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
@@ -253,7 +252,7 @@ class _Course:
         return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
 
     def counted(self, cell: Cell) -> bool:
-        """Whether a cell has an amount: a step that changes an amount depends on the amount before."""
+        """Return whether a cell has an amount: a step that changes an amount depends on the amount before."""
         return self.problem.domain.situations[cell[0]].quantity is not None
 
     def done(self, number: int, step: Step) -> None:
@@ -273,7 +272,7 @@ class _Course:
     def left(
         self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
     ) -> Iterator[tuple[Path, Need]]:
-        """Yield the facts that steps have to leave for the step above (or the plan, if level is 0), with their givers."""
+        """Yield the facts that steps have to achieve for the step above (for the plan if level is 0), each with its giver."""
         touched = dict[Cell, str]()
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)
@@ -294,9 +293,9 @@ class _Course:
             yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
 
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
-        """Yield the givers of the facts from which a defined goal follows.
+        """Yield the steps that give the facts from which a defined goal follows.
 
-        These are facts that the goal's derivation read and without which it wouldn't hold.
+        Facts that its derivation read, and without which the goal wouldn't hold.
         """
         if cell[0] not in self.problem.domain.rules:
             return

@@ -24,7 +24,7 @@ from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 OTHER, ANY, KEPT = "", "?", "="
-"""Entries of a case: none of the distinguished values; any value; in a successor: the value before."""
+"""Entries of a case: none of the distinguished values; any value; in a successor, the value before the behaviour."""
 WORK = 3_000_000
 """Maximum work of a check: tests of conditions, and behaviours tried in a case."""
 MOST_CASES = 200_000
@@ -37,7 +37,7 @@ applicable; and the claim "never" or "always" that it violates."""
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
-    """Return why a certificate doesn't prove that a problem has no plan; None if it does."""
+    """Return the reason for which a certificate doesn't prove that a problem has no plan; None if it proves this."""
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
@@ -98,7 +98,7 @@ class CaseView:
     unknown: list[tuple[Symbol, str, bool]] | None = None
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has a value in some state of the case."""
+        """Return whether a symbol has a value in some state of the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -121,7 +121,7 @@ class CaseView:
         return True
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has another value in some state of the case."""
+        """Return whether a symbol has another value in some state of the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -193,7 +193,7 @@ class Claims:
         return Range(min(low, first), max(high, first))
 
     def broken(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol with this value violates a claim "never" or "always"."""
+        """Return whether a symbol with this value violates a claim "never" or "always"."""
         always = self.certificate.always.get(symbol)
         return (always is not None and always != value) or Fact(symbol, value) in self.certificate.never
 
@@ -334,7 +334,7 @@ class Cases:
         return known
 
     def effects(self, reading: Reading, one: Try) -> Leaf:
-        """Return the possible changes of a behaviour, as far as the certificate concerns them."""
+        """Return the possible changes by a behaviour of the symbols that the certificate mentions."""
         behavior, env, claims = one.behavior, one.env, self.claims
         if not all(reading.holds(condition, env, behavior.kinds) for condition in behavior.preconditions):
             return None, ""
@@ -375,7 +375,7 @@ class Cases:
         return tuple((at, tuple(dict.fromkeys(entries))) for at, entries in sorted(changes.items())), ""
 
     def _overruled(self, behavior: Behavior, env: Mapping[str, str], symbol: Symbol) -> bool:
-        """Whether an unconditional effect certainly gives a symbol the value that it always has."""
+        """Return whether an unconditional effect certainly gives a symbol the value that it always has."""
         last = [
             env.get(effect.value, effect.value)
             for effect in behavior.effects
@@ -387,7 +387,7 @@ class Cases:
         return bool(last) and not others and not self.claims.broken(symbol, last[-1])
 
     def ends_here(self, case: Case) -> bool:
-        """Whether the goal and the rest values hold in some state of a case."""
+        """Return whether the goal and the rest values hold in some state of a case."""
         known = self._ends.find(case)
         if known is None:
             view = CaseView(self.claims, case)
@@ -397,7 +397,7 @@ class Cases:
         return known
 
     def met(self, reading: Reading, fact: Fact) -> bool:
-        """Whether a fact of the final state may hold; a symbol not at rest initially may keep its value."""
+        """Return whether a fact of the final state may hold; a symbol not at rest initially may keep its value."""
         symbol, wanted = fact.symbol, fact.value
         if reading.goal(symbol, wanted):
             return True
@@ -405,7 +405,7 @@ class Cases:
 
 
 def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
-    """Whether a fact is a goal, or a rest value that a plan has to restore if it changes the symbol."""
+    """Return whether a fact is a goal, or a rest value that a plan has to restore if it changes the symbol."""
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
@@ -428,9 +428,7 @@ def unified(
 ) -> dict[str, str] | None:
     """Return the bindings of a behaviour's own variables with which the terms of an effect equal some words.
 
-    None if there are none.
-
-    None in the place of a word matches any term.
+    None if there are no such bindings. A word that is None matches any term.
     """
     found: dict[str, str] = {}
     for term, word in zip(terms, words, strict=True):

@@ -1,4 +1,4 @@
-"""The reason that a certificate of unsolvability gives, as a sentence: the first cause, and what follows from it."""
+"""The reason of a certificate of unsolvability as a sentence: the first cause, and its consequences up to the goal."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a fact can't hold: a sentence, the terms in it, and the claims it depends on (none if no behaviour can change it)."""
+    """Why a fact can't hold: a sentence, its terms, and the claims on which it depends; none if the cause can't be changed."""
 
     text: str
     terms: tuple[str, ...] = ()
@@ -198,7 +198,7 @@ class _Causes:
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
     def exceeded(self, fact: Fact) -> str:
-        """Return the bound of an amount that a goal value lies beyond, in words; empty if there is none."""
+        """Return in words the bound of an amount that a goal value exceeds; empty if there is none."""
         quantity, words = (
             self.lowest.quantity(fact.symbol.situation),
             f"{fact.symbol.arguments[0]} {fact.symbol.situation}",
@@ -221,11 +221,11 @@ class _Causes:
         return ""
 
     def direction(self, fact: Fact) -> str:
-        """Return whether the goal requires more of an amount, or less."""
+        """Return `MORE` or `LESS`: the direction in which an amount would have to change to meet its goal."""
         return towards(self.problem.initial.get(fact.symbol), fact.value)
 
     def towards(self, effect: Effect, given: dict[str, str], fact: Fact) -> bool:
-        """Whether an effect may move an amount towards its goal, or out of its claimed bounds."""
+        """Return whether an effect may move an amount towards its goal, or out of its claimed bounds."""
         if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
             return True
         reading, _ = self.reading()
@@ -333,7 +333,7 @@ class _Causes:
         return Cause("")
 
     def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Yield how an effect would take an amount out of its bounds."""
+        """Yield in words how an effect would violate the bounds of an amount."""
         from confab.planner.possibilities import OPERATORS, calculated
 
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
@@ -356,7 +356,7 @@ class _Causes:
             yield f"take {words} to {written(new.low)}, which is no whole number", terms
 
     def words(self, core: Sequence[Condition], given: dict[str, str], kinds: dict[str, str]) -> str:
-        """Return the conditions that fail, as required: ``a Hand that canReach location9, and there is none``."""
+        """Return failing conditions in words, as a requirement: ``a Hand that canReach location9, and there is none``."""
 
         def term(name: str) -> str:
             return given.get(name, f"some {kinds[name]}" if name in kinds else name)
@@ -388,7 +388,7 @@ def variables_of(expression: Expression) -> set[str]:
 
 
 def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
-    """Return how many different individuals of a class a condition requires, the class, and the conditions on each."""
+    """Return the number of different individuals that a condition requires, their class, and the conditions on each."""
     before: list[str] = []
     found: tuple[str, tuple[Condition, ...]] = ("", ())
     while isinstance(condition, Witness) and not condition.negated and len(before) < len(WORDS) - 1:
@@ -406,19 +406,19 @@ def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...
 
 @dataclass
 class _Noting(CaseView):
-    """A view of a case that records the claims by which it denied a fact."""
+    """A view of a case that records the claims by which facts turned out impossible."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has a value in some state of the case."""
+        """Return whether a symbol has a value in some state of the case."""
         found = super().may(symbol, value)
         if not found and value in self.claims.lowest.given[symbol.situation]:
             self.claimed[Fact(symbol, value)] = None
         return found
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol has another value in some state of the case."""
+        """Return whether a symbol has another value in some state of the case."""
         found = super().may_not(symbol, value)
         if not found and symbol in self.claims.certificate.always:
             self.claimed[Fact(symbol, value)] = None

@@ -1,10 +1,9 @@
-"""A certificate proves that a task has no plan.
+"""A certificate proves that a task has no plan: a set of states that contains the initial state, is closed, and violates the goal.
 
-A set of states that contains the initial state, is closed, and violates the goal.
-
-Three kinds of claims describe the set. Some facts *never* hold. Some symbols *always* keep their value, or an amount stays within
-bounds. The values of some symbols are *told apart* (distinguished): only some combinations of these values, the cases, are
-reachable, and their number is stated. If no value is distinguished there is one case; if all are, each case is a state.
+Three kinds of claims describe the set. Some facts *never* hold. Some symbols *always* keep their value, or an amount stays
+within bounds. The values of some symbols are *told apart* (distinguished): only some combinations of these values, the cases,
+are reachable, and their number is stated. If no value is distinguished, there is one case. If all values are distinguished,
+each case is a state.
 
 `confab.planner.certificate_checks` verifies a certificate, `confab.planner.certifying` finds one.
 """

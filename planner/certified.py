@@ -1,4 +1,4 @@
-"""Every "unsolvable" passes this module: it needs a certificate that an independent checker accepts, or becomes "gave up"."""
+"""Every "unsolvable" needs a certificate that an independent checker accepts; without one the outcome becomes "gave up"."""
 
 from __future__ import annotations
 

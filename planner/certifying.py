@@ -1,14 +1,15 @@
 """Find a certificate that a task has no plan.
 
-First step: relaxed reachability. Assume that no fact ceases to hold; which facts can become true? The question is asked backwards
+First step: relaxed reachability. It determines which facts can become true if no fact ever ceases to hold. It works backwards
 from the goal, so that only relevant facts are considered. A required fact that can't become true never holds.
 
-Second step, if the goal is reachable in this way: distinguish few values, at first those of the goal, and search the cases, the
-combinations of these values. A path through the cases to the goal is executed on the task itself. Values on which it fails are
-distinguished too, until no path is left, or a path succeeds: then there is a plan.
+Second step, if the goal is reachable in this way: distinguish few values, at first those of the goal, and search the cases,
+which are the combinations of these values. A path through the cases to the goal is executed on the task itself. If it fails,
+the values that it assumed wrongly are distinguished, too. This is repeated until no path is left (the task is unsolvable) or a
+path succeeds (there is a plan).
 
-Last step: distinguish all values; a case is then a state. One partition may have infinitely many cases and another few, so each
-partition is tried with a small limit of work first, and then with a larger one.
+Last step: distinguish all values, so that each case is a state. One partition may have infinitely many cases and another few,
+so each partition is tried with a small limit of work first, and then with a larger one.
 """
 
 from __future__ import annotations
@@ -53,9 +54,9 @@ GETS, LEAVES, ENDS = "gets", "leaves", "ends"
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
-    """Return a certificate that a task has no plan; None if the allowed work doesn't find one, or if there is a plan.
+    """Return a certificate that a task has no plan; None if there is a plan, or if the allowed work doesn't suffice.
 
-    If there are `few_states`, since a search has examined them all, these are the first proof that is tried.
+    With `few_states`, a search has examined all states, so a proof by states is tried first.
     """
     if not problem.domain.levels:
         return None
@@ -89,7 +90,7 @@ def _at_once(lowest: Lowest, little: int) -> Certificate | None:
 
 
 def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
-    """Return the certificate that the allowed work finds; None if there is none or it takes more.
+    """Return the certificate that `find` returns within the allowed work; None if it needs more work or finds none.
 
     `NoTimeLeftError` ends the whole search for a certificate.
     """
@@ -106,7 +107,7 @@ def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate |
 
 
 def _contested(lowest: Lowest) -> Certificate | None:
-    """Return a certificate for two goals that require a value which only one symbol has at a time."""
+    """Return a certificate for two goals that require the same exclusive value."""
     wanting: dict[tuple[str, str], list[Symbol]] = {}
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         kind = lowest.problem.domain.situations[symbol.situation]
@@ -140,13 +141,13 @@ class Relaxed:
     # ------------------------------------------------------------------------------------------- what is known, so far
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol can get a value."""
+        """Return whether a symbol can get a value."""
         if self.lowest.initial(symbol) == value:
             return True
         return value in self.lowest.given[symbol.situation] and self._ask((GETS, symbol, value))
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol can get another value."""
+        """Return whether a symbol can get another value."""
         if self.lowest.initial(symbol) != value:
             return True
         if self.problem.domain.situations[symbol.situation].boolean:
@@ -198,14 +199,14 @@ class Relaxed:
         return True
 
     def brought_about(self, reading: Reading, key: Key) -> bool:
-        """Whether the answer to a question is yes, as far as is known."""
+        """Return whether the answer to a question is yes, as far as is known."""
         kind, symbol, value = key
         if kind == ENDS:
             return reading.goal(symbol, value)
         return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
 
     def possible_ways(self, reading: Reading, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
-        """Yield the behaviours, with individuals, that may give a symbol a value, or a value other than that."""
+        """Yield the behaviours, with individuals, that may give a symbol a value (or, with `other`, a different value)."""
         for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
             words = (*symbol.arguments, None if other else value)
             for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
@@ -314,7 +315,7 @@ def _number(effect: AmountEffect) -> bool:
 
 
 def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate by cases: of two goals, of all goals, or of all states, whichever takes the least work."""
+    """Return a certificate by cases: of two goals, of all goals, or of all states; the cheapest kind is tried first."""
     for little in (LITTLE[1], lowest.most):
         for find in (
             partial(_by_pairs, lowest, relaxed),
@@ -359,7 +360,10 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | No
 
 
 def _by_states(lowest: Lowest) -> Certificate | None:
-    """Distinguish all values; each case is a state, and none of them satisfies the goal and all rest values."""
+    """Return a certificate that distinguishes all values of all symbols.
+
+    Each case is a state, and no state satisfies the goal with all rest values.
+    """
     problem = lowest.problem
     told_apart: dict[Symbol, tuple[str, ...]] = {}
     for name in sorted(lowest.changing):
@@ -381,7 +385,7 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without the symbols that needn't be distinguished, as far as little work shows it for each."""
+    """Return a certificate without superfluous symbols; each symbol is tested with little work."""
     most = min(lowest.work + FEWER, lowest.most)
     for symbol in sorted(found.told_apart):
         fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
@@ -469,7 +473,7 @@ def _wrong(view: CaseView, facts: Facts) -> list[tuple[Symbol, str, bool]]:
 
 
 def _is(cases: Cases, facts: Facts, case: Case, exactly: bool) -> bool:
-    """Whether a state belongs to a case."""
+    """Return whether a state belongs to a case."""
     for at, symbol in enumerate(cases.claims.symbols):
         now = facts.value(symbol.situation, symbol.arguments) or FALSE
         if (case[at] == ANY and exactly) or (case[at] != ANY and cases.claims.entry(at, now) != case[at]):
@@ -494,7 +498,7 @@ def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
 
 
 def _told_apart(cases: Cases, relaxed: Relaxed, wrong: Iterable[tuple[Symbol, str, bool]]) -> Certificate | None:
-    """Return a certificate that claims of an assumed fact that it never holds, or distinguishes it."""
+    """Return a certificate that either claims that an assumed fact never holds, or distinguishes its value."""
     certificate, lowest = cases.certificate, cases.lowest
     apart = dict(certificate.told_apart)
     impossible = []

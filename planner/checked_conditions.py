@@ -1,4 +1,4 @@
-"""Conditions as the checker reads them: each conjunction is a list of tests and choices, the most determined condition first.
+"""Conditions as the checker reads them: a conjunction is a list of tests and choices, most determined first.
 
 It shares no code with any search.
 """
@@ -78,10 +78,10 @@ class ConditionReader:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], last: Sequence[Test] = ()
     ) -> list[Test]:
-        """Return conditions as tests, the last of which may choose individuals and test the rest; `bound` grows by these variables.
+        """Return conditions as tests, the last of which may choose individuals and test the rest.
 
-        Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these. `last` are tests after all others.
-        Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these. `last` are tests after all others.
+        `bound` grows by these variables. Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these.
+        `last` are tests after all others.
         """
         waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
         nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
@@ -118,7 +118,7 @@ class ConditionReader:
         return given
 
     def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
-        """Return a test whether the rest holds with one of some candidates for a variable."""
+        """Return a test of whether the rest holds with one of some candidates for a variable."""
         place, members = self.place(variable), self.problem.members(kind)
 
         def some(facts: Stated, values: Values) -> bool:
@@ -204,7 +204,7 @@ class ConditionReader:
 
 
 def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
-    """Whether tests hold; the first satisfying choices are stored in `values`."""
+    """Return whether tests hold; the first satisfying choices are stored in `values`."""
     for test in tests:  # noqa: SIM110 - a generator takes twice as long
         if not test(facts, values):
             return False

@@ -44,7 +44,7 @@ class Definitions:
         """Return whether a defined situation holds by its rules, which may depend on other defined situations.
 
         A symbol that is read while another one is evaluated is recorded and counts as false; all recorded symbols are evaluated
-        again until no more become true. Symbols that are true by then stay true, and all other recorded symbols are false.
+        again until no more become true. Symbols that have become true stay true; all other recorded symbols are false.
         """
         if cell in self._known:
             return self._known[cell]
@@ -96,7 +96,7 @@ class Total:
         return False
 
     def value(self, facts: Stated, arguments: tuple[str, ...]) -> str | None:
-        """Return the sum for some arguments as text; None if they aren't of its classes."""
+        """Return the sum for some arguments as text; None if an argument isn't of the required class."""
         if not all(a in members for a, members in zip(arguments, self._members, strict=True)):
             return None
         self._found = {}

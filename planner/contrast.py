@@ -1,8 +1,9 @@
-"""Contrastive explanations: an alternative is enforced, and the rest is planned and costed; or its missing conditions are named.
+"""Contrastive explanations: an alternative is enforced and the rest is planned, or its missing conditions are named.
 
-There are two kinds of alternative. A *step* in place of another one: the plan up to there is kept, the step is applied
-(and refined) there, and the rest is planned again. A *choice* of the individual that takes part in changes of a symbol: every
-behaviour that changes this symbol and could take the individual must take it, and the whole task is planned again.
+There are two kinds of alternative. A *step* in place of another step: the earlier steps are kept, the alternative step is
+refined and applied, and the rest is planned again. A *choice* of the individual that takes part in changes of a symbol: every
+behaviour that changes the symbol, and has a role for the individual, must take this individual; the whole task is planned
+again.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ class NoChoiceError(ValueError):
 class Contrast:
     """The result of asking for an alternative.
 
-    `behavior` and `arguments` are the requested step, if one was; `instead` is the step that it replaces. `lacks`: the step isn't
-    applicable, these conditions fail. `plan`: the complete plan with the alternative; `cost` and `before` are its cost and that of
-    the plan that it is compared with. `reason`: no plan with the alternative was found. With none of these, the plan already has
-    the step, `instead`.
+    `behavior` and `arguments` are the requested step, if one was; `instead` is the step that it replaces. `lacks`: the failing
+    conditions, if the step isn't applicable. `plan`: the complete plan with the alternative; `cost` is its cost, and `before`
+    the cost of the original plan. `reason`: why no plan with the alternative was found. If all of these are missing, the plan
+    already contains the step, as `instead`.
     """
 
     before: float
@@ -49,7 +50,7 @@ class Contrast:
 def instead_of(
     problem: Problem, plan: Plan, behavior: Behavior, given: Bindings, ask: Ask, place: Step | None = None
 ) -> Contrast:
-    """Return what follows if a step is done in the place of one of a plan.
+    """Return the result of replacing a step of a plan by another step.
 
     Parameters
     ----------
@@ -61,7 +62,8 @@ def instead_of(
     ask : callable
         Plans a problem.
     place : Step, optional
-        The step to be replaced, of the same level; if left out, the most similar step in whose place it is applicable.
+        The step to be replaced, of the same level. If left out, it is the most similar step at whose position `behavior` is
+        applicable.
     """
     rules, before = BehaviorReader(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))

@@ -1,4 +1,4 @@
-"""Defined situations, derived when generated Python reads them from a table; only scenes with definitions import this module."""
+"""Defined situations, which generated Python derives when it reads them from a table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from confab.reasoner.symbols import FALSE, TRUE
 
 
 class CompiledRules:
-    """The rules of a problem as Python, compiled once for any table.
+    """The rules of a problem as Python, compiled once for all tables.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ class DerivedCells(dict[Key, str]):
 class Stratum:
     """Mutually dependent defined situation types, and their known values at one age of the table.
 
-    The requested situations, and all that their rules read, are evaluated in rounds until no more become true; the rest is then
-    false. Only these are evaluated, and the depth of a chain isn't limited by the interpreter's stack.
+    The requested situations, and all situations that their rules read, are evaluated in rounds until no more become true; the
+    others are false. No other situations are evaluated, and the interpreter's stack doesn't limit the depth of a chain.
     """
 
     def __init__(self, table: Table) -> None:
@@ -81,7 +81,7 @@ class Stratum:
         self.asked: dict[Cell, None] | None = None  # during a derivation: the cells read, with the results
 
     def holds(self, cell: Cell) -> bool:
-        """Return whether a symbol is true; during the derivation of another one: as far as is known."""
+        """Return whether a symbol is true; while another symbol is derived, return what is known so far."""
         if self.age != self.table.age:
             self.age = self.table.age
             self.known.clear()

@@ -9,7 +9,7 @@ from types import CodeType
 
 
 def identifier(prefix: str, name: str) -> str:
-    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
+    """Return an ASCII identifier for a term, since Python identifies µ with μ; distinct terms get distinct identifiers."""
     clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
     return f"{prefix}_{clean}"
 

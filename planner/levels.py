@@ -1,11 +1,12 @@
 """Conditions that a plan violates where it leaves a level (docs/levels.md).
 
-If no plan of a level can be refined, steps of the level below take the place of its steps. They satisfy the conditions of their
-own level; they may violate conditions of the level above ("a filled cup isn't moved"). This module lists these violations.
+If no plan of a level can be refined, steps of the level below take the place of its steps. These steps satisfy the conditions
+of their own level, but may violate conditions of the level above ("a filled cup isn't moved"). This module lists the
+violations.
 
-An abandoned level is treated as an observer: it sees a change when a symbol that it knows gets another value that it knows. It
-doesn't see what happens in between (a cup in a hand). For each change that it sees and that persists, some behaviour of that level
-should have been applicable that makes this change, possibly together with the changes just before it.
+An abandoned level is treated as an observer. It sees a change when a symbol of the level gets another value of the level; it
+doesn't see values in between (a cup in a hand). For each change that it sees and that persists, some behaviour of the level
+should have been applicable that makes the change, possibly together with the changes just before it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ MOST_LACKING = 4
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return the stretches in which a valid plan leaves a level, with the conditions of that level that they violate.
+    """Return the runs of steps by which a valid plan leaves a level, with the conditions of the level that they violate.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ class _Watch:
                 self.step(part[0])
 
     def broken(self, level: int) -> Iterator[Broken]:
-        """Yield the violations of a finished stretch; a change that was undone doesn't count."""
+        """Yield the violations of a finished run of steps; a change that was undone doesn't count."""
         before: dict[Cell, str | None] = {}
         for cell, old in self.history.pop(level):
             before.setdefault(cell, old)
@@ -98,7 +99,7 @@ class _Watch:
                     view.put(situation, arguments, value)
 
     def judged(self, level: int, step: Step, change: Fact) -> Iterator[Broken]:
-        """Yield the violation of a change, if no behaviour of the level could make it now."""
+        """Yield the violation of a change, if no behaviour of the level could make the change in the current state."""
         best: Broken | None = None
         for behavior in self.problem.domain.at_level(level):
             for effect in behavior.every_effect:
@@ -132,7 +133,7 @@ class _Watch:
     def could(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
     ) -> bool:
-        """Whether a behaviour could make a change, alone or together with the changes just before it."""
+        """Return whether a behaviour could make a change, alone or together with the changes just before it."""
         view = self.views[level]
         conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         if self.rules.satisfied(conditions, terms, kinds, view) is not None:
@@ -167,7 +168,7 @@ class _Watch:
     def nearest(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, symbol: Symbol
     ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return the fewest conditions without which a behaviour would be applicable, with individuals."""
+        """Return the fewest failing conditions of a behaviour, with individuals."""
         conditions = (*behavior.preconditions, *effect.when)
         return failing_conditions(
             self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level])
@@ -187,7 +188,7 @@ def failing_conditions(
     """
 
     def gives(number: int) -> bool:
-        """Whether a condition determines a variable; without it, the others would hold for individuals that don't exist."""
+        """Return whether a condition determines a variable; without it, the others would hold for individuals that don't exist."""
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 

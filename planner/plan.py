@@ -36,8 +36,9 @@ class Status(Enum):
 class Step:
     """One behaviour of a plan, with the steps of the next level that refine it.
 
-    `path` is the position in the tree; `bindings` are the individuals that the situation gave to the behaviour's variables
-    (the object that GRASP grasps); `rank` is the cogency ranking score c_m of eq. (4) with which it was chosen, if computed.
+    `path` is the position in the tree; `bindings` are the individuals that the situation assigned to the behaviour's variables
+    (the object that GRASP grasps). `rank` is the cogency ranking score c_m of eq. (4) of the behaviour when it was chosen, if
+    computed.
     """
 
     path: tuple[int, ...]
@@ -143,7 +144,7 @@ class Plan(Sequence[Step]):
         return dot(self._nodes())
 
     def to_records(self) -> list[dict[str, object]]:
-        """Return a mapping for each step, each before its sub-steps: path, level, id, behavior, arguments, bindings."""
+        """Return one mapping per step, each step before its sub-steps: path, level, id, behavior, arguments, bindings."""
         return [
             {
                 "path": ".".join(map(str, step.path)),
@@ -190,7 +191,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why there is no plan: a sentence, the facts or terms in it, and the number of states if all were examined."""
+    """Why there is no plan: a sentence, its facts or terms, and the number of states if all states were examined."""
 
     text: str
     terms: tuple[str, ...] = ()
@@ -236,14 +237,14 @@ class Left:
 class Outcome:
     """The result of a planning call.
 
-    `plan` is present if and only if `status` is solved, `reason` if and only if it isn't. `search` counts per level, summed over
-    the calls at that level; `fallbacks` counts how often a level had no refinement for the level above; `hits` and `misses` count
-    the refinements found in the cache and those that had to be searched. `cost` is the cost of the plan if some behaviour has a
-    price; `bound` a lower bound on the cost of every lowest-level plan, if proved; `engine` the other planner that found the
-    plan. `given_up` says which level was given up for which goal, `left` where the plan has steps of a lower level instead, and
-    which conditions of the level above they violate. `saving` is the number of primitives per second by which the plan was still
-    being shortened in the end, None if it wasn't shortened. `certificate` proves that a task is unsolvable;
-    `confab.planner.solve` returns no such outcome without one.
+    `plan` is present if and only if `status` is solved, `reason` if and only if it isn't. `search` counts per level, summed
+    over the calls at that level; `fallbacks` counts how often a level had no refinement for the level above; `hits` and
+    `misses` count the refinements found in the cache and those that had to be searched. `cost` is the cost of the plan if some
+    behaviour has a price; `bound` a lower bound on the cost of every lowest-level plan, if proved; `engine` the other planner
+    that found the plan. `given_up` has the levels that were given up, each with its goal. `left` has the runs of lower-level
+    steps in the plan, with the conditions of the level above that they violate. `saving` is the number of primitives per second
+    by which the plan was still being shortened in the end, None if it wasn't shortened. `certificate` proves that a task is
+    unsolvable; `confab.planner.solve` returns no such outcome without one.
     """
 
     status: Status
@@ -277,7 +278,7 @@ class Limits:
     work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
-        """Return the time at which a share of the remaining time is over, on the clock of `perf_counter`; None: never.
+        """Return the time, on the clock of `perf_counter`, at which a share of the remaining time is over; None without a limit.
 
         The remaining time ends with the seconds of these limits, or with the current deadline (`confab.reasoner.limits`) if
         earlier.
@@ -286,7 +287,7 @@ class Limits:
         return None if left is None else perf_counter() + share * left
 
     def until(self, end: float | None) -> Limits:
-        """Return the same limits with the seconds left until then, for a step of a longer call."""
+        """Return the same limits with the seconds left until a time, for a step of a longer call."""
         return self if end is None else replace(self, seconds=max(end - perf_counter(), 0.0))
 
 
@@ -311,7 +312,7 @@ class UngroundableError(Exception):
 
 @contextmanager
 def paused_collection() -> Iterator[None]:
-    """Pause the garbage collector: reading and planning make no cycles, and collection took a third of the time."""
+    """Pause the garbage collector; reading and planning make no reference cycles, and collection took a third of their time."""
     enabled = gc.isenabled()
     gc.disable()
     try:

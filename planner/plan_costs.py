@@ -29,7 +29,7 @@ def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
 
 
 def in_circles(problem: Problem, plan: Plan) -> int:
-    """Return the number of primitives that lead from a state back to the same state: the goal is reached without them.
+    """Return the number of superfluous primitives: those that lead from a state back to the same state.
 
     Of nested circles only the outermost counts; steps that change more than they undo form no circle.
     """

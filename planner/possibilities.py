@@ -1,8 +1,8 @@
 """Possible and necessary facts of a set of states of which only some values are known.
 
-Conditions are evaluated with two bounds: `may` is true unless the condition is false in all of the states; `must` is true only if
-the condition holds in all of them. For a single, completely known state both agree with `confab.planner.validation`. The checker
-of certificates depends on this module; no search does.
+Conditions are evaluated with two bounds: `may` is true unless the condition is false in all of the states; `must` is true only
+if the condition holds in all of them. For a single, completely known state both bounds agree with `confab.planner.validation`.
+The checker of certificates depends on this module; no search does.
 """
 
 from __future__ import annotations
@@ -69,17 +69,17 @@ class Knowledge(Protocol):
     """Knowledge about the symbols that exist and that behaviours change."""
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol may have a value, that is, in some state."""
+        """Return whether a symbol may have a value, that is, in some state."""
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Whether a symbol may have another value, that is, in some state."""
+        """Return whether a symbol may have another value, that is, in some state."""
 
     def between(self, symbol: Symbol) -> Range:
         """Return the range of amounts of a symbol."""
 
 
 class Lowest:
-    """The lowest level of a problem, indexed by the symbols that its behaviours change.
+    """The lowest level of a problem, with its behaviours indexed by the symbols that they change.
 
     `work` counts tests. `WorkLimitError` is raised when it exceeds `most`, `NoTimeLeftError` when the current deadline has passed.
     """
@@ -120,7 +120,7 @@ class Lowest:
             raise NoTimeLeftError("more time than there is")
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
-        """Whether a symbol exists: it is stated, or it is boolean and its arguments are of the right classes."""
+        """Return whether a symbol exists: it is stated, or it is boolean and its arguments are of the right classes."""
         if Symbol(situation, arguments) in self.problem.initial:
             return True
         kind = self.problem.domain.situations[situation]
@@ -149,7 +149,7 @@ class Lowest:
         return self._rows[relation, position]
 
     def constant(self, condition: Condition) -> bool:
-        """Whether a condition without nested conditions has the same value in all states."""
+        """Return whether a condition without nested conditions has the same value in all states."""
         if isinstance(condition, ValueCondition):
             return condition.situation not in self.changing and condition.situation not in self.problem.domain.rules
         if isinstance(condition, Comparison):
@@ -217,7 +217,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------- values
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
-        """Whether a symbol may, or must, have a value."""
+        """Return whether a symbol may, or must, have a value."""
         lowest = self.lowest
         lowest.spend()
         if not lowest.exists(situation, arguments):
@@ -258,7 +258,7 @@ class Reading:
         return self.knowledge.between(symbol)
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """Whether an amount may, or must, satisfy a goal: a number, or bounds."""
+        """Return whether an amount may, or must, satisfy a goal: a number, or bounds."""
         found = self.between(symbol.situation, symbol.arguments)
         try:
             limits = bounds(wanted)
@@ -267,7 +267,7 @@ class Reading:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """Whether a goal may, or must, hold; a symbol that doesn't exist counts as false."""
+        """Return whether a goal may, or must, hold; a symbol that doesn't exist counts as false."""
         if not self.lowest.exists(symbol.situation, symbol.arguments):
             return wanted == FALSE
         if self.lowest.quantity(symbol.situation) is not None:
@@ -277,7 +277,7 @@ class Reading:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """Whether a condition may, or must, hold with the given individuals for its variables."""
+        """Return whether a condition may, or must, hold with the given individuals for its variables."""
         found: bool
         match condition:
             case ValueCondition(situation, arguments, value, negated):
@@ -470,7 +470,7 @@ def variables(condition: Condition) -> set[str]:
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """Whether a comparison holds for some pairs, or for all pairs, of amounts from two ranges."""
+    """Return whether a comparison holds for some pairs, or for all pairs, of amounts from two ranges."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):

@@ -83,7 +83,7 @@ def solve(request: Request) -> Outcome:
     ValueError
         The mode doesn't exist.
     RejectedPlanError
-        The steps found are no valid plan: an internal error, and no answer to the request.
+        The checker rejects the steps that a search found. This is an internal error, and no answer to the request.
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")

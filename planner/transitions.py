@@ -1,9 +1,10 @@
 """A state as a table that is changed in place, and Python code generated for conditions and effects.
 
-now      situation type → key → value. The key is the individual, or the tuple of individuals if the type has several arguments
+now      the state: situation type → key → value. The key is the individual, or the tuple of individuals of a type with several
+         arguments
 holders  situation type → value → the keys that have the value, in order of assignment; not kept for `FALSE`
-trail    the overwritten values, oldest first; `undo` restores them down to a mark
-age      number of changes, undoing included; values derived from the table at this age are still valid
+trail    the overwritten values, oldest first; `undo` restores the values since a mark
+age      number of changes, including undone ones; values derived from the table are valid as long as its age is the same
 
 The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
 
@@ -43,7 +44,7 @@ from confab.reasoner.symbols import (
 
 Key: TypeAlias = "str | tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Key]"
-"""A symbol as the table addresses it: situation type and key."""
+"""A symbol in a table: situation type and key."""
 Change: TypeAlias = "tuple[str, Key, str]"
 """A changed cell with the values before and after."""
 Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
@@ -58,7 +59,7 @@ def key_of(arguments: tuple[str, ...]) -> Key:
 
 
 def arguments_of(key: Key) -> tuple[str, ...]:
-    """Return the arguments behind a key."""
+    """Return the arguments of a key."""
     return (key,) if isinstance(key, str) else key
 
 
@@ -277,7 +278,7 @@ class PythonWriter:
         return source, tests
 
     def listed(self, situation: str, value: str) -> bool:
-        """Whether the table lists the holders of a value.
+        """Return whether the table lists the holders of a value.
 
         It doesn't for defined situations, nor for false unless a variable could be false.
         """
@@ -290,7 +291,7 @@ class PythonWriter:
         return f"{identifier('now', condition.situation)}.get({key_written(condition.arguments)}{default})"
 
     def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
-        """Return tests that the symbol exists, as far as the classes of the terms don't guarantee it."""
+        """Return tests of whether the symbol exists; there are none if the classes of the terms guarantee it."""
         return [
             self.member(term, wanted)
             for term, wanted in zip(arguments, self.problem.domain.situations[situation].arguments, strict=True)

@@ -1,11 +1,12 @@
 """The checker of plans. It shares no code with any search and reads conditions as they are written.
 
 A behaviour's preconditions hold if *some* individuals, as its variables, satisfy them all. Each conjunction is compiled once
-into a list of tests and choices, the most determined condition first, and then evaluated in every state: a long plan is checked
-in time that grows with its length and not with the world.
+into a list of tests and choices, the most determined condition first, and then evaluated in every state. So the time to check a
+plan grows with the length of the plan, and not with the size of the world.
 
-The meaning of a plan of several levels is defined in docs/levels.md. In short: after a step, the symbols that its level sees are
-as the step says; touched symbols of the level below that have a rest value are at rest; the next step begins in that state.
+The meaning of a plan of several levels is defined in docs/levels.md. In short: after a step, the symbols that its level sees
+have the values that the step states. Touched symbols of the level below that have a rest value are at rest. The next step
+begins in that state.
 """
 
 from __future__ import annotations
@@ -49,10 +50,7 @@ class Fault:
 
 
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
-    """Return the faults of a plan; empty if it is valid.
-
-    Checked are every step's ID and everything that `carried_out` checks.
-    """
+    """Return the faults of a plan; it is empty for a valid plan. IDs are checked, and everything that `carried_out` checks."""
     numbered = {step.path: problem.id_of(step.behavior, step.arguments) for step in plan.walk() if _fits(problem, step)}
     wrong = [
         Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {numbered[step.path]}")
@@ -63,7 +61,7 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
 
 
 def _fits(problem: Problem, step: Step) -> bool:
-    """Whether a step has an ID: its behaviour exists, and its arguments are of the classes of the parameters."""
+    """Return whether a step has an ID: its behaviour exists, and its arguments are of the classes of the parameters."""
     behavior = problem.domain.behaviors.get(step.behavior)
     if behavior is None or len(behavior.parameters) != len(step.arguments):
         return False
@@ -75,8 +73,9 @@ def carried_out(
 ) -> list[Fault]:
     """Return the faults of a plan during its execution on symbols.
 
-    Checked are: on each level, the preconditions of every step in the state before it; that its refinement leaves the symbols that
-    its level sees as the step says, and other touched symbols at rest; and the goal. Nothing is checked after an inapplicable step.
+    On each level, the preconditions of every step must hold in the state before it. After its refinement, the symbols that its
+    level sees must have the values that the step states, and other touched symbols must be at rest. In the end the goal must
+    hold. Nothing is checked after an inapplicable step.
 
 
     Parameters
@@ -140,9 +139,8 @@ class _Check:
     ) -> bool:
         """Execute steps that together refine one of level `above`, or the task (level 0); return whether all were applicable.
 
-        A goal on a symbol takes precedence over its rest value, but not `inside` a step, which knows no goal.
-
-        The steps of the next level may include stretches of lower levels, each in the place of such a step.
+        A goal on a symbol takes precedence over its rest value, except `inside` a step, since a step knows no goal. Runs of
+        lower-level steps may stand in for steps of the next level.
         """
         level = next((level for level in self.levels if level > above), above)
         marks = []
@@ -218,7 +216,7 @@ class _Check:
 
 
 def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
-    """Yield each step of a level alone, and lower steps in stretches."""
+    """Yield each step of a level alone, and lower-level steps in runs."""
     lower: list[Step] = []
     for step in steps:
         if step.level > level:
@@ -330,7 +328,7 @@ class BehaviorReader:
         ]
 
     def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
-        """Whether a rule of a situation type derives it for some arguments."""
+        """Return whether a rule of a situation type derives it for some arguments."""
         if situation not in self._defined:
             self._defined[situation] = [_Behavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]]
         for rule in self._defined[situation]:
@@ -346,7 +344,7 @@ class BehaviorReader:
         return self._read[behavior.name]
 
     def fits(self, behavior: Behavior, arguments: Arguments) -> bool:
-        """Whether the arguments are of the classes of the behaviour's parameters."""
+        """Return whether the arguments are of the classes of the behaviour's parameters."""
         members = self.read(behavior).members
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 

@@ -1,8 +1,8 @@
 """Regression: a condition after a behaviour, written as a condition before it.
 
 ``IN(parcel) = van`` holds after LOAD(?item, ?into) if the parcel is ?item and the van is ?into, or if the parcel is another one
-and is in the van before. Conditions inside alternatives and witnesses are rewritten in place. The result may be just true or
-false: terms that are equal by name, or of classes without a common individual, are compared here.
+and is in the van before. Conditions inside alternatives and witnesses are rewritten in place. Terms with equal names, and terms
+of classes without a common individual, are compared here, so the result may simply be true or false.
 
 Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; here over functional situation types and numeric effects.
 """
@@ -90,7 +90,7 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Whether a condition may determine a variable, which its plain negation would leave undetermined."""
+    """Return whether a condition may determine a variable, which the negated condition would leave undetermined."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 
@@ -105,7 +105,7 @@ class Afterwards:
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
     kinds : dict of term to class
-        Of all terms of the behaviour and of the conditions; variables made here are added.
+        The classes of all terms of the behaviour and of the conditions; new variables are added.
     """
 
     behavior: Behavior
@@ -132,16 +132,16 @@ class Afterwards:
         }
 
     def fixed(self, term: str) -> bool:
-        """Whether a term is an individual, or is bound wherever the behaviour can be done."""
+        """Return whether a term is an individual, or is bound whenever the behaviour is applicable."""
         return not is_variable(term) or term in self._fixed
 
     def boolean(self, situation: str) -> bool:
-        """Whether the values of a situation type are true and false."""
+        """Return whether the values of a situation type are true and false."""
         return self.situations[situation].boolean
 
     @cached_property
     def amounts(self) -> tuple[AmountEffect, ...]:
-        """The effects on amounts; one that adds to an amount for each of a class is an effect for each individual."""
+        """The effects on amounts; an effect for each individual of a class is replaced by one effect per individual."""
         found: list[AmountEffect] = []
         for effect in self.behavior.amounts:
             if effect.each is None or effect.each.name in effect.arguments:
@@ -152,13 +152,13 @@ class Afterwards:
         return tuple(found)
 
     def fresh(self, kind: str) -> str:
-        """Return a variable of a class that has no other use."""
+        """Return a new variable of a class; no condition or effect contains it yet."""
         name = next(name for n in self._number if (name := f"?kept{n}") not in self.kinds)
         self.kinds[name] = kind
         return name
 
     def renamed(self, condition: Condition) -> Condition:
-        """Return a condition with each of its witnesses' variables renamed, so that no term of the behaviour has its name."""
+        """Return a condition whose witnesses have new variables, so that their names differ from all terms of the behaviour."""
         match condition:
             case Witness(variable, kind, inner):
                 terms = {variable: self.fresh(kind)}
@@ -191,7 +191,7 @@ class Afterwards:
         return {*self.classes.get(kind, ())}
 
     def among(self, term: str, kind: str) -> Formula:
-        """Return that a term is of a class."""
+        """Return the condition that a term belongs to a class."""
         members = self.members(kind)
         if not is_variable(term):
             return term in members
@@ -201,7 +201,7 @@ class Afterwards:
         return ClassCondition(term, kind) if own & members else False
 
     def equal(self, one: str, other: str) -> Formula:
-        """Return that two terms stand for the same individual."""
+        """Return the condition that two terms denote the same individual."""
         if one == other:
             return True
         possible = [self.members(self.kinds[term]) if is_variable(term) else {term} for term in (one, other)]
@@ -217,7 +217,7 @@ class Afterwards:
         return condition
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str) -> Formula:
-        """Return that a symbol has a value before the behaviour."""
+        """Return the condition that a symbol has a value before the behaviour."""
         known = self._known.get((situation, arguments))
         return ValueCondition(situation, arguments, value) if known is None else self.equal(known, value)
 
@@ -244,11 +244,14 @@ class Afterwards:
     # ------------------------------------------------------------------------------------------------------ conditions
 
     def changed(self, condition: Condition) -> bool:
-        """Whether the behaviour changes a situation type in a condition."""
+        """Return whether the behaviour changes a situation type in a condition."""
         return any(situations_of(inner) & self.behavior.changes for inner in walk(condition))
 
     def condition(self, condition: Condition) -> Formula:
-        """Return a condition after the behaviour; its variables are bound by others, or by it as a witness."""
+        """Return a condition after the behaviour.
+
+        Its variables are bound by other conditions, or by the condition itself as a witness.
+        """
         if not self.changed(condition):
             return condition
         match condition:
@@ -273,7 +276,7 @@ class Afterwards:
         return negation(found) if negated else found
 
     def _overwritten(self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Formula) -> Formula:
-        """Return that a symbol has a value after one more effect, given that it has it without."""
+        """Return the condition that a symbol has a value after one more effect, given the condition without that effect."""
         apart = self.apart(effect)
         assert isinstance(apart, ValueEffect)
         fires = self.fires(apart, arguments)
@@ -287,7 +290,7 @@ class Afterwards:
     # ---------------------------------------------------------------------------------------------------------- amounts
 
     def cases(self, expression: Expression) -> list[tuple[tuple[Condition, ...], Expression]]:
-        """Return the values of an expression after the behaviour, each with the conditions under which it has it."""
+        """Return the values of an expression after the behaviour, each with the conditions under which it results."""
         match expression:
             case Amount(situation, arguments):
                 found: list[tuple[Conjunction, Expression]] = [((), expression)]
@@ -328,7 +331,7 @@ def _changed(now: Expression, operation: str, by: Expression) -> Expression:
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
-    """Return conditions in which a variable that only an alternative or a witness determines is sought by a witness.
+    """Return conditions with a witness for each variable that only an alternative or another witness determines.
 
     >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
     >>> found.alternatives[0][0].variable

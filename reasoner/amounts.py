@@ -60,7 +60,7 @@ class Amount:
 
 @dataclass(frozen=True)
 class Measure:
-    """The number that a static relation gives for individuals, the last of its tuple: a capacity, a distance."""
+    """The number that a static relation states for individuals, such as a capacity or a distance: the last element of a tuple."""
 
     relation: str
     arguments: tuple[str, ...]
@@ -210,7 +210,7 @@ def bounds_written(wanted: str) -> str:
 
 
 def meets(value: str | None, wanted: str) -> bool:
-    """Return whether a value equals the wanted one, or is an amount within the wanted bounds.
+    """Return whether a value equals the wanted value, or is an amount within the wanted bounds.
 
     >>> meets("shelf", "shelf"), meets("1.5", ">=2"), meets("2", ">=2,<5")
     (True, False, True)

@@ -1,7 +1,7 @@
 """Conditions, effects and calculations as RDF nodes: the properties of each kind, and how they are written and read.
 
-A node is an individual of a class of the core (``:ValueCondition``, ``:AmountEffect``, ``:Calculation``). Its properties are
-those of the table; ``:negated true`` stands beside them where a condition is negated.
+A node is an individual of a class of the core (``:ValueCondition``, ``:AmountEffect``, ``:Calculation``). The table lists its
+properties; a negated condition also has ``:negated true``.
 
 ========================  =====================================================================
 class                     properties
@@ -61,7 +61,7 @@ SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
 """Maximum depth of nested conditions and calculations; the conjunctions of a disjunction do not count."""
 MOST_CONDITIONS = 10_000
-"""Maximum number of conditions inside one, each counted once per occurrence."""
+"""Maximum number of conditions inside one condition; each occurrence counts."""
 DECIMALS = 30
 """Number of decimals of a number without a finite decimal form."""
 
@@ -93,12 +93,12 @@ def class_properties(term: str, kind: str) -> Properties:
 
 
 def equality_properties(left: str, right: str) -> Properties:
-    """Return the properties that name two individuals that are the same."""
+    """Return the properties of an equality: they name its two individuals."""
     return {"about": [left], "value": [right]}
 
 
 def triples(node: ox.NamedNode | ox.BlankNode, properties: Properties) -> Iterator[ox.Triple]:
-    """Yield the triples of a node whose properties have IRIs or the text of literals; `TYPE` stands for itself."""
+    """Yield the triples of a node whose properties have IRIs or texts of literals as values; the property `TYPE` is a whole IRI."""
     for name, values in properties.items():
         prop = ox.NamedNode(name if name == TYPE else CORE + name)
         for value in values:
@@ -126,13 +126,13 @@ class NodeWriter:
     spelled : callable
         Returns the Turtle term of an individual, a class, a relation or a situation type.
     named : callable
-        Returns the Turtle term of a new node: of its kind (``condition``, ``amount``), and its position among the nodes.
+        Returns the Turtle term of a new node, given its kind (``condition``, ``amount``) and its position among the nodes.
     variable : callable
-        Returns the Turtle term of the variable of a witness: of its name, the node of the witness, and that node's position.
+        Returns the Turtle term of a witness's variable, given its name, the node of the witness, and the position of that node.
     terms : mapping of variable to Turtle term
         Parameters and variables outside of the conditions.
     boolean : callable, optional
-        Returns whether the value `TRUE` of a situation type goes without saying.
+        Returns whether the value `TRUE` of a situation type may be left out.
 
     Attributes
     ----------
@@ -210,7 +210,10 @@ class NodeWriter:
         return node
 
     def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
-        """Write the alternatives of a disjunction; return their nodes: of a single condition, the node of that condition."""
+        """Write the alternatives of a disjunction and return their nodes.
+
+        The node of an alternative with one condition is that condition.
+        """
         return [self.condition(group[0]) if len(group) == 1 else self.all_of(group) for group in alternatives]
 
     def all_of(self, conditions: Sequence[Condition]) -> str:
@@ -226,7 +229,7 @@ class NodeWriter:
         return {"relation": [self.spelled(one.relation)], **argument_properties([*map(self.put, one.arguments)])}
 
     def side(self, name: str, one: Expression) -> Properties:
-        """Return the properties of one side; an amount on the left and a decimal on the right need no node of their own."""
+        """Return the properties of one side; an amount on the left and a decimal on the right need no separate node."""
         if name == "right" and isinstance(one, Fraction) and finite(one):
             return {"amount": [decimal_text(one)]}
         if name == "left" and isinstance(one, Amount | Measure):
@@ -282,8 +285,7 @@ def decimal_text(number: Fraction) -> str:
 class NodeReader:
     """Reads conditions and calculations from nodes.
 
-    Names of terms, classes, relations and situation types are those that `term` and `short` return. A subclass checks what it
-    knows of them.
+    `term` and `short` return the names of terms, classes, relations and situation types. Subclasses check these names.
 
     Attributes
     ----------
@@ -325,7 +327,7 @@ class NodeReader:
         return any(CORE + kind in types for kind in kinds)
 
     def word(self, iri: str, name: str, known: Sequence[str]) -> str:
-        """Return the value of a property, which has to be one of some known words."""
+        """Return the value of a property; it has to be one of the known words."""
         said = self.one(iri, name)
         if said not in known:
             raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
@@ -365,7 +367,7 @@ class NodeReader:
         return self.short(self.one(iri, "relation"))
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition that a term is an individual of a class, given as an IRI."""
+        """Return the condition that a term is an individual of a class; the class is given as an IRI."""
         return ClassCondition(term, self.short(kind), negated)
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
@@ -373,11 +375,11 @@ class NodeReader:
         return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return the conditions of a conjunction, or the alternatives of a disjunction, in the order of the value."""
+        """Return the conditions of a conjunction, or the alternatives of a disjunction, in their order in the value."""
         return tuple(parts)
 
     def entered(self, iri: str, what: str) -> None:
-        """Begin to read a node; raise an error if it is inside itself or too deep."""
+        """Begin to read a node; raise an error if the node is inside itself or nested too deeply."""
         if iri not in self.nodes:
             raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or correct the name")
         depth = sum(not self.is_a(node, "AllOf") for node in self.inside)
@@ -387,7 +389,7 @@ class NodeReader:
         self.inside.append(iri)
 
     def condition(self, iri: str) -> Condition:
-        """Return a condition; a recursive or too deeply nested one is a fault."""
+        """Return a condition; a recursive or too deeply nested condition is a fault."""
         self.entered(iri, "condition")
         self.count[0] = self.count[0] + 1 if len(self.inside) > 1 else 0
         if self.count[0] > MOST_CONDITIONS:
@@ -434,11 +436,11 @@ class NodeReader:
         return (found,)
 
     def left(self, iri: str) -> Expression:
-        """Return the left side of a comparison or calculation: its own amount, if it has no other."""
+        """Return the left side of a comparison or calculation; without a ``:left`` it is the node's own amount."""
         return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
 
     def right(self, iri: str) -> Expression:
-        """Return the right side of a comparison, calculation or effect: its own number, if it has no other."""
+        """Return the right side of a comparison, calculation or effect: ``:right`` or the node's number."""
         if self.values(iri, "right"):
             return self.expression(self.one(iri, "right"))
         number = self.decimal(iri, "amount")

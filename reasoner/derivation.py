@@ -1,7 +1,7 @@
-"""Stratification: the order in which defined situation types are computed, mutually dependent ones together.
+"""Stratification: the order in which defined situation types are computed; mutually dependent types are computed together.
 
-A situation type may depend on the negation of another one only if that one is computed before it; otherwise its value would be
-undefined or ambiguous.
+A situation type may depend on the negation of another type only if the other type is computed earlier. Otherwise its value
+would be undefined or ambiguous.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
-    """Yield the situation types that conditions name, each with whether they depend on its negation.
+    """Yield the situation types that conditions name, each with True if the conditions depend on its negation.
 
     >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
     [('FULL', True)]
@@ -65,7 +65,7 @@ def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
 
 
 def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
-    """Return the pairs of a situation type and another one on whose negation it depends, while that one depends on it."""
+    """Return the pairs of mutually dependent situation types in which the first depends on the negation of the second."""
     together = {name: group for group in strata(rules) for name in group}
     return sorted(
         {

@@ -23,13 +23,13 @@ log = logging.getLogger(__name__)
 STDOUT = Path("-")
 """In place of a file's name: standard output."""
 PATIENCE = 600.0
-"""Seconds to wait for other writers of a file: a lesson in a large scene takes minutes."""
+"""Seconds to wait for other writers of a file. (A lesson in a large scene takes minutes.)"""
 
 
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file so that a reader, or a crash, sees the old content or the new; parameters and errors as of `written_whole`.
+    """Write a file atomically: a reader, or a crash, sees either the old content or the new. Errors are those of `written_whole`.
 
     Parameters
     ----------
@@ -52,10 +52,10 @@ def write_whole(
 
 @contextmanager
 def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
-    """Yield the name of a temporary file to write, which replaces a file at the end of the block: all of it, or nothing.
+    """Yield the name of a temporary file to be written; at the end of the block it replaces a file, completely or not at all.
 
-    A link is followed: its target is replaced. Permissions stay as they were. A folder, a device, a file that is read-only and
-    a file whose content is of another kind than what was written (`confab.reasoner.kinds`) are never replaced.
+    A link is followed: its target is replaced. Permissions stay as they were. Folders, devices, read-only files, and files with
+    content of another kind than the new content (`confab.reasoner.kinds`) are never replaced.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
 
 
 def check_replaceable(path: Path, kind: str) -> None:
-    """Raise the errors that `written_whole` would raise for content of a kind, before anything is computed.
+    """Raise the errors that `written_whole` would raise for content of a kind; called before the content is computed.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Lock a file, by locking its folder so that no lock file is left behind; other callers of this function wait.
+    """Lock a file: its folder is locked, so that no lock file is left behind. Other callers of this function wait.
 
     Links are followed, so that all paths to a file lead to one lock. A caller that has to wait is notified.
 

@@ -1,4 +1,4 @@
-"""Scenes for trials, as ordinary ontology files: a template in Turtle, multiplied and placed.
+"""Scenes for trials, as ordinary ontology files made from Turtle templates.
 
 A family is a Turtle file in ``ontology/families``: a line ``#* SECTION`` heads a block that is repeated for each row of
 that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named:
@@ -208,7 +208,10 @@ def _crowded(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
-    """Put objects at places that only the first or the last hand reaches, with goals on the other side; the rest stay between."""
+    """Put objects at places that only the first or the last hand reaches, with goals on the other side.
+
+    Other objects stay in between.
+    """
     places = range(1, 2 * objects + 1)
     reach = strips(objects, hands, places)
     of_first = set(reach[0]).difference(*reach[1:]) if hands > 1 else set()

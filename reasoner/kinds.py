@@ -1,8 +1,8 @@
 """The kinds of files that Confab writes, recognised by their content.
 
 Reports, pictures and films name Confab as their maker, plans and verdicts have keys of their own, memories and episodes
-properties of their own. What people go on editing (scenes, PDDL) ends with a stamp, a comment with a hash of all above it: an
-edited file is no longer recognised. All else is foreign.
+properties of their own. Files that people go on editing (scenes, PDDL) end with a stamp, a comment with a hash of the content
+above it; an edited file is no longer recognised. All other files are foreign.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Kind:
     foreign : bool
         Whether Confab doesn't write such files; they are never overwritten.
     columns : tuple of str, optional
-        The columns of rows; None where there are none or the format doesn't tell.
+        The columns of rows; None if the content has none or its format doesn't state them.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Kind:
 
 
 def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
-    """Yield a text piece by piece, then the stamp: a comment by which its kind is recognised until the text is edited.
+    """Yield the pieces of a text and a stamp, a comment by which the kind of the text is recognised until it is edited.
 
     >>> print("".join(stamped("a text", ["one"])).strip())
     one
@@ -95,7 +95,7 @@ def kind_of(file: Path, suffix: str | None = None) -> Kind | None:
     ----------
     file : Path
     suffix : str, optional
-        The ending that tells CSV from other texts; by default the file's own.
+        The suffix that distinguishes CSV from other texts; by default that of the file.
 
     Raises
     ------

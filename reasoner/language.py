@@ -19,7 +19,7 @@ from confab.reasoner.symbols import (
 
 
 class DomainError(ValueError):
-    """A behaviour can't be executed as it is written; the message names it and the term at fault."""
+    """A behaviour can't be executed as it is written; the message names the behaviour and the faulty term."""
 
 
 def is_variable(term: str) -> bool:
@@ -99,7 +99,7 @@ def mentions(condition: Condition) -> set[str]:
 
 
 def needs(condition: Condition) -> set[str]:
-    """Return the variables that must be bound before a condition can be tested; it determines its other variables.
+    """Return the variables that must be bound before a condition can be tested; the condition determines its other variables.
 
     >>> needs(ValueCondition("LOCATION", ("cup1",), "?l")), needs(ValueCondition("LOCATION", ("cup1",), "?l", True))
     (set(), {'?l'})
@@ -119,6 +119,6 @@ def _unbound(group: Sequence[Condition]) -> set[str]:
 
 
 def nothing_determines(where: str, waiting: Sequence[Condition], bound: set[str]) -> DomainError:
-    """Return the error for a behaviour of which no condition can be tested next."""
+    """Return the error for a behaviour none of whose waiting conditions can be tested."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

@@ -1,4 +1,4 @@
-"""The deadline of a call: set once around the call and read in every loop inside it, instead of being passed on.
+"""The deadline of a call. It is set once around the call and read in every loop, so that no function passes it on.
 
 `within` sets it. Loops call `check`, or read `left`. Blocks nest, and the earliest deadline applies, so that a part of a call can
 receive a share of its time.
@@ -60,7 +60,7 @@ _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # n
 def within(limit: Deadline | float | None) -> Iterator[Deadline]:
     """Limit everything in a block to a deadline, or to seconds from now.
 
-    Yields the effective deadline: this one, or an earlier one that applies already.
+    Yields the effective deadline: the earlier one of the new deadline and the current deadline.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def overtime(share: float = 0.1) -> Iterator[Deadline]:
-    """Extend the deadline to check a result that was found in time: by a share of the time, at least a tenth of a second.
+    """Extend the deadline by a share of its time, at least a tenth of a second, to check a result that was found in time.
 
     Examples
     --------

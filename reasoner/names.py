@@ -1,4 +1,4 @@
-"""Short names for IRIs: the last part where that is unique in the scene, else with the ontology's name before it."""
+"""Short names for IRIs: the last part of the IRI if it is unique in the scene, otherwise with the ontology's name before it."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def local_name(iri: str) -> str:
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
-    """Return ``; did you mean 'x'?`` with the most similar known word, else the hint, else an empty text."""
+    """Return ``; did you mean 'x'?`` with the most similar known word; without one, return the hint, or an empty text."""
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
     near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [
@@ -96,11 +96,11 @@ def _ontology_name(iri: str) -> str:
 
 
 TYPED = 0.85
-"""Similarity from which on a wrong name counts as a right one with a slip."""
+"""Minimum similarity of a wrong name to a right name for which it counts as a typing error."""
 FEW_NAMES = 30
-"""Maximum number of names that are all told where none is like a wrong one."""
+"""Maximum number of names of an object that are all listed if none of them resembles the wrong name."""
 GUESSING: list[str] = []
-"""Modules that find what a wrong name means: `guessed` of a thing's names, `chosen` of some names; the top layer adds one."""
+"""Modules that find the meaning of a wrong name by their functions `guessed` and `chosen`; the top layer adds one."""
 
 
 def right_names(kind: str, module: str = "", table: str = "", made: str = "") -> Callable[[C], C]:
@@ -109,11 +109,11 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
     Parameters
     ----------
     kind : str
-        What lacks it, e.g. ``a scene``.
+        The object without the name, e.g. ``a scene``.
     module, table : str
-        Where the mapping of a right name to the words that mean it stands; it is imported when a name is wrong.
+        The module and the name of the mapping of right names to words of the same meaning; it is imported when a name is wrong.
     made : str, optional
-        The call that makes one; the error of a constructor without its arguments names it.
+        The call that creates such an object; the error of a constructor without arguments names it.
     """
 
     def hints() -> Mapping[str, str]:
@@ -167,12 +167,12 @@ def _checked(function: Callable[..., R]) -> Callable[..., R]:
 class WrongNameError(AttributeError):
     """The error for a missing name: with the name of the same function, or the most similar name.
 
-    The text is made when it is read: libraries ask objects for names that these don't have.
+    The text is made only when it is read, since libraries often request names that objects don't have.
 
     Parameters
     ----------
     kind : str
-        What lacks it, e.g. ``a scene``.
+        The object without the name, e.g. ``a scene``.
     name : str
     there : object
         Its public names are those that `dir` lists.

@@ -1,4 +1,7 @@
-"""The depth of nesting of documents, checked first since the time, memory or stack of some parsers grows much faster."""
+"""The depth of nesting of documents.
+
+It is checked before parsing, since the time, memory or stack of some parsers grows much faster than the depth.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,9 @@ from contextlib import suppress
 from xml.parsers import expat
 
 MOST_NESTED = 1_000
-"""Depth that every parser here reads; ontologies have about ten levels."""
+"""Maximum depth of a document; all parsers used here can read it. Ontologies have about ten levels."""
 PIECE = 256
-"""Bytes that are counted at once; the depth may be overestimated by as much."""
+"""Number of bytes that are counted at once; the depth may be overestimated by this number."""
 TURTLE = re.compile(
     rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
     rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
@@ -40,7 +43,7 @@ def nested(content: bytes, quoted: re.Pattern[bytes] = TURTLE) -> int:
 
 
 def nested_elements(content: bytes) -> int:
-    """Return how deeply the elements of an XML document are nested, up to where it isn't well-formed.
+    """Return the depth of the nested elements of an XML document, up to the first position where it isn't well-formed.
 
     >>> nested_elements(b"<a>" * 5000 + b"</a>" * 5000), nested_elements(b"<a>" + b"<b></b>" * 5000)
     (5000, 2)

@@ -1,8 +1,8 @@
 """Impossible states: one check, with one set of messages, for every source of states.
 
-Files, callers, observations, interventions and the board state facts. Each time, a value has to belong to its
-situation type, an amount has to lie within its bounds, and an exclusive value may have one holder. A symbol without a value is
-unknown, which is no fault.
+Facts come from files, callers, observations, interventions and the board. A value must belong to its situation type, an amount
+must lie within its bounds, and an exclusive value may have only one holder. A symbol without a value is unknown, which is no
+fault.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from confab.reasoner.amounts import DECIMAL, Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Domain, Fact, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
-"""Perceivers of an object's place, of the object in a hand, and of a hand's position."""
+"""Perceivers of the place of an object, of the object in a hand, and of the position of a hand."""
 
 
 class ImpossibleStateError(ValueError):
@@ -78,7 +78,7 @@ def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a state is impossible, for a reason that the state before doesn't have.
+    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't apply to the state before it.
 
     Parameters
     ----------

@@ -55,7 +55,10 @@ def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
 
 
 def _needed(problem: Problem) -> list[Behavior]:
-    """Return the behaviours that change what the goal, or a condition or effect of such a behaviour or rule, mentions."""
+    """Return the relevant behaviours.
+
+    Those that change a situation type in the goal, or in a condition or effect of a relevant behaviour or rule.
+    """
     behaviors = [*problem.domain.behaviors.values()]
     doing = [*behaviors, *(rule.behavior for rules in problem.domain.rules.values() for rule in rules)]
     counting, before = {symbol.situation for symbol in problem.goal}, -1
@@ -82,7 +85,7 @@ def _from(problem: Problem, level: int) -> list[Behavior]:
 
 
 def _given(problem: Problem, level: int, situation: str) -> set[str]:
-    """Return the values that behaviours from a level on may give to symbols of a situation type."""
+    """Return the values that behaviours of a level, and of those below it, may give to symbols of a situation type."""
     return {
         value
         for behavior in _from(problem, level)

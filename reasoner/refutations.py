@@ -64,6 +64,6 @@ def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem
 
 
 def _condition(fact: Fact) -> ValueCondition:
-    """Return the condition that a fact holds; that of a false fact is the negation of the true one."""
+    """Return the condition that a fact holds; for a false fact, the negation of the condition that it is true."""
     value = TRUE if fact.value == FALSE else fact.value
     return ValueCondition(fact.symbol.situation, fact.symbol.arguments, value, negated=fact.value == FALSE)

@@ -1,4 +1,4 @@
-"""Conditions and amounts as sentences, in names or in a caller's words for facts and names."""
+"""Conditions and amounts as sentences. They contain names, or the words that a caller has for facts and names."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def said(condition: Condition, words: Words = str) -> str:
 
 
 def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
-    """Return that some, no, or every individual of a class satisfies conditions.
+    """Return the sentence that some, no, or every individual of a class satisfies conditions.
 
     "Every" is the negation of a witness whose last condition is negated.
     """

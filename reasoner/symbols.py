@@ -71,7 +71,7 @@ class Perceived:
     by : str
         The perceiver.
     exclusive : bool
-        Whether no two individuals can have the same value at once, special values excepted.
+        Whether no two individuals can have the same value at once, except for special values.
     special : tuple of (str, str)
         The special values as pairs of name and value: ``("valueInHand", "in_hand")``.
     """
@@ -83,13 +83,13 @@ class Perceived:
 
 @dataclass(frozen=True)
 class SituationType:
-    """A property of an object type that is at once the class of its values.
+    """A property of objects, which is also the class of its values.
 
-    `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
-    value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
-    `level` on; `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
-    With a `quantity` the values are numbers (`confab.reasoner.amounts`), and only the symbols with a stated amount exist.
-    `perceived` states how physics reads the values, where it does.
+    `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional is
+    `boolean`: its value is the last argument, and there is one symbol per value, which is `TRUE` or `FALSE`. The symbols exist
+    from `level` on; `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene
+    doesn't state. With a `quantity` the values are numbers (`confab.reasoner.amounts`), and only the symbols with a stated
+    amount exist. `perceived` states how physics reads the values, if it reads them.
     """
 
     name: str
@@ -108,7 +108,7 @@ class SituationType:
 
 @dataclass(frozen=True)
 class ValueCondition:
-    """``situation(arguments) = value``; with an unbound variable as value it determines that variable.
+    """``situation(arguments) = value``. If the value is an unbound variable, the condition determines it.
 
     A symbol that doesn't exist has no value: the condition is then false, and its negation true.
     """
@@ -161,7 +161,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class AnyOf:
-    """At least one alternative holds, each a conjunction; negated: none does. Binds nothing outside itself."""
+    """At least one alternative, which is a conjunction, holds; negated: none does. It binds no variables outside of itself."""
 
     alternatives: tuple[tuple[Condition, ...], ...]
     negated: bool = False
@@ -233,9 +233,10 @@ class Timing:
     Attributes
     ----------
     duration : Expression, optional
-        Seconds, evaluated where the behaviour begins. None: as long as its refinement or, of a primitive, as was measured.
+        Seconds, evaluated where the behaviour begins. None: the duration of its refinement; for a primitive, the measured
+        duration.
     actors : tuple of str
-        Terms of the behaviour that can be in one step at a time.
+        Terms whose individuals can take part in only one step at a time.
     conditions, effects : tuple of pairs
         All conditions and effects, each with its span.
     """
@@ -261,11 +262,12 @@ class Times:
     Attributes
     ----------
     deadlines : mapping of Symbol to seconds
-        From when on a goal holds, at the latest.
+        The latest time from which on a goal has to hold.
     windows : mapping of individual to pairs of seconds
-        When an individual is available; None as the end of a window: for good. An individual without a window always is.
+        When an individual is available. A window without an end (None) lasts for ever; an individual without windows is always
+        available.
     measured : mapping of behaviour to seconds
-        How long behaviours without a stated duration took on average.
+        The average measured duration of behaviours without a stated duration.
     events : mapping of behaviour to seconds
         Events, which no actor executes: they happen at that time (PDDL's timed initial literals).
     """
@@ -291,10 +293,11 @@ class Parameter:
 class Behavior:
     """A lifted behaviour.
 
-    Effects are applied in order, false facts first, so that a fact which one binding makes both false and true is true, as in
-    PDDL. The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
-    the individuals that it names only as members of a class. A `price` replaces `cost`, and a precondition requires that the price
-    is defined (`priced`). `timing` states when its conditions must hold and its effects take place (`confab.reasoner.timing`).
+    Effects are applied in order, false facts first. So a fact that one binding makes both false and true is true, as in PDDL.
+    The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
+    the individuals that effects on all members of a class name. A `price` replaces `cost`, and a precondition requires that the
+    price is defined (`priced`). `timing` states when its conditions must hold and its effects take place
+    (`confab.reasoner.timing`).
     """
 
     name: str
@@ -357,9 +360,9 @@ class Behavior:
 class Rule:
     """A rule of a defined situation type: it is true of its arguments in every state in which all conditions hold.
 
-    If a situation type has several rules, one suffices; if none applies it is false. States do not contain its symbols: their
-    values are computed on demand. Rules may depend on each other, but not on the negation of a situation type that depends on them
-    (`confab.reasoner.derivation`).
+    If a situation type has several rules, one true rule suffices; if none is true, the situation is false. States don't contain
+    its symbols: their values are computed on demand. Rules may depend on each other, but not on the negation of a situation
+    type that depends on them (`confab.reasoner.derivation`).
 
     Parameters
     ----------
@@ -392,9 +395,9 @@ AGGREGATES = ("sum", "count", "max", "min")
 class Aggregate:
     """A rule of a derived amount: in every state the sum, count, maximum or minimum over all solutions of its conditions.
 
-    A solution assigns an individual to each of the `variables`. One for which `amount` is not defined is left out. A sum or
-    count without solutions is zero; a maximum or minimum without any doesn't exist. No behaviour that an author writes changes
-    a derived amount; `confab.reasoner.aggregates` adds the effects that keep it up to date.
+    A solution assigns an individual to each of the `variables`. A solution for which `amount` is not defined is left out. A sum
+    or count without solutions is zero; a maximum or minimum without solutions doesn't exist. No behaviour that an author writes
+    changes a derived amount; `confab.reasoner.aggregates` adds the effects that keep it up to date.
 
     Parameters
     ----------
@@ -525,7 +528,10 @@ class Problem:
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
-        """Return the symbols that a level sees and that are initially at rest; of unstated boolean ones, those that it changes."""
+        """Return the symbols that a level sees and that are initially at rest.
+
+        Unstated boolean symbols count if the level changes them.
+        """
         rests = {s.name: s.rest for s in self.domain.situations.values() if s.rest is not None}
         found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation)}
         changed = frozenset[str]().union(*(behavior.changes for behavior in self.domain.at_level(level)))
@@ -553,7 +559,7 @@ class Problem:
     def id_of(self, behavior: str, arguments: tuple[str, ...]) -> int:
         """Return the ID of a quantified behaviour without enumerating the others.
 
-        Behaviours count in declared order, then parameters in theirs, then individuals in theirs (PAPER.md section 4).
+        IDs are in declared order: of behaviours, then of parameters, then of individuals (section 4 of PAPER.md).
         """
         number, kinds = self._numbers[behavior]
         rank = 0
@@ -564,7 +570,7 @@ class Problem:
 
     @cached_property
     def _numbers(self) -> Mapping[str, tuple[int, tuple[str, ...]]]:
-        """For each behaviour its first ID, and the classes of its parameters."""
+        """The first ID of each behaviour, and the classes of its parameters."""
         found = {}
         for level in self.domain.levels:
             number = self.domain.first_ids.get(level, 0)
@@ -637,7 +643,7 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
     """Return the preconditions that follow from the bounds of the amounts that a behaviour changes, if conditions can express them.
 
-    They are negations of a violated bound, so they hold for missing amounts, which effects don't change.
+    Each is the negation of a violated bound, so it holds for missing amounts, which effects don't change.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

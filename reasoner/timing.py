@@ -1,7 +1,8 @@
 """How behaviours lie in time: durations, actors, and the spans of conditions and effects (docs/levels.md, "In time").
 
-A behaviour's own preconditions and effects are its *projection*: its conditions before and effects after it, if no other step
-overlaps it. Every planner reads these. `Timing` states in addition when each condition must hold and each effect takes place.
+The preconditions and effects of a behaviour are its *projection*: the conditions before it, and the effects after it, if no
+other step overlaps it. Every planner reads the projection. `Timing` states in addition when each condition must hold and when
+each effect takes place.
 """
 
 from __future__ import annotations
@@ -58,9 +59,10 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours with a value that holds only during them, and that another one, or the goal, can require.
+    """Return the behaviours that give a symbol a value only for their duration.
 
-    Their plans need concurrency: no sequence of whole steps shows such a value.
+    The value counts if another behaviour or the goal can require it. Such plans need concurrency: in no sequence of whole steps
+    does the value hold for another step.
     """
     found = set[str]()
     for behavior in problem.domain.behaviors.values():
@@ -75,7 +77,7 @@ def only_during(problem: Problem) -> frozenset[str]:
 
 
 def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
-    """Return the effects at the start of a behaviour whose value its end takes away."""
+    """Return the effects at the start of a behaviour that its end undoes."""
     if behavior.timing is None:
         return ()
     last = {
@@ -112,7 +114,7 @@ def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
 
 
 def on_each(effects: Sequence[Effect], classes: Mapping[str, Sequence[str]]) -> tuple[Effect, ...]:
-    """Return effects with each one on all individuals of a class replaced by effects on the individuals."""
+    """Return effects; an effect on all individuals of a class is replaced by one effect per individual."""
     found: list[Effect] = []
     for effect in effects:
         every = () if effect.each is None else classes.get(effect.each.kind, ())
@@ -124,12 +126,12 @@ DAY_TIME = re.compile(
     r"P(?=.)(?:(?P<days>\d{1,9})D)?(?:T(?=.)(?:(?P<hours>\d{1,9})H)?(?:(?P<minutes>\d{1,9})M)?"
     r"(?:(?P<seconds>\d{1,9}(?:\.\d{1,12})?)S)?)?"
 )
-"""A non-negative duration as xsd:dayTimeDuration writes it."""
+"""A non-negative duration in the notation of xsd:dayTimeDuration."""
 PARTS = {"days": 86400, "hours": 3600, "minutes": 60, "seconds": 1}
 
 
 def seconds_of(text: str) -> Fraction | None:
-    """Return the seconds of an xsd:dayTimeDuration, or None if the text is none or is negative.
+    """Return the seconds of an xsd:dayTimeDuration, or None if the text isn't a duration or is negative.
 
     >>> seconds_of("PT1M2.5S"), seconds_of("P1D"), seconds_of("2 s")
     (Fraction(125, 2), Fraction(86400, 1), None)

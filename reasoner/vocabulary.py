@@ -14,11 +14,11 @@ SHACL = "http://www.w3.org/ns/shacl#"
 SKOS = "http://www.w3.org/2004/02/skos/core#"
 XSD = "http://www.w3.org/2001/XMLSchema#"
 PREFIXES = {"": CORE, "owl": OWL, "rdf": RDF, "rdfs": RDFS, "skos": SKOS, "xsd": XSD}
-"""What every query may use."""
+"""The prefixes that every query may use."""
 
 TYPE = RDF + "type"
 INDIVIDUAL = OWL + "NamedIndividual"
 ONTOLOGY = OWL + "Ontology"
 LABEL = RDFS + "label"
 ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
-"""The properties by which conditions, effects and facts name their arguments, in order; the value comes behind them."""
+"""The properties by which conditions, effects and facts name their arguments, in order; the value follows them."""

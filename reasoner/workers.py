@@ -1,8 +1,8 @@
 """Processes that end with the process that started them, even if that is killed, and have their own limit of CPU time.
 
-Each gets one end of a pipe whose other end belongs to the parent process. The kernel kills the child, with its children, as soon as
-that other end is closed (Linux). After kill -9 or a crash no code has to run for that, and it doesn't matter which thread started
-the process.
+Each process gets one end of a pipe; the other end belongs to the parent process. As soon as the other end is closed, the kernel
+(Linux) kills the process with its children. After kill -9 or a crash, no code has to run for that, and any thread may have
+started the process.
 """
 
 from __future__ import annotations
@@ -79,13 +79,13 @@ def limit_cpu(seconds: float) -> None:
 
 
 def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) -> Popen[bytes]:
-    """Start a command in a session of its own; the command ends with this process, even if that is killed.
+    """Start a command in a separate session; the command ends when this process ends, even if this process is killed.
 
     Parameters
     ----------
     command : sequence of str
     seconds : float
-        CPU time, of each process of the command.
+        Maximum CPU time of each process of the command.
     **options
         Of `subprocess.Popen`.
     """
@@ -127,14 +127,14 @@ def call(
     timeout: float | None = None,
     started: Callable[[Popen[bytes]], object] | None = None,
 ) -> Any:
-    """Return the result of a function that runs in a process of its own.
+    """Return the result of a function that runs in a separate process.
 
     Parameters
     ----------
     function : callable
         A function of a module; its output is lost.
     *arguments
-        Are pickled, as what is returned or raised.
+        Arguments of the function; they, and the result or the exception, are pickled.
     seconds : float
         CPU time.
     megabytes : int, optional
@@ -142,7 +142,7 @@ def call(
     timeout : float, optional
         Seconds that may pass.
     started : callable, optional
-        Is given the process, which `kill` ends from elsewhere.
+        Called with the process, so that other code can end it by `kill`.
 
     Raises
     ------

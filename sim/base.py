@@ -20,7 +20,7 @@ FORCE = 5000.0
 class Base:
     """The base of a robot in a physics world, on joints along x and y and about z.
 
-    Every drive ends up to `miss` metres and radians off its goal.
+    A drive misses its goal by at most `miss` metres and radians.
     """
 
     client: int

@@ -217,7 +217,7 @@ def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
 
 
 def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]) -> _Way:
-    """Return the postures of poses by angle; raise `SkillError` if they can't be followed."""
+    """Return the postures of the arm for the poses at some tilt angles; raise `SkillError` if the arm can't follow them."""
     with attempt.planning():
         reacher = attempt.reacher(margin=CLOSE)
         q = reacher.follow(poses)

@@ -134,7 +134,10 @@ class Learned(TypedDict):
 
 
 class TurnableRow(TypedDict):
-    """A symbol that can be turned: its key, its words, the name of its list of values, its value and the wanted one."""
+    """A symbol whose value the user can change.
+
+    Its key, its words, the name of its list of values, its current value and its goal value.
+    """
 
     key: str
     label: str

@@ -21,7 +21,7 @@ class Agenda:
     begun : mapping of path to State
         The situation before each step in progress.
     sound : bool
-        Whether the steps in progress could also begin if what was observed since then had held before.
+        Whether the steps in progress could also have begun in a situation with the facts that were observed since then.
     """
 
     planned_for: Problem

@@ -1,4 +1,4 @@
-"""An asynchronous world as a synchronous one: its coroutines run on an event loop in a thread of their own."""
+"""An asynchronous world as a synchronous one: its coroutines run on an event loop in a separate thread."""
 
 from __future__ import annotations
 

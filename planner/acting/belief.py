@@ -75,7 +75,7 @@ class Belief:
         return self.problem.domain.situations[symbol.situation].boolean
 
     def fault(self, symbol: Symbol, value: str) -> str:
-        """Return why an observed value can't be believed; an empty text if it can."""
+        """Return the reason for which an observed value can't be believed; an empty text if it can be believed."""
         situation = self.problem.domain.situations.get(symbol.situation)
         if situation is None:
             return f"the scene has no situation type {symbol.situation}"
@@ -129,7 +129,7 @@ class Belief:
         self._apply_doubts()
 
     def without_obstacles(self, goal: Mapping[Symbol, str]) -> Problem:
-        """Return the task of reaching a goal as if every obstacle were movable."""
+        """Return the task of reaching a goal, with every obstacle treated as movable."""
         return replace(self.problem, domain=self.unobstructed, relations=self.certain.relations, goal=dict(goal))
 
     # ------------------------------------------------------------------------------------------------- doubts
@@ -191,6 +191,6 @@ def _terms(behavior: Behavior) -> Iterable[Parameter]:
 
 
 def _excluding(behavior: Behavior, never: Iterable[tuple[Condition, ...]]) -> Behavior:
-    """Return a behaviour with the additional preconditions that none of some conjunctions holds."""
+    """Return a behaviour with additional preconditions: none of some conjunctions may hold."""
     new = [AnyOf((together,), negated=True) for together in never]
     return replace(behavior, preconditions=(*behavior.preconditions, *new)) if new else behavior

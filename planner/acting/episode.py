@@ -29,8 +29,8 @@ class InterventionKind(Enum):
 class Intervention:
     """An intervention by a person during an episode.
 
-    It takes place as soon as the step with the ID `after` (an int: a step of the most abstract level) or the path `after` (a tuple)
-    is done, or when the world's clock shows `at` seconds, which may be inside a primitive.
+    It takes place as soon as a step is done: the step of the most abstract level with the ID `after` (an int), or the step with
+    the path `after` (a tuple). Otherwise it takes place when the world's clock shows `at` seconds, possibly during a primitive.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """A symbol with an unexpected value; `None` if nothing was perceived, or nothing expected."""
+    """A symbol with an unexpected value. A value is `None` if none was perceived, or none was expected."""
 
     symbol: Symbol
     expected: str | None
@@ -93,7 +93,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed primitive: the situation, the failure, and the objects concerned."""
+    """A failed primitive: the situation, the failure, and the objects that took part."""
 
     step: Step
     code: str
@@ -106,7 +106,7 @@ class Failure:
 class ExecutedPrimitive:
     """An executed primitive: its times, its verdict, and the surprises after it.
 
-    `relied_on` are the static facts, as relation and individuals, that it or the behaviour above it relied on.
+    `relied_on` are the static facts (relation and individuals) on which the primitive, or the behaviour above it, relied.
     """
 
     step: Step
@@ -122,9 +122,9 @@ class ExecutedPrimitive:
 class Replan:
     """A change of the plan.
 
-    `after` is the path of the last primitive that was begun. `kind` is ``repair`` where valid steps of the old plan were kept,
-    otherwise ``replan``. `steps` are the steps to be done from then on, of cost `cost`; `dropped` and `added` count the primitives
-    removed from and added to the steps planned before.
+    `after` is the path of the last primitive that was begun. `kind` is ``repair`` if valid steps of the old plan were kept,
+    otherwise ``replan``. `steps` are the steps to be done from then on, of cost `cost`; `dropped` and `added` count the
+    primitives removed from and added to the steps planned before.
     """
 
     after: tuple[int, ...]
@@ -157,7 +157,7 @@ class Episode:
     done : Plan
         The executed steps; a failed primitive isn't part of it, unless its effects were observed afterwards.
     initial, observed : State
-        The situation in the beginning, and as it was observed in the end.
+        The situation in the beginning, and the situation that was observed in the end.
     goal : State
         The goal in the end.
     events : tuple of ExecutedPrimitive
@@ -168,7 +168,7 @@ class Episode:
     failures : tuple of Failure
         Experience for the memory.
     missed : tuple of Intervention
-        The interventions that didn't take place, since the episode was over before.
+        The interventions that didn't take place, because the episode ended before.
     course : tuple of Seen
         The changes of the situation from `initial` to `observed`, in order of time.
     refuted : tuple of Refutation

@@ -58,7 +58,7 @@ def act(
     repairs: bool = True,
     caution: Caution | None = None,
 ) -> Episode:
-    """Execute a task in a world until it is done, proved impossible, or a limit is reached.
+    """Execute a task in a world until it is done, it is proved impossible, or a limit is reached.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def act(
     world : World
         An object with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
     plan : Plan, optional
-        The first plan; made here if left out.
+        The first plan; if left out, it is planned here.
     interventions : sequence of Intervention
         The interventions by people during the episode.
     planner : callable, optional
@@ -78,7 +78,7 @@ def act(
     repairs : bool
         False replans from scratch instead of repairing.
     caution : Caution, optional
-        Failures in earlier episodes: unreliable facts and behaviours are avoided where there is an alternative.
+        Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
 
     Returns
     -------
@@ -153,7 +153,7 @@ class _Run:
         self.say("plan", text="; ".join(reason.text for _, reason in self.goals.aside.values()))
 
     def finish(self) -> None:
-        """End the episode, check the agenda again, or take up a goal that was put off: no step is left."""
+        """End the episode, check the agenda again, or take up a goal that was put off; called when no step is left."""
         record = self.record
         if missing := open_goals(self.belief.problem):
             self.request_replan(f"{missing[0]} doesn't hold yet")
@@ -239,7 +239,7 @@ class _Run:
         return chain, before, verdict
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
-        """Return whether some of the expected changes can be perceived, and none of these was."""
+        """Return whether at least one expected change can be perceived, and none was perceived."""
         found = [
             seen.get(fact.symbol, FALSE) == fact.value
             for fact in changes
@@ -385,7 +385,7 @@ class _Run:
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
     def on_no_plan(self, outcome: Outcome | None, limits: Limits) -> None:
-        """Look for free spots; otherwise set aside or put off the goals unreachable even alone; otherwise retry, or stop.
+        """Look for free spots; otherwise set aside or put off the goals that are unreachable one by one; otherwise retry, or stop.
 
         A goal that needs facts in doubt is put off until everything else is done.
         """
@@ -444,7 +444,10 @@ class _Run:
     # ---------------------------------------------------------------------------------------------------- failures
 
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
-        """Retry, then use an alternative: a behaviour that failed repeatedly counts as impossible for the rest of the episode."""
+        """Retry a failed behaviour, then use an alternative.
+
+        Repeated failures make a behaviour impossible for the rest of the episode.
+        """
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
             self.request_replan(verdict.message)

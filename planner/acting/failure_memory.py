@@ -1,8 +1,8 @@
-"""Failure as experience: which static facts proved unreliable, and which of them to avoid.
+"""Failures as experience: static facts that proved unreliable, and those to be avoided.
 
-A primitive that fails though its preconditions hold casts doubt on the static facts that it relied on: for instance, that this
-hand can reach that place. Counts only grow, so that the counts of several robots can be added. A fact that failed more
-often than it held is avoided as long as there is a plan without it.
+If a primitive fails although its preconditions hold, the static facts on which it relied are in doubt: for instance, that this
+hand can reach that place. Counts only grow, so that the counts of several robots can be added. A fact that failed in more cases
+than it held is avoided as long as there is a plan without it.
 
 A refutation by motion planning is certain and more specific: the behaviour is impossible while all objects are where they are
 (`refuted_by`).
@@ -59,7 +59,7 @@ class Caution:
         return Caution({fact: (a[0] + b[0], a[1] + b[1]) for fact, (a, b) in pairs.items()})
 
     def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
-        """Return the problem without the doubtful facts, the most doubtful first, as long as a plan is left."""
+        """Return the problem without doubtful facts; facts are removed in order of doubt as long as there is a plan."""
         end = limits.end()
         doubtful = [fact for fact in self.counts if self.failure_probability(fact) > DOUBTFUL]
         for fact in sorted(doubtful, key=lambda fact: (-self.failure_probability(fact), fact)):

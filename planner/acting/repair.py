@@ -327,7 +327,7 @@ def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
-    """Whether all changes that the first level sees were goals once and no longer are."""
+    """Return whether all changes that the first level sees were goals once and no longer are."""
     situations, first = call.problem.domain.situations, call.program.levels[0]
     return all(
         call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value

@@ -10,10 +10,10 @@ from confab.planner.plan import Limits
 
 @dataclass(frozen=True)
 class RetryPolicy:
-    """Limits of an episode: attempts per primitive, total failures, primitives begun per primitive planned, and planning limits.
+    """Limits of an episode: attempts per primitive, total failures, begun primitives per planned primitive, and planning limits.
 
-    `rounds` is the number of times that failed steps are tried once no alternative is left, since the situation may have changed
-    and a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
+    `rounds` is the maximum number of new attempts of failed steps when no alternative is left: the situation may have changed,
+    or a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
     each planning call; the whole episode ends by the current deadline (`confab.reasoner.limits.within`).
     """
 
@@ -35,9 +35,9 @@ class Retries:
     ----------
     policy : RetryPolicy
     attempts : mapping of behaviour and arguments to int
-        The number of failures of each primitive since doubts were dropped.
+        The number of failures of each primitive since the doubts were last dropped.
     rounds : int
-        The number of times that failed steps were tried, the first included.
+        The number of rounds of attempts, including the first.
     pondered : mapping of situation to int
         The number of checks of the agenda in each situation.
     room_wanted : bool

@@ -1,7 +1,8 @@
 """Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that keeps it.
 
-Most of a plan's order is arbitrary. A primitive must wait for an earlier one only if, executed before it, one of the two would be
-inapplicable or have other effects. The behaviours themselves are used for this test, so it covers all forms of conditions.
+Most of the order of a plan is arbitrary. A primitive must wait for an earlier primitive only if in the reverse order one of the
+two would be inapplicable or have other effects. The behaviours themselves are used for this test, so it covers all forms of
+conditions.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ class SymbolicWorld:
         return ()
 
     def why_unplaced(self, individual: str) -> str:
-        """Return that an object lies, if it still exists."""
+        """Return the text that an object lies, if the object still exists."""
         return "lies" if any(symbol.arguments[0] == individual for symbol in self.state) else ""
 
     def _add_spot(self, individual: str) -> None:
@@ -157,7 +157,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Remove an individual from the values of other symbols: they get its former place if possible, otherwise their rest values."""
+    """Replace an individual as the value of other symbols: by its former place if possible, otherwise by their rest values."""
     own = [value for symbol, value in state.items() if symbol.arguments[0] == individual]
     for symbol, value in state.items():
         if value == individual and symbol in after:

@@ -34,7 +34,7 @@ def with_discoveries(belief: Belief, record: Record, fact: Fact, reason: Reason)
 
 
 def blamed(record: Record, symbol: Symbol, value: str) -> Reason:
-    """Return the reason for giving up a goal: the last failure that concerns it, or the last one of all."""
+    """Return the reason for giving up a goal: the last failure that concerns the goal, otherwise the last failure."""
     concerned = {*symbol.arguments, value}
     failures = record.failures
     near = [f for f in failures if concerned & {*f.objects, *f.step.arguments, *f.step.bindings.values()}]

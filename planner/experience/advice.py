@@ -70,15 +70,15 @@ class Memory:
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
 
     def helps(self, rule: Rule) -> bool:
-        """Whether rules have achieved goals of this kind at least as often as not."""
+        """Return whether rules have achieved goals of this kind at least as often as not."""
         return self.record(rule).chosen >= max(1, self.record(rule).failed)
 
     def harms(self, rule: Rule) -> bool:
-        """Whether they have failed more often than not."""
+        """Return whether they have failed more often than not."""
         return self.record(rule).chosen < self.record(rule).failed
 
     def leads(self, problem: Problem, mode: str) -> bool:
-        """Whether rules may be used: some open goal has rules with a good record, or the mode requires it."""
+        """Return whether rules may be used: some open goal has rules with a good record, or the mode requires it."""
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
         return (
             mode != "strict"
@@ -124,7 +124,7 @@ class Memory:
         return replace(using, methods=methods)
 
     def _fits(self, method: Method, using: Compiled) -> bool:
-        """Whether a domain has the behaviours of a method, with the same numbers of roles."""
+        """Return whether a domain has the behaviours of a method, with the same numbers of roles."""
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)
         if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:

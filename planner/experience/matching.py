@@ -49,7 +49,7 @@ def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind 
 
 
 def known(rule: Rule, problem: Problem) -> bool:
-    """Whether a problem has the behaviour, the classes and the situation types of a rule."""
+    """Return whether a problem has the behaviour, the classes and the situation types of a rule."""
     domain, classes = problem.domain, problem.classes
     behavior = domain.behaviors.get(rule.does[0])
     if (

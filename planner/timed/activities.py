@@ -1,7 +1,7 @@
 """The facts that each step of a sequence reads and changes at its beginning, throughout, and at its end.
 
-The sequence consists of steps, or of begins and ends of steps where some are possible only during others. It is simulated once on
-symbols, and the facts that each condition reads are recorded.
+The sequence consists of steps, or of begins and ends of steps if some steps are possible only during others. It is simulated
+once on symbols, and the facts that each condition reads are recorded.
 """
 
 from __future__ import annotations

@@ -29,12 +29,12 @@ from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
 
 SECONDS = 10.0
-"""Maximum number of seconds for a schedule where no limit is given; the exchanges of turns are bounded by their work, too."""
+"""Maximum number of seconds for a schedule if no limit is given; exchanges of turns are also bounded by their work."""
 
 
 @dataclass(frozen=True)
 class Timed:
-    """The result of scheduling: a timed plan that the checker accepts, or why there is none."""
+    """The result of scheduling: a timed plan that the checker accepts, or the reason that there is none."""
 
     plan: TimedPlan | None = None
     reason: Reason | None = None
@@ -59,7 +59,7 @@ def in_time(
     separation : Fraction
         The time between conflicting events, in seconds: PDDL's epsilon.
     events : sequence of StepEvent, optional
-        The order in which its primitives begin and end; one after another if not given.
+        The order in which the primitives begin and end; by default they are executed one after another.
     """
     until = perf_counter() + (SECONDS if seconds is None else seconds)
     steps = plan.primitives
@@ -120,7 +120,7 @@ def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
 def _timed(
     problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
 ) -> TimedPlan | None:
-    """Return a schedule as a timed plan, with the turns taken by their actors; None if its levels have no sequential order."""
+    """Return a schedule as a timed plan with the actors of its turns; None if its levels have no sequential order."""
     renamed: dict[int, dict[str, str]] = {}
     for resource, line in enumerate(found.turns):
         for own, number in line:
@@ -154,7 +154,7 @@ def _timed(
 
 
 def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins) -> list[int]:
-    """Return by how much each activity could begin later without a longer makespan."""
+    """Return the slack of each activity: the time by which it could begin later without a longer makespan."""
     latest = [begins.makespan - lasts for lasts in durations]
     order = sorted(range(len(latest)), key=lambda i: -begins.begins[i])
     for _ in range(len(latest)):

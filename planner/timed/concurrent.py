@@ -1,11 +1,12 @@
 """Plans that need concurrency: the begins and ends of steps as operators of the flat core, with a simple temporal network.
 
-A behaviour with a value that holds only during it is cut into its begin and its end. The others stay whole, and are cut
-only if no plan is found otherwise. A first search ignores durations; its plan is scheduled. If that has no schedule, a
-second search keeps a network of the events since no step was running, and drops nodes in which a step can't end in time.
+A behaviour that gives a symbol a value only for its own duration is cut into its begin and its end. Other behaviours are cut
+only if no plan is found otherwise. A first search ignores durations, and its plan is scheduled. If the plan has no schedule, a
+second search keeps a temporal network of the events since the last time at which no step was running, and drops nodes in which
+a step can't end in time.
 
-state       bits of the cut task, as in `confab.planner.grounded.best_first`
-window      the events since no step was running, each with its reads and writes
+state       bits of the cut task, as in `confab.planner.grounded.best_first` window the events since the last time at which no
+            step was running, each with its reads and writes
 h           relaxed-plan heuristic of a state, and one for each running step
 
 Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008; Coles et al., "Extending the use of
@@ -111,7 +112,8 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
 class _Cut:
     """A problem with some behaviours cut into begin and end.
 
-    If `guarded`, a symbol that a cut behaviour requires throughout can't be changed meanwhile, nor required by another one.
+    If `guarded`, no other behaviour may change or require a symbol that a cut behaviour requires throughout, between its begin
+    and end.
     """
 
     whole: Problem
@@ -156,7 +158,7 @@ class _Cut:
         return [(c.situation, c.arguments) for c in asked if isinstance(c, ValueCondition)]
 
     def guard(self, behavior: Behavior) -> Behavior:
-        """Return a behaviour that changes no reserved symbol; a cut one reserves symbols at its begin until its end."""
+        """Return a behaviour that changes no reserved symbol; a cut behaviour reserves symbols from its begin to its end."""
         name, _, part = behavior.name.partition("@")
         held = self.held()
         own = [cell for cell in self.asked(name) if cell[0] in held] if part else []
@@ -346,7 +348,7 @@ class _Finder:
         return node.state, tuple(number for pair in busy for number in pair)
 
     def busy(self, node: _Node, step: int) -> int:
-        """Return the minimum time taken by the events of a window since a step of it began, as far as its end waits for them."""
+        """Return the minimum time between the begin of a step and the events of the window for which its end waits."""
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
         return 0 if times is None else times[-1]
@@ -444,7 +446,9 @@ class _Finder:
         return {}
 
     def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest times of the steps of a window, if these running ones end next; None if one would end too late.
+        """Return the earliest times of the steps of a window if some running steps end next.
+
+        None if one of them would end too late.
 
         The last entry is the time from the begin of the first ending step to the events that its end waits for.
         """

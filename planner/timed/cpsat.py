@@ -1,7 +1,8 @@
 """A shorter schedule, and a lower bound, by the constraint solver CP-SAT of OR-Tools (the extra `time`).
 
-Turns are intervals that don't overlap on their resource; a turn that several actors could take is an optional interval on each of
-them, one of which is present. The solver chooses the order of turns and their actors; the earliest begins follow from these.
+Turns are intervals that don't overlap on their resource. A turn that several actors could take is an optional interval on each
+of these actors; exactly one of the intervals is present. The solver chooses the order of turns and their actors; the earliest
+begins follow from these.
 """
 
 from __future__ import annotations

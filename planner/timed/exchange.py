@@ -145,7 +145,7 @@ def _durations(
     members: Sequence[int],
     names: Mapping[str, str],
 ) -> dict[int, int] | None:
-    """Return the durations of activities with other actors; None if static facts don't allow these."""
+    """Return the durations of activities with other actors; None if static facts don't allow these actors."""
     found = {}
     for member in members:
         step = order.activities[member].step

@@ -20,7 +20,7 @@ Window = tuple[int, int | None]
 
 @dataclass(frozen=True)
 class Network:
-    """The constants of a network: all but the durations, which may depend on the chosen actors.
+    """The constants of a network. Durations aren't constant: they may depend on the chosen actors.
 
     Attributes
     ----------
@@ -29,8 +29,8 @@ class Network:
     separation : int
         The minimum time between conflicting events.
     tick : int
-        The minimum time of a begin, or of the end of a later activity, before an end that it must precede: at the same instant,
-        ends come first, in the order of the activities.
+        The minimum time between an event and an end that the event must precede. (Events at the same instant are ordered: ends
+        come first, in the order of the activities.)
     durations : list of int
     edges : tuple of Edge
     at, latest : list of int or None
@@ -53,7 +53,7 @@ class Network:
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
     def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
-        """Return for each activity those that begin at least some time after it, with that time."""
+        """Return for each activity its successors, each with the minimum time between the two begins."""
         found: list[dict[int, int]] = [{} for _ in durations]
         for i, high, j, low in edges:
             apart = (
@@ -74,7 +74,7 @@ class Begins:
 
 
 def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[Fraction] = ()) -> Network:
-    """Return the network of an order; `more` are further times that its unit divides."""
+    """Return the network of an order. The unit of the network also divides the times in `more`."""
     fixed = [one.at for one in order.activities]
     ends = [end for windows in order.windows.values() for window in windows for end in window if end is not None]
     times = [separation, *(one.duration for one in order.activities), *ends, *order.latest.values(), *more]

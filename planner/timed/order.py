@@ -1,8 +1,9 @@
 """The necessary order of activities: precedences, and turns that can be exchanged.
 
-Two accesses to one key conflict unless both only read. Conflicting accesses keep the order of the sequence, so that every schedule
-is equivalent to it, with one exception: a *turn* changes a symbol from its first value and back again. The turns of a symbol
-(or of an actor, with all symbols about it) can be taken in any order, one at a time: a hand picks up and puts down many objects.
+Two accesses to one key conflict unless both only read. Conflicting accesses keep the order of the sequence, so that every
+schedule is equivalent to the sequence. There is one exception: a *turn* changes a symbol from its first value and back again.
+The turns of a symbol (or of an actor, with all symbols about it) can be taken in any order, one at a time. (Example: a hand
+picks up and puts down many objects.)
 
 Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998); blocks: Siddiqui and Haslum, "Block-structured plan
 deordering", AI 2012.
@@ -27,7 +28,9 @@ Edge = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Turn:
-    """Activities that use a resource without a break: from the first of `lows` to the last of `highs`, each a begin or an end.
+    """Activities that use a resource without interruption, from the first event in `lows` to the last in `highs`.
+
+    An event is a begin or an end.
 
     Turns that only read can be taken at the same time.
     """
@@ -40,7 +43,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Resource:
-    """A symbol or an actor whose turns exclude each other, in the order of the sequence; `actor` is its name if it is one."""
+    """A symbol or an actor whose turns exclude each other, in the order of the sequence. `actor` is the name of an actor."""
 
     turns: tuple[Turn, ...]
     actor: str | None = None
@@ -92,7 +95,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     Raises
     ------
     InapplicableError
-        The events have an activity change a fact that another one, which isn't over, requires throughout.
+        An activity changes a fact that another, unfinished activity requires throughout.
     """
     records, touched, starts, ends = _records(activities, events)
     times = problem.times or Times()
@@ -203,7 +206,7 @@ def _actor(
     starts: Mapping[int, int],
     ends: Mapping[int, int],
 ) -> Resource:
-    """Return the turns of an actor: while it is busy, or a symbol about it hasn't returned to its first value."""
+    """Return the turns of an actor: it is busy in a turn, or a symbol about it differs from its first value."""
     its = sorted((n for n, one in enumerate(activities) if actor in one.actors), key=lambda n: starts[n])
     busy = [_Record(n, BEGIN, END, ("", ""), starts[n]) for n in its]
     return Resource(_turns([busy, *cells.values()], ends), actor)
@@ -223,7 +226,7 @@ def _chained(
     activities: Sequence[Activity],
     turn_of: Mapping[int, int] | None,
 ) -> Iterator[Edge]:
-    """Yield the edges between conflicting accesses to a symbol; if there are turns, only within one."""
+    """Yield the edges between conflicting accesses to a symbol; if the symbol has turns, only edges within a turn."""
     last: _Record | None = None
     readers: list[_Record] = []
     turn: int | None = None
@@ -272,7 +275,7 @@ def _touching(
 
 
 def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]) -> dict[int, Fraction]:
-    """Return the latest ends of activities for goals with a deadline: of those that change the goals last."""
+    """Return the latest ends of the activities that change goals with a deadline last."""
     found: dict[int, Fraction] = {}
     for symbol, seconds in times.deadlines.items():
         its = [r for r in records.get((symbol.situation, symbol.arguments), ()) if r.written is not None]
@@ -282,7 +285,7 @@ def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Rec
 
 
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
-    """Return the time windows of activities, where restricted: within a window of each individual that they name."""
+    """Return the time windows of restricted activities: an activity lies within a window of each individual that it names."""
     found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
     for number, one in enumerate(activities):
         for individual in dict.fromkeys((*one.step.arguments, *one.actors)):
@@ -295,7 +298,7 @@ def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tu
 def common(
     one: Sequence[tuple[Fraction, Fraction | None]], other: Sequence[tuple[Fraction, Fraction | None]]
 ) -> tuple[tuple[Fraction, Fraction | None], ...]:
-    """Return the windows that lie in one of each of two sets of windows.
+    """Return the intersections of two sets of windows.
 
     >>> common([(Fraction(0), Fraction(9))], [(Fraction(5), None)])
     ((Fraction(5, 1), Fraction(9, 1)),)

@@ -106,9 +106,9 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
 
 
 def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the actors of a step: those that its behaviour names, otherwise the first argument that is a resting individual.
+    """Return the actors of a step.
 
-    `resting` has what `default_actors` returns.
+    Those that its behaviour names, otherwise the first argument in `resting`, which is the result of `default_actors`.
     """
     stated = timing_of(behavior).actors
     if stated:

@@ -10,7 +10,7 @@ from functools import cached_property
 from confab.planner.plan import Plan, Step
 
 THESE_STEPS = "these steps"
-"""A bound on schedules of the same steps: conflicting ones in the order of the plan, turns in any order, by any of the actors."""
+"""A bound on schedules of the same steps: conflicting steps in the order of the plan, turns in any order and by any actor."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """A schedule of an order: the order of turns of each resource, the actor of each turn, and the begins of activities.
 
-The first schedule is greedy: turns in the order of the sequence, each by the actor that is free first. Then turns on the critical
-path are exchanged (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem",
-Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
+The first schedule is greedy: turns are taken in the order of the sequence, each by the actor that is free first. Then turns on
+the critical path are exchanged (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
+problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class _Search:
                     self.turns_of[member].append((resource, number))
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
-        """Return the schedule of some turns; None if they have none."""
+        """Return the schedule for an order of turns; None if there is none."""
         durations = durations_with(self.network, self.choices, turns)
         begins = earliest(self.network, turn_edges(self.order, turns), durations)
         return None if begins is None else CandidateSchedule(turns, begins)
@@ -194,7 +194,7 @@ class _Search:
                                 yield (turn, (resource, -1 - target)), turns
 
     def moved(self, now: CandidateSchedule, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
-        """Yield the turns with one given to another actor, among its turns by their begins, or one earlier or later."""
+        """Yield the turns with one of them moved to another actor: inserted by begin time, or one position earlier or later."""
 
         def begin(one: TurnId) -> int:
             its = self.order.resources[one[0]].turns[one[1]]
@@ -252,7 +252,7 @@ def least(order: Order, network: Network, choices: Choices) -> int:
 
 
 def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
-    """Return the minimum duration of a turn: for an actor while it is busy, for a symbol its longest activity."""
+    """Return the minimum duration of a turn: for an actor the time that it is busy, for a symbol its longest activity."""
     resource = order.resources[turn[0]]
     its = resource.turns[turn[1]]
     if resource.actor is not None:

@@ -1,8 +1,8 @@
 """The checker of plans in time. It shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
 
-The primitives are simulated on symbols at their times: at each instant, ends come first. Every condition is evaluated at the times
-that its span requires, those of `throughout` again after every event. Pending values belong to their step: a step that reads
-or changes them meanwhile is a fault.
+The primitives are simulated on symbols at their times; at each instant, ends come first. Every condition is evaluated at the
+times that its span requires; a condition `throughout` is evaluated again after every event. A pending value belongs to its
+step: it is a fault if another step reads or changes it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """Facts that record the cells, and the holders of values, that are read."""
+    """Facts that record which cells, and which holders of a value, a condition reads."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -143,7 +143,7 @@ class _Clock:
         return self.pieces[name]
 
     def actors(self) -> Iterator[Fault]:
-        """Yield a fault where an actor is in two steps at once, or an individual that a step names isn't available."""
+        """Yield a fault if an actor is in two steps at once, or an individual that a step names isn't available."""
         lanes: dict[str, list[Slot]] = {}
         for slot in self.timed.slots:
             behavior = self.problem.domain.behaviors[slot.step.behavior]
@@ -224,7 +224,7 @@ class _Clock:
         self.since[cell] = time
 
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
-        """Yield a fault where a step reads or changes a pending value of another one, or a value touched a moment ago."""
+        """Yield a fault if a step reads or changes a pending value of another step, or a value that was touched a moment ago."""
         read, values = set(self.facts.cells), set(self.facts.values)
         for other in self.running.values():
             if other.number == one.number:
@@ -249,14 +249,14 @@ class _Clock:
             self.asked[cell], self.read_by[cell] = time, one.number
 
     def holds(self, one: _Running) -> Iterator[Fault]:
-        """Yield a fault where a condition that a running step requires throughout no longer holds."""
+        """Yield a fault if a condition that a running step requires throughout no longer holds."""
         if one.pieces.middle.preconditions:
             self.facts.clear()
             if self.rules.changes(one.pieces.middle, one.terms, self.facts) is None:
                 yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks throughout ceases to hold")
 
     def in_the_end(self) -> Iterator[Fault]:
-        """Yield the goals not reached, or not in time, and the cells that another step than in sequence changes last."""
+        """Yield the goals that aren't reached in time, and the cells whose last change isn't by the same step as in sequence."""
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
             if not meets(got, wanted):

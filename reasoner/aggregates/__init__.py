@@ -5,6 +5,6 @@ each behaviour gets the effects that keep it up to date (`keeping.py`). For ``LO
 items in the cart, PUT(?item, ?cart) increases LOAD(?cart) by weight(?item) and decreases LOAD of the cart that the item was in
 before.
 
-A maximum or a minimum needs no effects: a condition that reads it becomes a witness, the individual of which none has more
+A maximum or a minimum needs no effects: a condition that reads it becomes a witness, an individual that no other one exceeds
 (`extrema.py`).
 """

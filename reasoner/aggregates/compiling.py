@@ -14,7 +14,7 @@ from confab.reasoner.symbols import Domain, spread
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
-    """Return a domain whose behaviours keep its sums and counts, name no maximum or minimum, and no class in an effect.
+    """Return a domain whose behaviours keep sums and counts up to date, and name no maximum, no minimum and no class in an effect.
 
     Raises
     ------

@@ -53,7 +53,7 @@ def read_by(aggregate: Aggregate) -> frozenset[str]:
 
 
 def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -> set[str]:
-    """Return some situation types with all that their definitions name, directly or not."""
+    """Return situation types together with all types that their definitions name, directly or indirectly."""
     found, waiting = set[str](), [*situations]
     while waiting:
         name = waiting.pop()
@@ -107,12 +107,12 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
 
 
 def existing(aggregate: Aggregate) -> tuple[Condition, ...]:
-    """Return the condition that the number of an aggregate is defined, where it may not be."""
+    """Return the condition that the number of an aggregate is defined; none if it is always defined."""
     whole = aggregate.amount
     amounts = [part for part in inside(whole) if isinstance(part, Amount | Measure)]
     return (Comparison(whole, "=", whole),) if amounts or divides(whole) else ()
 
 
 def divides(expression: Expression) -> bool:
-    """Whether a number is divided in an expression."""
+    """Return whether a number is divided in an expression."""
     return any(isinstance(part, Calculation) and part.operator == "/" for part in inside(expression))

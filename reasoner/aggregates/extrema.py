@@ -53,7 +53,7 @@ def _extrema(expression: Expression, aggregates: Mapping[str, Aggregate]) -> lis
 
 
 def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, Aggregate]) -> Condition:
-    """Return a comparison with the number of the individuals of which none has more, or less, in the place of an extremum."""
+    """Return a comparison in which the number of an unexceeded individual replaces a maximum or a minimum."""
     aggregate = aggregates[read.situation]
     taken = {*mentions(condition), *read.arguments}
     best, other = (_solution(aggregate, read.arguments, suffix, taken) for suffix in ("", "_other"))
@@ -72,7 +72,7 @@ def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, A
 def _solution(
     aggregate: Aggregate, arguments: Sequence[str], suffix: str, taken: set[str]
 ) -> tuple[tuple[Condition, ...], Expression, tuple[Parameter, ...]]:
-    """Return the conditions, the number and the variables of an aggregate for some arguments, with names of their own."""
+    """Return the conditions, the number and the variables of an aggregate for some arguments, with unique names."""
     terms = dict(zip((p.name for p in aggregate.parameters), arguments, strict=True))
     variables = []
     for one in aggregate.variables:
@@ -88,7 +88,7 @@ def _solution(
 
 
 def _sought(variables: Sequence[Parameter], conditions: tuple[Condition, ...], negated: bool) -> Condition:
-    """Return that some individuals, or none, satisfy conditions."""
+    """Return the condition that some individuals, or none, satisfy conditions."""
     found: Condition | None = None
     for variable in reversed(variables):
         found = Witness(variable.name, variable.kind, conditions if found is None else (found,))

@@ -1,10 +1,11 @@
 """The effects of a behaviour that keep a sum or a count up to date.
 
-Soundness: a tuple of individuals adds to a total as long as it satisfies the aggregate's conditions. It can begin or
-cease to satisfy them, or add another number, only if an effect changes a symbol that these conditions or the number name. So every
-such tuple is among the *candidates* of an effect and such a name: it agrees with the effect in the arguments, and in the value
-before or after. A candidate's number is added if the conditions hold afterwards and not before (`confab.reasoner.afterwards`), and
-subtracted if they hold before and not afterwards. A tuple of several candidates is counted for the first one only.
+Soundness: a tuple of individuals adds to a total as long as it satisfies the aggregate's conditions. It can begin or cease to
+satisfy them, or add another number, only if an effect changes a symbol that these conditions or the number name. So every such
+tuple is a *candidate* of an effect and a symbol that the aggregate names: it agrees with the effect in the arguments, and in
+the value before or after the effect. A candidate's number is added if the conditions hold afterwards and not before
+(`confab.reasoner.afterwards`), and subtracted if they hold before and not afterwards. A tuple of several candidates is counted
+for the first one only.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ from confab.reasoner.symbols import (
 )
 
 MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, nested ones included, of a behaviour that keeps derived amounts: a second to bind for search."""
+"""Maximum number of conditions, including nested ones, of a behaviour that keeps derived amounts.
+
+Compiling them takes about a second.
+"""
 
 
 def kept(
@@ -128,7 +132,7 @@ class _Keeping:
         return replace(self.own, variables=variables, amounts=amounts, timing=self._timed(effects))
 
     def _timed(self, effects: Sequence[AmountEffect]) -> Timing | None:
-        """Return the behaviour's timing, in which the total changes when the facts change that determine it."""
+        """Return the timing of the behaviour: the total changes at the same time as the facts that determine it."""
         timing = self.own.timing
         if timing is None or not effects:
             return timing
@@ -142,7 +146,7 @@ class _Keeping:
         return replace(timing, effects=(*timing.effects, *((span, effect) for span in spans for effect in effects)))
 
     def _candidates(self) -> Iterator[_Candidate]:
-        """Yield the effects that may change the total, each with each symbol in the conditions or the number."""
+        """Yield all pairs of an effect that may change the total and a symbol in the conditions or the number of the aggregate."""
         for condition in (inner for c in self.conditions for inner in walk(c)):
             if isinstance(condition, ValueCondition):
                 for effect in (e for e in self.own.effects if e.situation == condition.situation):
@@ -160,7 +164,7 @@ class _Keeping:
                     yield self._candidate(effect, part.arguments, None, False)
 
     def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
-        """Return a candidate; of an effect on all of a class whose individuals a witness seeks, without what names them."""
+        """Return a candidate. For an effect on all of a class whose individuals a witness seeks, terms for these are left out."""
         effect = self.after.apart(effect)
         if effect.each is None:
             return _Candidate(effect, named, value, before)
@@ -174,7 +178,7 @@ class _Keeping:
         return _Candidate(replace(effect, each=None, when=()), named, value, before)
 
     def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:
-        """Return that a tuple is one of a candidate's."""
+        """Return the condition that a tuple belongs to a candidate."""
         effect = candidate.effect
         found: list[Formula] = []
         if effect.each is not None:

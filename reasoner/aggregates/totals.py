@@ -121,7 +121,7 @@ class _World:
     def solutions(
         self, conditions: Sequence[Condition], terms: dict[str, str], kinds: Mapping[str, str], names: Sequence[str]
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals for some terms with which conditions hold; variables that a value determines aren't enumerated."""
+        """Yield the individuals for some terms that make conditions true; variables that a value determines aren't enumerated."""
         if any(not self.holds(c, terms, kinds) for c in conditions if not mentions(c) - terms.keys()):
             return
         waiting = [c for c in conditions if mentions(c) - terms.keys()]

@@ -1,7 +1,7 @@
 """The graph's statements about bodies as tables: attributes, links, classes and indices by node.
 
 The vocabulary is that of ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``),
-another one the links; all further access is by lookup.
+another query the links; all further access is by lookup.
 """
 
 from __future__ import annotations
@@ -134,7 +134,10 @@ class BodyFacts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the numbers of a skill or perceiver: its user's numbers override its own, and adjustments override both."""
+        """Return the numbers of a skill or perceiver.
+
+        Numbers of the behaviour or situation type that uses it override its own numbers; adjustments override both.
+        """
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):
             settings |= self.all_numbers(node)
@@ -149,7 +152,7 @@ class BodyFacts:
         return self.links.get(node, {}).get(name, ())
 
     def ordered(self, nodes: Iterable[str]) -> list[str]:
-        """Return nodes ordered by index, those without one last, then by IRI."""
+        """Return nodes ordered by index and then by IRI; nodes without an index come last."""
         return sorted(nodes, key=lambda node: (self.indices.get(node, 10**9), node))
 
     def members(self, class_name: str) -> list[str]:

@@ -51,7 +51,7 @@ TIME_LIMIT = 60.0
 
 @dataclass(frozen=True)
 class InterfaceCall:
-    """The action that carries out a behaviour. Of each argument: the position among the behaviour's parameters, or a constant."""
+    """The action that carries out a behaviour. Each argument is a position among the behaviour's parameters, or a constant."""
 
     action: str
     arguments: Mapping[str, int | str]
@@ -79,7 +79,10 @@ class Reading:
 
 @dataclass(frozen=True)
 class Interface:
-    """The interface of a robot: calls by behaviour, meanings by status; `robot_names` has the names that differ from ours."""
+    """The interface of a robot: calls by behaviour, meanings by status.
+
+    `robot_names` has the individuals that the robot names differently.
+    """
 
     iri: str
     name: str

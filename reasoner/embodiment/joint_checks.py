@@ -80,7 +80,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _least_distance(feature: Feature, part: Part) -> float:
-    """Return the distance of a feature from the sphere around a part, a lower bound of that from the part."""
+    """Return the distance of a feature from the sphere around a part: a lower bound of its distance from the part."""
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
 
@@ -100,7 +100,10 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield places on furniture or links without a supporting surface, or inside a solid; near meshes and tilted solids none."""
+    """Yield places on furniture or links that have no supporting surface or are inside a solid.
+
+    Near meshes and tilted solids nothing is yielded.
+    """
     bodies = dict(_bodies(embodiment))
     grounds = {mechanism.name: mechanism for mechanism in embodiment.mechanisms}
     for place in embodiment.places.values():
@@ -137,7 +140,7 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
 
 
 def _without_flat_top(part: Part) -> bool:
-    """Return whether a solid has no horizontal top, or one that is not computed here."""
+    """Return whether a solid has no horizontal top, or a top that is not computed here."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 

@@ -9,7 +9,7 @@ from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that state a part's extent; a radius counts twice."""
+"""The attributes that state the extent of a part; a radius counts twice."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 

@@ -107,7 +107,7 @@ def _stand(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Stand:
 
 
 def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
-    """Return individuals with their shapes, their own or that of the nearest class with one."""
+    """Return individuals with their shapes: an individual's own shape, otherwise the shape of the nearest class that has one."""
     found = []
     for node in facts.ordered(facts.classes):
         if node in facts.supers or any(node in kinds for kinds in facts.classes.values()):
@@ -140,7 +140,7 @@ def _body(facts: BodyFacts, node: str, shape: str, names: Callable[[str], str]) 
 
 
 def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Filling]:
-    """Return the fillings: individuals that have beads by themselves or by their nearest class."""
+    """Return the fillings: individuals for which beads are stated, directly or for their nearest class."""
     found: dict[str, Filling] = {}
     for node in facts.ordered(facts.classes):
         kinds = [kind for kind in facts.nearest_first(node) if "serving_beads" in facts.attributes.get(kind, {})]

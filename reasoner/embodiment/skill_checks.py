@@ -15,7 +15,7 @@ JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
 """Numbers of a joint that an expression may name."""
 
 WITHOUT_ROLE = {"hand", "supports"}
-"""Words that may take the place of a role and need no term."""
+"""Words that may stand in place of a role and need no term."""
 
 
 def roles_of(use: SkillUse) -> set[str]:

@@ -66,7 +66,7 @@ def skill_uses(facts: BodyFacts, names: Callable[[str], str], store: ox.Store) -
 
 
 def _links(facts: BodyFacts, terms: Sequence[str], names: Callable[[str], str]) -> dict[str, tuple[str, ...]]:
-    """Return for each role the links that can take the place of its terms."""
+    """Return for each role the links that its terms can denote."""
     found = {}
     links = facts.ordered(node for node, linked in facts.links.items() if "part_of" in linked)
     for term in terms:

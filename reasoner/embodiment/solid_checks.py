@@ -1,7 +1,7 @@
-"""Rules of validation on solids that would be in one place: joints swept through their range, and objects at first.
+"""Rules of validation on overlapping solids: joints swept through their range, and objects in the initial state.
 
-Mechanisms are checked where each joint gets from `lower` to `upper`, against their own case, their neighbours and all furniture. A
-neighbour that moves may be shut or wide open: only what neither lets pass is a fault.
+Each joint of a mechanism is swept from `lower` to `upper`, and checked against its own case, its neighbours and all furniture.
+A neighbour that moves may be shut or wide open; an overlap is a fault only if it occurs in both cases.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ JOINT = "perceive_joint"
 """The perceiver that distinguishes open from shut."""
 
 DEEP = 0.0015
-"""Metres by which two solids may overlap: they touch."""
+"""Maximum overlap in metres of two solids that count as touching."""
 
 SAMPLES = 33
-"""Number of joint values at which a link is looked at."""
+"""Number of joint values at which a link is checked."""
 
 Met = tuple[float, float, Block, Block]
-"""How deep two solids overlap, the joint value, and the two."""
+"""The depth of an overlap, the joint value, and the two solids."""
 
 
 def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
@@ -48,7 +48,7 @@ def _base_inside(mechanism: Mechanism, around: Sequence[Block]) -> Iterator[Flaw
 
 
 def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield for each thing that a link passes through the deepest overlap."""
+    """Yield the deepest overlap with each object that a link passes through."""
     taken = _taken_along(mechanism, link)
     values = np.linspace(link.lower, link.upper, SAMPLES) if link.kind != "fixed" else np.zeros(1)
     met: list[Met] = []
@@ -77,7 +77,7 @@ def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterato
 
 
 def _still(mechanism: Mechanism, shut: Sequence[Block], link: Link, opened: Mapping[str, float]) -> Iterator[Block]:
-    """Yield the solids of a mechanism that move with no joint but that of a link's parents."""
+    """Yield the solids of a mechanism that move with no other joint than those of a link's parents."""
     taken = _taken_along(mechanism, link)
     return (block for block in shut if block.owner not in taken and block.owner not in opened)
 
@@ -107,7 +107,7 @@ def _meeting(ones: Sequence[Block], others: Sequence[Block], value: float) -> It
 
 
 def _deepest(met: Iterator[Met] | Sequence[Met]) -> list[Met]:
-    """Return for each two owners the deepest overlap of their solids."""
+    """Return the deepest overlap of the solids of each pair of owners."""
     found: dict[tuple[str, str], Met] = {}
     for one in met:
         key = one[2].owner, one[3].owner

@@ -1,4 +1,4 @@
-"""Solids of furniture, mechanisms and objects: where they are for given joint values, and how deep two of them overlap.
+"""Solids of furniture, mechanisms and objects: their positions for given joint values, and the depth of an overlap.
 
 Lengths in metres, angles in radians. Meshes, and mechanisms with a URDF file of their own, have no solids here.
 """
@@ -65,7 +65,7 @@ class Block:
         return turned
 
     def directions(self) -> Array:
-        """Return the normals (n, 3) of the surface that are tried first."""
+        """Return the normals (n, 3) of the surface, which are the first directions of separation."""
         if self.kind != "cylinder":
             normals: Array = self.rotation.T
             return normals
@@ -75,7 +75,7 @@ class Block:
 
 
 def overlap(one: Block, other: Block) -> float:
-    """Return by how far one of two solids has to be moved to part them, in metres; a gap counts as negative."""
+    """Return the distance in metres by which one of two solids has to be moved to separate them; a gap is negative."""
     apart = other.center - one.center
     if not apart.any():
         apart = np.array([1e-9, 0.0, 0.0])
@@ -176,9 +176,9 @@ def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
 def place_frame(
     embodiment: Embodiment, name: str, where: Mapping[str, str], values: Mapping[str, float]
 ) -> Frame | None:
-    """Return a place's frame in the world, with objects at the places `where` and joints at `values`; None if it is unknown.
+    """Return the frame of a place in the world, with objects at the places `where` and joints at `values`.
 
-    A carrier that is an object stands at a place itself.
+    None if the frame is unknown. A carrier that is an object stands at a place itself.
     """
     passed: list[str] = []
     shift = np.zeros(3)

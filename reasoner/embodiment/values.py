@@ -14,7 +14,7 @@ from typing import TypeAlias
 Vector: TypeAlias = tuple[float, float, float]
 Color: TypeAlias = tuple[float, float, float, float]
 Flaw: TypeAlias = tuple[str, str, str, str]
-"""A finding of validation: IRI or short name of the node, what is wrong, why it matters, remedy."""
+"""A finding of validation: IRI or short name of the node, the fault, its effect, and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,9 @@ class Filling:
 
 @dataclass(frozen=True)
 class Guard:
-    """A bound on a measured quantity, ``force >= 30``, that ends a motion or must hold after it, else the skill fails with `code`.
+    """A bound on a measured quantity, ``force >= 30``, that ends a motion or must hold after it.
+
+    If it doesn't hold, the skill fails with `code`.
 
     `sign` is 1 for ``>=`` and -1 for ``<=``; the bound is an expression (see `Phase`).
     """
@@ -228,11 +230,10 @@ class Guard:
 class Phase:
     """One motion of a skill, relative to a feature of a thing.
 
-    `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
-    key of `confab.sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or for the
-    point that
-    `bring` names. `offset` is a shift from the goal in the hand's frame, `above` a shift upwards. `offset`, `above`, `value`,
-    `speed` and `wait` are expressions: sums of numbers and settings, ``raised-slip``.
+    `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or
+    another key of `confab.sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or
+    for the point that `bring` names. `offset` is a shift from the goal in the hand's frame, `above` a shift upwards. `offset`,
+    `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, for example ``raised-slip``.
 
     `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles or features that the hand may touch. The motion
     ends early when one of the guards in `until` holds; after it all `checks` must hold. A phase is executed only if all conditions

@@ -16,7 +16,8 @@ from confab.reasoner.vocabulary import OWL, RDF
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
     """Write the triples of a CONSTRUCT query into a Turtle file and return their number.
 
-    The file is an ontology named after it, beside the scene's IRI, and imports the scene, so that it can be planned in.
+    The file is an ontology that imports the scene, so that it can be planned in. Its IRI has the name of the file in place of
+    the scene's name.
 
     Raises
     ------

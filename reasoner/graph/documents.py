@@ -1,7 +1,8 @@
 """Documents as a parser receives them: RDF/XML without the parts of a DTD that read other files or grow.
 
-expat, which is made for XML, reads the document type. It is then replaced by one with plain entities only, which Protégé 4 uses to
-abbreviate namespaces. The RDF parser sees no other prolog, whatever comments, instructions and declarations the file has.
+The XML parser expat reads the document type, which is then replaced by a document type with plain entities only. (Protégé 4
+uses plain entities to abbreviate namespaces.) The RDF parser sees no other comments, instructions and declarations before the
+first element.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
     Raises
     ------
     DocumentError
-        Another kind of file, and the suffix to save it with; invalid XML; entities that read other files, or grow.
+        The file is of another kind (the message names the suffix for it), is invalid XML, or has entities that read other files
+        or grow.
     OSError
         The file can't be read.
     """
@@ -90,8 +92,8 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
 def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFormat]:
     """Return a document, and its format, that a parser reads in time and memory proportional to its size.
 
-    Deep nesting is refused in every format. JSON-LD, in which each level may repeat its context, is parsed in a process of its own
-    and returned as TriG.
+    Deep nesting is refused in every format. JSON-LD, in which each level may repeat its context, is parsed in a separate
+    process and returned as TriG.
 
     Raises
     ------
@@ -140,7 +142,7 @@ def as_trig(content: bytes, media_type: str, base: str) -> bytes:
 
 
 def plain_xml(content: bytes) -> bytes:
-    """Return an XML document with a new prolog; one without a document type unchanged.
+    """Return an XML document with a new prolog; a document without a document type is unchanged.
 
     >>> plain_xml(b'<!--<a>--><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
     b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'

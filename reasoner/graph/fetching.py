@@ -1,4 +1,4 @@
-"""Fetching an ontology from the web, only on request: it becomes a file, and the catalog names it.
+"""Fetching an ontology from the web, on request only. The ontology becomes a file that the catalog names.
 
 Loading stays offline. A document is checked before it is kept: plain RDF of a bounded size, without entities that read other files
 or grow, without imports by file path, and an ontology with the requested IRI.
@@ -61,7 +61,7 @@ def fetch(url: str, folder: Path) -> Fetched:
     url : str
         ``http`` or ``https``; also the IRI, or version IRI, of the ontology.
     folder : Path
-        Where the importing ontology lies.
+        The folder of the importing ontology.
 
     Raises
     ------

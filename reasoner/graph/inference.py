@@ -1,8 +1,8 @@
 """OWL 2 RL inference: conclusions from the ontology are written to the graph `inferred` before planning.
 
-Only static facts are concluded. Facts of situation types are left out, since behaviours change them; they count merely as
-proof that their subject and object have the domain and range of the property. A class that is defined by situations is
-compiled into conditions instead, see `confab.reasoner.reading.definitions`.
+Only static facts are concluded. Facts of situation types are left out, since behaviours change them; they only show that their
+subject and object belong to the domain and the range of the property. A class that is defined by situations is compiled into
+conditions instead, see `confab.reasoner.reading.definitions`.
 
 The reasoner runs only if the ontology has axioms with consequences beyond subclasses, which the reader follows by itself:
 `needed` tests this. docs/inference.md lists the limits of RL.
@@ -22,7 +22,7 @@ from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
 GIVEN = ("asserted", "reach")
 WORLD = {CORE + name for name in ("Object", "Robot", "Hand")}
-"""The core's classes of things; its other classes describe behaviours, which are exempt from inference."""
+"""The core's classes of physical things; its other classes describe behaviours, which are exempt from inference."""
 
 NEEDED = """
 ASK {
@@ -112,7 +112,7 @@ def _of_behaviors(iri: str) -> bool:
 
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
-    """Yield the closure of some triples, as far as it consists of IRIs."""
+    """Yield the triples of IRIs in the closure of some triples."""
     import tempfile
 
     import reasonable

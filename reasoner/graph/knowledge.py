@@ -1,8 +1,8 @@
 """The knowledge graph: ontology files with all their imports, in one SPARQL store.
 
-Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read and never written here. Nothing is
-fetched from the network (`confab.reasoner.graph.fetching` does that on request): an import is looked up in the catalog beside the
-file, then in the shipped one.
+Each kind of triples has its own named graph (`GRAPHS`); a query sees their union. Files are read and never written here.
+Nothing is fetched from the network (`confab.reasoner.graph.fetching` does that on request): an import is looked up in the
+catalog beside the file, then in the shipped one.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 DERIVED = "derived"
 """Graph of the facts that follow from definitions in the initial state. For queries only; planning derives them in each state."""
 SCENE = ("asserted", "inferred", "reach")
-"""Graphs that a planning call begins with."""
+"""Graphs that a planning call reads."""
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
 """Marks of triples about triples in a file, in one of the three notations."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
@@ -55,7 +55,7 @@ class Remote(Protocol):
         """Return the result of a query; with `confirm`, the query is recorded and repeated later."""
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if a recorded query has another answer now."""
+        """Raise `KnowledgeError` if the answer of a recorded query has changed."""
 
 
 class KnowledgeError(ValueError):
@@ -93,7 +93,7 @@ class KnowledgeGraph:
     faults : list of str
         The reason why the scene can be queried but not planned in, if it was loaded in spite of faults.
     written : mapping of individual to place
-        Where in the SPARQL update of a behaviour an individual stands that was made from it.
+        The position in a SPARQL update of each individual that was made from the update.
     remote : Remote, optional
         The store that answers instead of `store`; it is only read.
     round_trips : int
@@ -131,7 +131,7 @@ class KnowledgeGraph:
             raise KnowledgeError(self.faults[0])
 
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
-        """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
+        """Return the rows of a SELECT query on the union of some graphs; `bindings` replaces selected variables by IRIs.
 
         Raises
         ------
@@ -146,7 +146,7 @@ class KnowledgeGraph:
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
-        """Return the rows of `select` one after the other, for callers that read very many; same errors."""
+        """Yield the rows of `select` one by one, for callers that read many rows. Errors are the same."""
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError(NO_ROWS)
@@ -202,7 +202,10 @@ class KnowledgeGraph:
 
     @property
     def folders(self) -> list[Path]:
-        """Folders in which other files of the ontologies are looked for: the shipped ones, and that of each file read."""
+        """Folders in which other files of the ontologies are sought.
+
+        The shipped folders, and the folder of each file that was read.
+        """
         own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
@@ -218,14 +221,14 @@ def load(
     Parameters
     ----------
     source : str, Path or sequence of them
-        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads. Of several, the scene is the
-        first that no other imports; all of them are read.
+        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads. If there are several, all
+        are read, and the scene is the first one that no other imports.
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
     tolerant : bool
-        Load any file of RDF, and note in `faults` what keeps it from being a scene: imports that aren't found, no ontology.
+        Load any RDF file, and record in `faults` why it is no scene: imports that aren't found, or a missing ontology.
     faults : list of Fault, optional
-        Receives the faults of behaviours that are written as updates; without it, they are errors.
+        Receives the faults of behaviours that are written as updates; without this list, such faults are errors.
 
     Raises
     ------
@@ -247,7 +250,7 @@ def load(
 
 
 def write_out(graph: KnowledgeGraph) -> list[Fault]:
-    """Add the individuals of behaviours and rules that are written in SPARQL; return the texts that can't be read."""
+    """Add the individuals that behaviours and rules written in SPARQL stand for; return the SPARQL texts that can't be parsed."""
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends", "construct")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []

@@ -16,7 +16,7 @@ from confab.reasoner.validation.hermit import world_of
 
 
 class Mirror:
-    """An owlready2 world and the statements of it that the graph knows.
+    """An owlready2 world, and those of its statements that the graph contains.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Queries of users, answered in a process of their own, so that their costs and failures don't affect this one.
+"""Users' queries, answered in a separate process, so that their costs and failures don't affect this process.
 
 A query can produce more rows than memory holds, and a deeply nested one crashes the SPARQL parser. The planner's own queries go to
 the store directly.
@@ -43,7 +43,7 @@ TEXTS = re.compile(
 WORDS = re.compile(
     rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
 )
-"""Texts, which contain no names, and prefixed names."""
+"""A text, in which names don't count, or a prefixed name."""
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
 """Maximum number of suggestions."""
@@ -54,7 +54,7 @@ FROM = re.compile(
     r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
     re.DOTALL | re.IGNORECASE,
 )
-"""Texts, which contain no clauses, and clauses that name a graph of the query's dataset."""
+"""A text, in which clauses don't count, or a clause that names a graph of the query's dataset."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
@@ -79,9 +79,9 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
     Raises
     ------
     KnowledgeError
-        It isn't SPARQL 1.1, queries another endpoint without permission, or is nested too deeply.
+        The query isn't SPARQL 1.1, asks another endpoint without permission, or is nested too deeply.
     LimitError
-        It takes more time or memory, or gives more rows, than the limits allow.
+        The query takes more time or memory, or has more rows, than the limits allow.
     """
     limits = limits or QueryLimits()
     if graph.remote:
@@ -106,10 +106,10 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 
 
 class QueryWorker:
-    """A process that answers queries about a graph in the state in which the process started, one after another.
+    """A process that answers queries, one after another, about a graph as it was when the process started.
 
-    It starts with the first query and ends with the ``with`` block or with this process, even if that is killed. A query that is
-    interrupted or exceeds its limits ends alone.
+    It starts with the first query. It ends with the ``with`` block or with this process, even if this process is killed. An
+    interrupted query, or one that exceeds its limits, doesn't end the process.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class QueryWorker:
     limits : QueryLimits
         Limits of each query.
     nice : int
-        How far it gives way to other processes, as of ``nice``.
+        The niceness of the process.
     """
 
     def __init__(self, graph: KnowledgeGraph, limits: QueryLimits, nice: int = 0) -> None:
@@ -145,7 +145,7 @@ class QueryWorker:
             self.ask("ASK {}")
 
     def interrupt(self) -> None:
-        """End the query of another thread, whose `ask` raises `LimitError`; does nothing while the process starts."""
+        """End the running query of another thread, whose `ask` raises `LimitError`; do nothing while the process starts."""
         if self._sending.acquire(blocking=False):
             self._send(None)
             self._sending.release()
@@ -153,7 +153,7 @@ class QueryWorker:
     def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
         """Return the answer to a query on a dataset; by default the query's own (``FROM``), or the union of all graphs.
 
-        Errors are those of the function `ask`; a graph that doesn't exist is one, too.
+        Errors are those of the function `ask`; a missing graph is also an error.
         """
         self.graph.round_trips += 1
         dataset = _existing(self.graph, dataset or clauses(self.graph, query) or (UNION, None))
@@ -301,7 +301,7 @@ def unknown_prefixes(graph: KnowledgeGraph, query: str) -> list[str]:
 
 
 def core_names(graph: KnowledgeGraph, query: str) -> str:
-    """Return a query in which ``:Behavior`` means the core's where the scene's own ``:`` has no such name."""
+    """Return a query in which ``:Behavior`` denotes the core's class if the scene's own ``:`` namespace has no such name."""
     own = graph.spoken.get("", CORE)
     if own == CORE or "" in DECLARED.findall(query):
         return query
@@ -317,7 +317,7 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
 
 
 def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the prefixed names in a query that the graph doesn't contain, each with a place of such a name."""
+    """Return the prefixed names in a query that the graph doesn't contain, each with its first position."""
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
     found = []
     for match in WORDS.finditer(core_names(graph, query)):
@@ -339,7 +339,7 @@ def _speaks_of(graph: KnowledgeGraph, iri: str) -> bool:
 
 
 def standing_alone(graph: KnowledgeGraph, query: str) -> str:
-    """Return one of our queries with PREFIX lines for its prefixes, so that any endpoint understands it."""
+    """Return one of our queries with PREFIX lines for its prefixes, for endpoints that don't know them."""
     used = {m["prefix"] or "" for m in WORDS.finditer(query) if m["text"] is None and "?" not in m[0]}
     lines = [f"PREFIX {prefix}: <{graph.prefixes[prefix]}>" for prefix in sorted(used) if prefix in graph.prefixes]
     return "\n".join([*lines, query])

@@ -1,7 +1,7 @@
 """The process that answers queries for `confab.reasoner.graph.query_process`. It imports nothing else of this project.
 
-It keeps a graph and forks for each query. The fork limits its own memory, time and files (hence connections, too) and ends with
-its answer; the next message, or the end of the parent process, ends it early.
+The process keeps a graph and forks for each query. The fork limits its own memory, time and files (and thereby connections),
+and ends after its answer. The next message, or the end of the parent process, ends the fork early.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def received() -> Any:
-    """Return the next message; end with the asking process."""
+    """Return the next message; end this process if the parent process has ended."""
     size = int.from_bytes(read(8), "big")
     return pickle.loads(read(size))
 

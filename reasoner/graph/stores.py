@@ -1,7 +1,7 @@
-"""Stores of a scene's triples besides memory: Oxigraph on disk, and any SPARQL 1.1 endpoint.
+"""Stores of a scene's triples outside of memory: Oxigraph on disk, and any SPARQL 1.1 endpoint.
 
-On disk, the files are loaded once, and again after one of them has changed. An endpoint is only read, by few and large queries. It
-offers either one default graph with everything in it, or a named graph per ontology, named by its IRI.
+Files are loaded into a store on disk once, and again after one of them has changed. An endpoint is only read, by few large
+queries. It has either one default graph with all triples, or a named graph for each ontology, named by the ontology's IRI.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Endpoint:
     timeout : float
         Seconds to wait for an answer.
     retries : int
-        Number of retries after a lost connection or a busy server, each after twice the pause.
+        Number of retries after a lost connection or a busy server; the pause before each retry doubles.
     graphs : tuple of str
         IRIs of the named graphs whose union is queried; the endpoint's default graph if empty.
 
@@ -130,8 +130,8 @@ class Endpoint:
         Raises
         ------
         KnowledgeError
-            No response, or too slow or too large; authentication is required; it is no endpoint; the query isn't
-            SPARQL.
+            There is no response, or it is too slow or too large; authentication is required; the URL is no endpoint; the query
+            isn't SPARQL.
         """
         form = FORM.search(PROLOGUE.sub(" ", query))
         rows = form is None or form.group().upper() in ("SELECT", "ASK")
@@ -158,12 +158,12 @@ class Endpoint:
         return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
 
     def confirm(self) -> None:
-        """Repeat all recorded queries, so that no two versions of the data get into one plan.
+        """Repeat all recorded queries, so that one plan is never made from two versions of the data.
 
         Raises
         ------
         KnowledgeError
-            Something is answered otherwise now; or as `query`.
+            An answer has changed; and the errors of `query`.
         """
         for (body, accept), digest in self.noted.items():
             if _digest(self._post(body, accept)[0]) != digest:
@@ -272,7 +272,7 @@ def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
 
 
 def _complete(query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> str:
-    """Return a self-contained query: with its prefixes before it and its bindings behind it."""
+    """Return a self-contained query: its prefixes precede it, and its bindings follow it."""
     head = "\n".join(f"PREFIX {prefix}: {ox.NamedNode(namespace)}" for prefix, namespace in prefixes.items())
     values = f"\nVALUES ({' '.join(f'?{name}' for name in bindings)}) {{ ({_iris(bindings)}) }}" if bindings else ""
     return f"{head}\n{query}{values}"
@@ -303,7 +303,7 @@ def _short(error: object) -> str:
 
 
 def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
-    """Load a scene into an Oxigraph store on disk, or find it there as it was loaded, if no file of it has changed.
+    """Load a scene into an Oxigraph store on disk, unless the store has it and no file has changed.
 
     Parameters
     ----------

@@ -9,10 +9,11 @@ Tally       numbers of times that an item was chosen and worked, was passed over
 Experience  the learned items, with tallies by replica and epoch: grow-only, so that memories merge
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content: equal items of two replicas have equal names, and
-merging them is a union. The tallies of an item are kept by lifted facts (`Fact`): the empty fact counts the item itself, others
-count what held of the individuals in its roles. Epoch 0 has the tallies that never age. The later epochs, one for each episode of a
-replica, have preferences between individuals (this hand, not that one), whose weight decays with the number of later episodes.
+Rules, orders, methods and kinds of goals are named by a hash of their content: equal items of two replicas have equal names,
+and merging them is a union. The tallies of an item are kept by lifted facts (`Fact`): the empty fact counts the item itself;
+other facts count situations of the individuals in its roles. Epoch 0 has the tallies that never age. The later epochs, one for
+each episode of a replica, have preferences between individuals (this hand, not that one), whose weight decays with the number
+of later episodes.
 """
 
 from __future__ import annotations
@@ -107,8 +108,9 @@ class Order:
 class OpenRole:
     """A role of a method that is no parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that it filled. `source` is the symbol whose value it is at its first use: situation type
-    and positions of the arguments. `becomes` is the situation type whose value it becomes, so that a free individual is preferred.
+    `kind` is the class of the parameter that it filled. `source` is the symbol whose value it is at its first use: situation
+    type and positions of the arguments. `becomes` is the situation type whose value the individual becomes; a free individual
+    is preferred.
     """
 
     kind: str
@@ -149,7 +151,7 @@ Said: TypeAlias = "Rule | Order | Method | GoalKind"
 
 @dataclass(frozen=True)
 class Tally:
-    """Numbers of times that a candidate was chosen and worked, was passed over for another one, and was chosen but failed."""
+    """Numbers of times that a candidate was chosen and succeeded, was passed over, and was chosen but failed."""
 
     chosen: int = 0
     passed_over: int = 0
@@ -192,7 +194,7 @@ class Experience:
     Parameters
     ----------
     replica : str
-        ID of the replica that counts here, unique to one writer.
+        ID of the replica that counts in this memory, unique to one writer.
     episodes : mapping of replica to number
         Number of episodes of each replica.
     said : mapping of name to rule, order, method or kind of goal

@@ -1,10 +1,9 @@
 """Experience on disk and in stores: rules and methods as triples, counts as annotated axioms, in Turtle that Protégé opens.
 
 `confab.reasoner.memory.rules_file` writes each learned item once. There is a counter for each replica, epoch and item
-(`:countsFor`),
-which is `:associatedWith` the item itself and the lifted facts that held. An ``owl:Axiom`` on each of these links has `:chosen`,
-`:passedOver`, `:failed` and the resulting `:probability`. Writers never share a counter, and all else is named by its content, so
-the union of two files is a file of both memories. An edited rule keeps its counts.
+(`:countsFor`), which is `:associatedWith` the item itself and the lifted facts that held. An ``owl:Axiom`` on each of these
+links has `:chosen`, `:passedOver`, `:failed` and the resulting `:probability`. Writers never share a counter, and all other
+items are named by their content. So the union of two files is a file of both memories. An edited rule keeps its counts.
 
 Each link is written on one line, and such lines are read by a regular expression. Files in another layout, such as Protégé's, are
 read by the Turtle parser.
@@ -55,11 +54,11 @@ COUNTS = re.compile(
     r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
     re.MULTILINE,
 )
-"""Lines of lifted facts and of counts, which make up most of a file. The Turtle parser reads the rest, in any layout."""
+"""Lines of lifted facts and of counts, which make up most of a file. The Turtle parser reads all other lines, in any layout."""
 
 
 PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+)", re.MULTILINE)
-"""Lines of the paper's links, which only the paper's mode reads and which can be nearly all of a file."""
+"""Lines of the paper's links. Only the paper's mode reads them, and they can make up nearly all of a file."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class Lines:
 
 
 def no_such_file(path: Path) -> KnowledgeError:
-    """Return the error for a memory file that isn't there."""
+    """Return the error for a missing memory file."""
     several = "; several goals are a list: goals=[…, …]" if str(path).count(" ") > 1 else ""
     return KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one{several}")
 
@@ -106,7 +105,7 @@ def new_replica() -> str:
 
 
 def probability(tally: Tally) -> float:
-    """Return the probability that a candidate is chosen and works, with half a choice and half a pass as prior.
+    """Return the probability that a candidate is chosen and succeeds, with half a choice and half a pass as prior.
 
     >>> probability(Tally(chosen=3, passed_over=0))
     0.875

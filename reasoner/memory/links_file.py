@@ -42,7 +42,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     ----------
     path : Path
     names : Names
-        The scene's names; terms unknown to the scene keep the last part of their IRIs.
+        The scene's names; a term that the scene doesn't contain is named by the last part of its IRI.
     found : Lines, optional
         The result of `memory_lines` for the file, if it has been read before.
 

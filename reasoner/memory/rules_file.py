@@ -112,7 +112,7 @@ class RuleWriter:
 
 
 class _RuleNodes(NodeWriter):
-    """Writes the conditions of a rule, each named after the rule and its place."""
+    """Writes the conditions of a rule; the name of each consists of the rule's name and its position."""
 
     def __init__(self, me: str, spelled: Callable[[str], str], terms: Mapping[str, str]) -> None:
         def variable(name: str, node: str, position: int) -> str:
@@ -130,7 +130,7 @@ class _RuleNodes(NodeWriter):
 
 
 class RuleReader(NodeReader):
-    """Reads learned items from the triples of a file. Properties of the core are without its namespace in `nodes`."""
+    """Reads learned items from the triples of a file. In `nodes`, properties of the core have no namespace."""
 
     def __init__(self, nodes: Mapping[str, Node], names: Names | None) -> None:
         self.nodes, self.names = nodes, names
@@ -160,7 +160,7 @@ class RuleReader(NodeReader):
         return iri.rsplit("#", 1)[-1].rsplit("/", 1)[-1]
 
     def said(self, iri: str) -> Said | None:
-        """Return the learned item of a node, or None if the node is none; raise `ValueError` if a part is missing."""
+        """Return the learned item of a node, or None if the node isn't a learned item; raise `ValueError` if a part is missing."""
         node = self.nodes[iri]
         kinds = [kind.removeprefix(CORE) for kind in node.get(RDF + "type", ())]
         if "LearnedRule" in kinds:

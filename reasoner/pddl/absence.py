@@ -1,4 +1,4 @@
-"""Predicates of an export for "no individual has this value": one predicate "free" per value, or one contrary per object."""
+"""Predicates of an export for "no individual has this value": a predicate "free" for each value, or a contrary for each object."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Kept:
         return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
 
     def asked(self, kind: str, situation: str) -> frozenset[str]:
-        """Return the values that conditions of the form "no individual of the class has it" mention."""
+        """Return the values in conditions of the form "no individual of the class has the value"."""
         found = frozenset[str]()
         for behavior in self.behaviors:
             for absent in map(self.absent, behavior.preconditions):
@@ -57,7 +57,7 @@ class Kept:
         return found
 
     def exclusive(self, kind: str, situation: str) -> bool:
-        """Return whether no two individuals of a class can get the same of the mentioned values."""
+        """Return whether each of the mentioned values can be held by at most one individual of a class."""
         asked, its = self.asked(kind, situation), self.problem.members(kind)
         held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
         held = [value for value in held if value in asked]
@@ -77,13 +77,13 @@ class Kept:
         return True
 
     def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
-        """Return "a symbol doesn't have a value" as an atom of a predicate of its own."""
+        """Return "a symbol doesn't have a value" as an atom of a separate predicate."""
         words = self.words
         name = words.name("predicate", f"not {situation}", f"not_{situation}")
         return words.atom(name, (*words.about(situation, terms), value))
 
     def none_has(self, kind: str, situation: str, value: Term) -> Atom:
-        """Return "no individual of a class has a value" as an atom of a predicate of its own."""
+        """Return "no individual of a class has a value" as an atom of a separate predicate."""
         name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
         return self.words.atom(name, (value,))
 

@@ -1,4 +1,4 @@
-"""What a domain and a problem of PDDL declare, as values."""
+"""The declarations of a domain and a problem of PDDL, as values."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Typed:
 class Action:
     """An action as parsed; `precondition` and `effect` are forms whose words have been checked.
 
-    Those of a durative action are its conditions and effects as a whole (`confab.reasoner.pddl.durative`); `durative` has the
-    parts.
+    For a durative action they are the conditions and effects of the action as a whole (`confab.reasoner.pddl.durative`);
+    `durative` has its parts.
     """
 
     name: str

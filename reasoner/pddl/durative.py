@@ -1,7 +1,7 @@
 """Durative actions of PDDL 2.1: their parts at the start, over all and at the end, and the action as a whole.
 
-As a whole, a condition that an effect at the start achieves isn't required, and an effect at the start that the end deletes is
-hidden: this is the action if no other one overlaps it.
+The action as a whole is the action that no other one overlaps: it doesn't require a condition that its own effect at the start
+achieves, and it hides an effect at the start that its end deletes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Durative:
 
 
 class NotTimedError(ValueError):
-    """A part of a durative action has no time, or one that isn't supported; `at` is where it stands."""
+    """A part of a durative action has no time, or an unsupported time; `at` is its position."""
 
     def __init__(self, at: Word | Form, text: str) -> None:
         super().__init__(text)
@@ -33,7 +33,7 @@ class NotTimedError(ValueError):
 
 
 def duration_in(form: Form) -> Word | Form:
-    """Return a duration as a number or an expression; where only bounds are given, the least one."""
+    """Return a duration as a number or an expression; if only bounds are given, return the lower bound."""
     if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
         return duration_in(form.items[2])
     bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]
@@ -53,7 +53,7 @@ def duration_in(form: Form) -> Word | Form:
 
 
 def timed(form: Form | None, what: str, duration: Word | Form) -> Iterator[tuple[str, Form]]:
-    """Yield the conditions or effects of a durative action, each with its span; in them, the duration in place of its name."""
+    """Yield the conditions or effects of a durative action, each with its span; the duration replaces its variable."""
     if form is None or not form.items:
         return
     words = tuple(item.text for item in form.items[:2] if isinstance(item, Word))
@@ -130,7 +130,7 @@ def _text(form: Word | Form) -> str:
 
 
 def _put(form: Form, duration: Word | Form) -> Form:
-    """Return a form with the duration in place of its name."""
+    """Return a form in which the duration replaces its variable."""
     return replace(
         form,
         items=tuple(

@@ -1,8 +1,8 @@
 """Export of one level of a scene to PDDL, as close to STRIPS as possible, for planners that support little more.
 
-A class becomes a type, or a unary predicate if it overlaps others. An individual becomes an object, also where it is a value. A
-situation type becomes a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering` describes
-the rest.
+A class becomes a type, or a unary predicate if it overlaps others. An individual becomes an object, even if it is only a value.
+A situation type becomes a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering`
+describes the rest.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ def to_pddl(
     Raises
     ------
     KnowledgeError
-        Some behaviour has a value that others require and that holds only during it: actions without time can't express it.
+        A behaviour gives a symbol a value that others require and that holds only for its duration. Actions without time can't
+        express this.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(
@@ -87,7 +88,7 @@ def to_pddl(
 
 
 def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Read a plan in the format of the planning competitions: one ``(action object …)`` a line, ``;`` for comments.
+    """Read a plan in the format of the planning competitions: one ``(action object …)`` per line, and comments after ``;``.
 
     Returns
     -------

@@ -19,7 +19,7 @@ MOST_CONJUNCTS = 10_000
 
 @dataclass(frozen=True)
 class Effect:
-    """An atom made true or false, where its condition holds."""
+    """An atom that becomes true or false if a condition holds."""
 
     atom: Atom
     true: bool
@@ -29,7 +29,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class NumericEffect:
-    """A function changed by `head` (of `CHANGES`) if its condition holds."""
+    """A function that changes by the operation `head` (a key of `CHANGES`) if a condition holds."""
 
     head: str
     function: Form
@@ -86,9 +86,9 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
 
 
 def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[[Atom], bool | None]) -> Iterator[Form]:
-    """Yield the conjuncts of a formula.
+    """Yield the conjuncts of a formula. A universal conjunct becomes one conjunct for each object.
 
-    A universal one becomes one for each object, and conjuncts that always hold are left out.
+    Conjuncts that always hold are left out.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
         Without free variables.
     objects : function of a type
     holds : function of an atom
-        Whether it holds, or None where that may change.
+        Whether the atom holds; None if its truth may change.
     """
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head == "and":
@@ -118,7 +118,7 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
 
 
 def _with(form: Form, terms: Mapping[str, str]) -> Form:
-    """Return a form with terms in the places of its free variables."""
+    """Return a form in which terms replace free variables."""
     if form.head in ("exists", "forall"):
         assert isinstance(form.items[1], Form)
         own = {one.name for one in typed_in(form.items[1])}

@@ -14,7 +14,7 @@ from typing import TypeAlias
 from confab.reasoner.amounts import written
 
 DIGITS = 30
-"""Number of decimal places of an infinite decimal fraction where no quotient can be written."""
+"""Number of decimal places of an infinite decimal fraction if a quotient can't be written."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class ConditionalEffect:
-    """An effect: an atom becomes true or false, or a number changes, for all bindings of a formula that held before."""
+    """An effect: an atom becomes true or false, or a number changes, for all bindings for which a formula held before."""
 
     what: Atom | Not | Assignment
     when: Formula = TRUE
@@ -207,7 +207,7 @@ def calls(number: Number) -> Iterator[FunctionTerm]:
 
 
 def terms(formula: Formula) -> Iterator[Term]:
-    """Yield the terms in a formula, its own variables among them."""
+    """Yield the terms in a formula, including its quantified variables."""
     for one in inside(formula):
         match one:
             case Atom(_, its):

@@ -16,10 +16,9 @@ any other function              situation type whose values are amounts, unless 
 goal that is no fact            precondition of the behaviour ``REACH_GOAL``, whose effect is a goal
 ==============================  ================================================================
 
-Which predicates exclude one another is found by invariant synthesis: an action that adds one of them for an object
-deletes another, which held, for the same object; and initially at most one holds. Helmert, "Concise finite-domain
-representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for
-inequalities.
+Invariant synthesis finds predicates that exclude one another: initially at most one of them holds for an object, and an action
+that adds one of them deletes another one, which held for the same object. Helmert, "Concise finite-domain representations for
+PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
 """
 
 from __future__ import annotations
@@ -84,7 +83,7 @@ BASE = "https://w3id.org/confab/pddl/"
 
 @dataclass(frozen=True)
 class Place:
-    """The translation of a predicate: a situation type with a value of its own, or with the value in one of the arguments."""
+    """The translation of a predicate: a situation type with a separate value, or with one of the arguments as its value."""
 
     situation: str
     part: Part | None = None
@@ -99,7 +98,7 @@ class Imported:
     said: Mapping[str, str]
 
     def line(self, behavior: str, arguments: Sequence[str]) -> str:
-        """Return a step as PDDL plans write it; an empty text for the step that only states that the goal is reached."""
+        """Return a step in the notation of PDDL plans; an empty text for the step that only states that the goal is reached."""
         action = self.said.get(behavior, behavior)
         return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
 
@@ -113,7 +112,7 @@ def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
     scene : str, optional
         Last part of the scene's IRI; the problem's name if not given.
     level : int
-        The level of the behaviours: more than 1 leaves room for abstract ones above them.
+        The level of the behaviours; a level above 1 leaves room for more abstract behaviours.
     """
     table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
@@ -321,9 +320,9 @@ class _Import:
         return found
 
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal, and the behaviour for those parts of it that are no facts.
+        """Return the goal, and the behaviour for the parts of the goal that aren't facts.
 
-        None if there are none, or they always hold.
+        None if there are no such parts, or they always hold.
         """
         found: dict[Symbol, str] = {}
         parts = list(conjuncts(self.pddl.goal))
@@ -350,9 +349,10 @@ class _Import:
         return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to the facts found, if it is a fact or a negated boolean one that agrees with the rest.
+        """Add a conjunct of the goal to the found facts, if it is a fact.
 
-        So is a function that changes compared with a number.
+        A negated boolean fact that agrees with the others, and a comparison of a changing function with a number, are facts,
+        too.
         """
         if part.head in COMPARISONS and part.items[1:] and isinstance(part.items[1], Form):
             function, limit = part.items[1:]
@@ -374,7 +374,7 @@ class _Import:
 
     @cached_property
     def signatures(self) -> dict[str, list[str]]:
-        """The types of each predicate's arguments: as declared, or wider if a variable of a wider type occurs there."""
+        """The types of each predicate's arguments: the declared type, or a wider one if a variable of a wider type occurs there."""
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
         parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
         parts += [(axiom.parameters, (axiom.condition, None)) for axiom in self.pddl.axioms]
@@ -424,7 +424,7 @@ class _Import:
         return None if any(replace(one, negated=not one.negated) in found for one in found) else tuple(found)
 
     def inhabited(self, kind: str) -> bool:
-        """Return whether a class that is a type has an individual."""
+        """Return whether the class of a type has an individual."""
         return any(self.sets[theirs] for (of, theirs), ours in self.names.items() if of == "type" and ours == kind)
 
     def behavior(self, name: str) -> Behavior | None:
@@ -470,7 +470,7 @@ class _Import:
         return found
 
     def costing(self, changed: set[str]) -> dict[str, Fraction]:
-        """Return the functions in the metric with their weights: an action that increases one of them costs that much."""
+        """Return the functions in the metric with their weights; an action's increases of these functions are its cost."""
         found: dict[str, Fraction] = {"total-cost": Fraction(1)} if "total-cost" in changed else {}
         waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
         while waiting:
@@ -564,7 +564,7 @@ class _Import:
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether, whenever this effect ends a value, another effect gives the same symbol a new one."""
+        """Return whether another effect always gives a symbol a new value when this effect ends its value."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol
@@ -628,9 +628,10 @@ class _Variables:
     def nested(
         self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
     ) -> tuple[Condition, ...]:
-        """Return that some individuals satisfy all given pieces; each individual is quantified as far inside as possible.
+        """Return the condition that some individuals satisfy all given pieces.
 
-        "There are a car and a place such that …" then doesn't enumerate all pairs if the two occur in different pieces.
+        Each individual is quantified as far inside as possible, so that "there are a car and a place such that …" doesn't
+        enumerate all pairs if the two occur in different pieces.
         """
         left = dict(typed)
         while left:

@@ -1,9 +1,9 @@
 """Invariants of a PDDL domain.
 
-Sets of predicates of which at most one fact holds for an object, so that they form one variable.
+Invariants are sets of predicates of which at most one fact holds for an object, so that they form one variable.
 
-An invariant is guessed from changing predicates and proved from what each action adds and deletes. If the proof fails, the
-invariant is extended by what the action deletes: *at* becomes *at or in*.
+An invariant is guessed from changing predicates, and proved from the additions and deletions of each action. If the proof
+fails, a predicate that the action deletes is added to the invariant: *at* becomes *at or in*.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_
 from confab.reasoner.pddl.words import Form
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
-"""For each arity, the possible positions of the object and of the value."""
+"""The possible positions of the object and of the value, by arity."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Invariants:
     pddl : Pddl
     effects : mapping of action to its effects
     changing : set of str
-        The predicates that may be in one.
+        The predicates that may be part of an invariant.
     fluent : set of str
         All predicates whose facts change.
     sets : mapping of type to its objects
@@ -109,7 +109,7 @@ class Invariants:
 
     @cached_property
     def possible(self) -> dict[str, list[frozenset[str]]]:
-        """For each argument of a predicate, the objects for which it may ever hold."""
+        """The objects for which a predicate may ever hold, by its argument."""
         found = {name: [set[str]() for _ in signature] for name, signature in self.pddl.predicates.items()}
         for fact in self.pddl.initial:
             for position, thing in enumerate(fact[1:]):
@@ -150,7 +150,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action preserves "at most one"; otherwise parts that might repair the invariant."""
+        """Return None if every action preserves the invariant; otherwise return parts that might repair it."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]

@@ -66,12 +66,12 @@ from confab.reasoner.symbols import (
 
 Terms = Mapping[str, Term]
 CASES = 4
-"""Maximum number of cases into which an effect is split if a symbol's other values are to become actions of their own."""
+"""Maximum number of cases into which an effect is split if the other values of a symbol become separate actions."""
 
 
 @dataclass(frozen=True)
 class Action:
-    """An action; `places` are the positions of the behaviour's parameters among its own."""
+    """An action; `places` are the positions of the behaviour's parameters among the parameters of the action."""
 
     behavior: Behavior
     parameters: tuple[Term, ...]
@@ -125,7 +125,7 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------- conditions
 
     def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> Formula:
-        """Return that a conjunction holds, with unbound variables existentially quantified."""
+        """Return the formula of a conjunction; unbound variables are existentially quantified."""
         own, inside = self.bound(conditions, terms, scope)
         parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
         parts += [self.formula(condition, inside, scope) for condition in conditions]
@@ -167,7 +167,7 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return that a boolean symbol is true; for a defined one, its definition, unless its rules are recursive."""
+        """Return the formula that a boolean symbol is true: its definition unless it is recursive, otherwise an atom."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -197,7 +197,7 @@ class Lowering:
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
         """Yield a behaviour for each case of its conditional effects, if the cases are few; no case has conditional effects.
 
-        The condition has to be one value of one symbol: either the symbol has it, or it has one of at most `CASES` others.
+        The condition has to be a value of one symbol; the other case has at most `CASES` other values.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -364,7 +364,7 @@ class Lowering:
                 yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
 
     def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the changes when a symbol gets a value in place of its present one."""
+        """Yield the changes by which a symbol gets a new value in place of its current value."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
         own, when = cell.own, cell.when
@@ -411,12 +411,10 @@ class Lowering:
                 yield ConditionalEffect(Not(self.kept.none_has(kind, situation, new)), both([when, member]), own)
 
     def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the changes of a behaviour's effects on amounts.
+        """Yield the changes by a behaviour's effects on amounts.
 
-        If one of them would be no number, the behaviour isn't applicable.
-
-        An assignment or multiplication that is followed by an increase becomes one assignment, since planners don't chain such
-        effects.
+        If the result of an effect would be no number, the behaviour isn't applicable. An assignment or multiplication followed
+        by an increase becomes one assignment, since planners don't chain such effects.
         """
         groups: dict[tuple[str, FunctionTerm, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
@@ -450,7 +448,7 @@ class Lowering:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
     def within_bounds(self, scope: Scope) -> Iterator[Formula]:
-        """Yield that all totals are within their bounds.
+        """Yield the formulas that all totals are within their bounds.
 
         It is a precondition of every action and a goal: a state in which a total is out of bounds leads nowhere.
         """
@@ -489,7 +487,7 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------------- goals
 
     def goal(self, symbol: Symbol, wanted: str) -> Formula:
-        """Return the goal about a symbol."""
+        """Return the goal formula of a symbol."""
         words = self.words
         situation, its = words.situations[symbol.situation], words.terms(symbol.arguments, {})
         if situation.quantity is None:

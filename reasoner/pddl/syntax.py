@@ -1,10 +1,10 @@
-"""PDDL as text: nested lists of words, each with its place, and declarations and formulas read off them.
+"""PDDL as text: nested lists of words with their positions, and the declarations and formulas in these lists.
 
 The subset is that of classical planning: types, constants, predicates, actions with conditional and quantified parts, derived
-predicates, action costs. What lies outside of it is refused by name. Every error says file, line and column.
+predicates, action costs. Other constructs are refused by name. Every error states file, line and column.
 
-Written for this project instead of taking unified-planning's reader, which answers an undefined type with a bare
-``KeyError``, gives no place for half of the errors, and takes .2 to .5 s for problems that this one reads in 2 ms.
+unified-planning's reader isn't used: it answers an undefined type with a bare ``KeyError``, gives no position for half of the
+errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
 
 McDermott et al., "PDDL: the planning domain definition language", 1998; Fox and Long, "PDDL2.1", JAIR 20 (2003).
 """
@@ -194,7 +194,7 @@ class _Reader:
         return item.text
 
     def types(self, items: Sequence[Word | Form]) -> None:
-        """Read types; one that is declared twice, or as ``either``, has several supertypes."""
+        """Read types; a type that is declared twice, or as ``either``, has several supertypes."""
         declared = self.typed(items, declaring=True)
         for one in declared:
             if one.name != "object":
@@ -207,7 +207,7 @@ class _Reader:
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[Word | Form]) -> None:
-        """Read objects; one that is declared twice has the lower of its types."""
+        """Read objects; an object that is declared twice has the lower one of its types."""
         for one in self.typed(items):
             known = self.pddl.objects.get(one.name, one.type)
             if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
@@ -485,7 +485,7 @@ class _Reader:
             self.pddl.initial.append(self.atom(item, {}))
 
     def timed_fact(self, item: Form) -> None:
-        """Take a fact that begins or ends to hold at a time (PDDL 2.2's timed initial literals)."""
+        """Read a timed initial literal of PDDL 2.2: a fact that becomes true or false at a given time."""
         seconds, literal = self.constant(item.items[1]), item.items[2]
         true = not (isinstance(literal, Form) and literal.head == "not")
         inner = literal if true else literal.items[1] if isinstance(literal, Form) and len(literal.items) == 2 else None

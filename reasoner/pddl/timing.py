@@ -38,7 +38,7 @@ class Variables(Protocol):
     def condition(
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
-        """Yield the conditions whose conjunction a formula is."""
+        """Yield the conditions whose conjunction is equivalent to a formula."""
 
 
 class Table(Protocol):
@@ -96,10 +96,10 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which each durative action is two, its start and its end, for the search of invariants.
+    """Return a domain in which each durative action is replaced by two actions, its start and its end.
 
-    A deletion is safe if the deleted fact is required at the same time: the end may add one in place of a fact that the start
-    took away, unless the start adds one, too.
+    It is used to find invariants. A deletion is safe if the deleted fact is required at the same time. The end may add a fact
+    in place of a fact that the start deleted, unless the start adds one, too.
     """
     actions: dict[str, Action] = {}
     found: dict[str, tuple[Effect, ...]] = {}

@@ -1,7 +1,7 @@
-"""A planning problem written as a scene in Turtle: what `confab.reasoner.reading.problem` reads back as the same problem.
+"""A planning problem written as a scene in Turtle, which `confab.reasoner.reading.problem` reads as the same problem.
 
-Domain and scene go into one file. Every condition and effect is an individual with an IRI of its own, so that Protégé
-shows and edits it. Effects are numbered in the order in which they are made.
+Domain and scene go into one file. Every condition and effect is an individual with an IRI, so that Protégé shows and edits it.
+Effects are numbered in the order in which they are made.
 """
 
 from __future__ import annotations
@@ -314,7 +314,7 @@ class _SceneWriter:
             yield from self.above(parent)
 
     def facts(self) -> Iterator[str]:
-        """Yield the facts: by a property where one relates an object to its value, otherwise as nodes."""
+        """Yield the facts: as statements of a value property if there is one, otherwise as nodes."""
         number = 0
         for subject, prop, value, properties in (*self.values(), *self.tuples()):
             if prop:
@@ -375,7 +375,7 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Say the span of a condition or an effect, if it isn't throughout; return its IRI."""
+    """Write the span of a condition or an effect, if it isn't throughout; return its IRI."""
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri

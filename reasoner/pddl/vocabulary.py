@@ -26,7 +26,10 @@ sometime sometime-after sometime-before start total-cost total-time types undefi
 
 
 class Vocabulary:
-    """The names of a problem in PDDL. They are all different, whatever they denote, since some readers use one table for all."""
+    """The names of a problem in PDDL.
+
+    All names differ, even if they denote things of different kinds, since some readers use one table for all of them.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem, domain = problem, problem.domain
@@ -47,7 +50,7 @@ class Vocabulary:
         self.lowest = {member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)}
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
-        """Return the PDDL name for one of ours."""
+        """Return the PDDL name for a name of the scene."""
         if (kind, ours) not in self.names:
             text = re.sub(r"[^0-9a-z_-]", "_", (wanted or ours).lower())
             text = text if re.match(r"[a-z]", text) else f"x{text}"
@@ -60,7 +63,7 @@ class Vocabulary:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the type of each class that becomes one, and its supertype; any two types are nested or disjoint."""
+        """Return the classes that become types, each with its type and supertype; any two types are nested or disjoint."""
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
@@ -106,13 +109,13 @@ class Vocabulary:
         return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
 
     def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
-        """Return that a symbol has a value; without a value, that it is true."""
+        """Return the atom that a symbol has a value; without a value, that the symbol is true."""
         self.used[situation] = None
         words = self.about(situation, terms)
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
 
     def is_a(self, term: Term, kind: str) -> Formula:
-        """Return that a term is an individual of a class."""
+        """Return the atom that a term is an individual of a class."""
         members = self.problem.members(kind)
         if term.members <= members:
             return ALWAYS
@@ -127,11 +130,11 @@ class Vocabulary:
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
 
     def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
-        """Return that a relation holds."""
+        """Return the atom of a relation."""
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
     def differs(self, term: Term, constant: Term) -> Formula:
-        """Return that a term isn't some individual, for planners that don't support equality."""
+        """Return the atom that a term isn't a given individual, for planners that don't support equality."""
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
         found = self.static(
             "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)
@@ -167,7 +170,7 @@ class Vocabulary:
         return number
 
     def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
-        """Return that a symbol of a situation type exists for some terms."""
+        """Return the atom that a symbol of a situation type exists for some terms."""
         kind = self.situations[situation]
         if self.total(situation, terms):
             return ALWAYS
@@ -236,7 +239,7 @@ class Vocabulary:
                 return
 
     def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
-        """Return the PDDL terms for some of our names."""
+        """Return the PDDL terms for names of the scene."""
         return tuple(terms[name] if name in terms else self.object(name) for name in names)
 
     # ---------------------------------------------------------------------------------------------------- statements

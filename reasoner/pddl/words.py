@@ -1,4 +1,4 @@
-"""A text of PDDL as nested lists of words, each with its place."""
+"""A PDDL text as nested lists of words, each with its position."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Form:
 
 
 class PddlError(ValueError):
-    """The PDDL can't be used; one line says file, line and column, what is wrong and what is expected."""
+    """The PDDL can't be used; the message states file, line and column, the error, and what was expected."""
 
 
 def form_of(text: str, file: str) -> Form:

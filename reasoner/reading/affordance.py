@@ -1,6 +1,6 @@
 """Situated affordances: the behaviours that each object affords in a state, found by SPARQL.
 
-A state is written into a named graph of its own (`SITUATION`), one fact for each symbol, with defaults filled in. A behaviour's
+A state is written into a separate named graph (`SITUATION`): one fact for each symbol, including defaults. A behaviour's
 preconditions become graph patterns on it:
 
 =========================  ===================================================================
@@ -70,9 +70,9 @@ class Affordance:
     object : str
     behavior : str
     arguments : tuple of str
-        Of the behaviour, the object among them.
+        The arguments of the behaviour, including the object.
     situation : tuple of Fact
-        The facts that its preconditions name and that hold.
+        The true facts that the preconditions name.
     effect : tuple of Fact
         The facts that would hold afterwards.
     """
@@ -106,9 +106,9 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
-    """Yield the derived facts of the graph `SITUATION`, from stated facts upwards.
+    """Yield the derived facts of the graph `SITUATION`, in order of derivation.
 
-    Each has to be added before the next is requested.
+    Each fact has to be added before the next one is requested.
     """
     rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
     again = circular(rules)
@@ -126,7 +126,7 @@ def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
 
 
 def _names(condition: Condition, variable: str) -> bool:
-    """Whether a true condition determines a variable."""
+    """Return whether a condition, if true, determines a variable."""
     match condition:
         case ValueCondition(_, arguments, value, False) if value != FALSE:
             return variable in (*arguments, value)
@@ -139,15 +139,15 @@ def _names(condition: Condition, variable: str) -> bool:
 def applicable_query(
     graph: KnowledgeGraph, reading: Reading, behavior: Behavior, when: Sequence[Condition] = ()
 ) -> str:
-    """Return the SPARQL query whose rows are the arguments and variables with which a behaviour can be done.
+    """Return the SPARQL query whose rows are the arguments and variables with which a behaviour is applicable.
 
-    It asks the graph `SITUATION`, which `write_situation` fills. `when` are conditions that hold in addition.
+    It queries the graph `SITUATION`, which `write_situation` fills. `when` has additional conditions.
     """
     return _Writer(graph, reading).query(behavior, when)
 
 
 def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> list[Affordance]:
-    """Return what every object affords in a state (the initial one if none is given), in order.
+    """Return the affordances of every object in a state (by default the initial state), in order.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Classes defined by situations, compiled into conditions.
 
-"A full vessel is a vessel that carries some beverage" can become true and false, so the
-reasoner must not conclude its members before planning. In a behaviour, such a class is replaced by its definition:
+The members of a class such as "a full vessel is a vessel that carries some beverage" change, so the reasoner must not conclude
+them before planning. In a behaviour, such a class is replaced by its definition:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
@@ -86,7 +86,7 @@ CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinal
 CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
 """Constructs from which OWL 2 RL concludes no class; planning can, since unstated facts are false."""
 MOST = 5
-"""Maximum cardinality; larger ones would take longer to test than any plan to find."""
+"""Maximum cardinality; the test of a larger cardinality would take longer than planning."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
 
 
@@ -102,8 +102,8 @@ class Definitions:
     numbers : set of properties that lead to numbers
     kinds : mapping of property to the classes of subject and value, as names; "" where none is stated
     concluded : mapping of class to situation type and owner
-        Classes that rules conclude, SWRL's (`confab.reasoner.reading.swrl`) or others, or that are defined by themselves, the
-        situation type that holds of each, and the class that has it, "" if several do.
+        Classes that rules conclude (SWRL's, `confab.reasoner.reading.swrl`, or others), or that are defined recursively; each
+        with the situation type that is true of its members, and the class that has this type ("" if there are several).
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
@@ -114,12 +114,12 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether a class is tested by its definition: its members change, or OWL 2 RL doesn't find all of them."""
+        """Return whether a class is tested by its definition, because its members change or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
 
     @cached_property
     def recursive(self) -> frozenset[str]:
-        """The classes with a recursive definition, directly or through others."""
+        """The classes whose definitions are recursive, directly or through other classes."""
         names = {iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
         found = set()
         for iri in names:
@@ -141,7 +141,7 @@ class Definitions:
         return self._spread(set(self.concluded))
 
     def _spread(self, found: set[str]) -> frozenset[str]:
-        """Return some classes with those whose definitions use a value property, or one of these classes."""
+        """Return some classes, and all classes whose definitions use a value property or one of these classes."""
         defined = {
             iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node
         }
@@ -151,9 +151,9 @@ class Definitions:
 
     @cached_property
     def _closed(self) -> frozenset[str]:
-        """The classes without members for OWL 2 RL, since their definitions use `CLOSED` constructs.
+        """The classes for which OWL 2 RL finds no members, since their definitions use `CLOSED` constructs.
 
-        Definitions of the form *Base and …* whose terms planning knows.
+        They have the form *Base and …*, with terms that planning knows.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -228,7 +228,7 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions for a situation type of a class's members, besides those of rules."""
+        """Return the conditions for a situation type of a class's members, in addition to those of rules."""
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):
@@ -241,7 +241,7 @@ class Definitions:
         return found[0] if len(found) == 1 else AnyOf((found,))
 
     def beyond_base(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions of a changing class on a term besides its base class; empty for a static class."""
+        """Return the conditions of a changing class on a term, in addition to its base class; empty for a static class."""
         return self.conditions(term, iri) if self.changes(iri) else ()
 
     def _one_definition(self, iri: str) -> str:
@@ -257,8 +257,8 @@ class Definitions:
     def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
         """Return the rules of the axioms about a value property: subproperties and chains.
 
-        A transitive property is derived from its other rules, one link after another; `more` says whether there are
-        rules of another kind.
+        A transitive property is derived from its other rules, one link after another; `more` states whether there are rules of
+        another kind.
         """
         said = self.nodes.get(prop, {})
         ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
@@ -277,7 +277,7 @@ class Definitions:
         return found
 
     def _below(self, prop: str) -> list[str]:
-        """Return the stated subproperties and equivalent properties of one."""
+        """Return the stated subproperties and equivalent properties of a property."""
         nodes, said = self.nodes.items(), (RDFS + "subPropertyOf", OWL + "equivalentProperty")
         found = {iri for iri, node in nodes for name in said if prop in node.get(name, ())}
         return sorted((found | {*self.nodes.get(prop, {}).get(said[1], ())}) - {prop})
@@ -449,7 +449,10 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return that some value is in a class (with `others` further ones), or (`outside`) that no value is outside it."""
+        """Return the condition that some value is in a class, with `others` further values.
+
+        With `outside`, that no value is outside it.
+        """
         variable = f"{term if term.startswith('?') else '?' + term}_{local_name(self._named(prop)[0])}"
         variable += str(len(before) + 1) if before else ""
         inside = tuple(self.expression(variable, filler))
@@ -476,7 +479,7 @@ class Definitions:
         return kind
 
     def related(self, prop: str, term: str, value: str) -> Condition:
-        """Return that a property relates a term to a value."""
+        """Return the condition that a property relates a term to a value."""
         iri, inverse = self._named(prop)
         one, other = (value, term) if inverse else (term, value)
         if iri not in self.situations:
@@ -514,7 +517,7 @@ class Definitions:
 
 
 def _negation(conditions: tuple[Condition, ...]) -> Condition:
-    """Return that not all of some conditions hold."""
+    """Return the condition that at least one of some conditions is false."""
     if len(conditions) == 1:
         return replace(conditions[0], negated=not conditions[0].negated)
     return AnyOf((conditions,), negated=True)

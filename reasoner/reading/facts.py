@@ -114,7 +114,7 @@ def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
 
 
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
-    """Raise `KnowledgeError` if a relation gives two numbers for the same individuals, or for some none."""
+    """Raise `KnowledgeError` if a relation gives two numbers for the same individuals, or no number for some."""
     for row in bare:
         raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its :amount")
     found: dict[tuple[str, ...], str] = {}
@@ -126,7 +126,10 @@ def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collect
 def initial_state(
     domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
 ) -> dict[Symbol, str]:
-    """Return the value of each symbol: the stated one, else the default; raise `KnowledgeError` if it has none or several."""
+    """Return the value of each symbol: the stated value, or the default.
+
+    Raise `KnowledgeError` if a symbol has no value, or several.
+    """
     initial = {}
     for situation in domain.situations.values():
         if situation.boolean or situation.name in domain.aggregates:
@@ -151,7 +154,7 @@ def initial_state(
 
 
 def check_values(state: State, domain: Domain, names: Names) -> None:
-    """Raise `KnowledgeError` if a symbol has a value that is declared nowhere, or an amount that it can't have."""
+    """Raise `KnowledgeError` if a symbol has an undeclared value, or an amount outside its bounds."""
     for fault in values_at_fault(state, domain, names):
         about = next(iter(fault.symbol.arguments), "")
         raise KnowledgeError(str(fault), names.iri(about) if about in names else "")

@@ -49,7 +49,7 @@ WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 
 
 class _Whole(Names):
-    """Names that are IRIs, but for truth values."""
+    """Names that are IRIs, except for truth values."""
 
     def short(self, iri: str) -> str:
         return {CORE + TRUE: TRUE, CORE + FALSE: FALSE}.get(iri, iri)
@@ -59,7 +59,7 @@ class _Whole(Names):
 
 
 def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
-    """Return behaviours with IRIs for names, and with the names of classes that situations define."""
+    """Return behaviours with IRIs as names; classes that situations define keep their names."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
@@ -68,10 +68,10 @@ def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
 
 @dataclass(frozen=True)
 class Frame:
-    """A schema as values, for some individuals: everything of a problem but its facts and its goal.
+    """A schema as values, for some individuals: everything of a problem except its facts and its goal.
 
-    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values;
-    `lifted` are the behaviours with effects for all of a class still in one.
+    `properties` maps the IRI of a value property to the name of its situation type, and to True if it has many values. `lifted`
+    has the behaviours before effects on all of a class are expanded.
     """
 
     schema: Schema
@@ -137,7 +137,7 @@ def frame(
 
 
 def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
-    """Return short names of a schema's terms, of some individuals, and of others that may end alike."""
+    """Return short names of a schema's terms, of some individuals, and of others with the same local name."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
     derived = {*derived_goals(schema)}
@@ -160,7 +160,8 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     Raises
     ------
     KnowledgeError
-        A behaviour changes one that has rules, one isn't true or false, or is defined by its own negation.
+        A behaviour changes a defined situation type; or a defined situation type isn't boolean, or is defined by its own
+        negation.
     """
     changed = {
         parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
@@ -227,7 +228,7 @@ def _aggregates(
     Raises
     ------
     KnowledgeError
-        A behaviour changes one, one has two rules, isn't an amount, or depends on itself.
+        A behaviour changes a derived amount; or a derived amount has two rules, isn't an amount, or depends on itself.
     """
     found: dict[str, Aggregate] = {}
     for iri in schema.of_kind("Rule"):
@@ -265,7 +266,7 @@ def _on_their_levels(
     rules: Mapping[str, Sequence[Rule]],
     aggregates: Mapping[str, Aggregate],
 ) -> Iterator[SituationType]:
-    """Yield situation types; a defined one exists from the level on that has all situation types of its definition."""
+    """Yield situation types; a defined type exists from the first level that has all situation types of its definition."""
     known = {s.name: s for s in situations}
     before = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
@@ -312,7 +313,7 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a part of it has more or fewer arguments than it can."""
+    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a condition or effect has a wrong number of arguments."""
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
         raise KnowledgeError(

@@ -1,4 +1,4 @@
-"""Goals: those of a task, and those that users type."""
+"""Goals: the goals of a task, and goals that users type."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from confab.reasoner.symbols import (
 )
 
 TASK = "Task"
-"""The class of the individual that derived goals are about."""
+"""The class of the individual that is the argument of derived goals."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
-"""The goal for an amount, as users write it."""
+"""The notation of users for the goal of an amount."""
 
 
 def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
@@ -153,7 +153,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
 
 
 def _is_fact(wanted: Condition, problem: Problem) -> bool:
-    """Whether a goal is a fact: a value of a symbol, or bounds of an amount that is part of each state."""
+    """Return whether a goal is a fact: a value of a symbol, or bounds of an amount in the state."""
     match wanted:
         case ValueCondition():
             return True
@@ -167,7 +167,7 @@ def _is_fact(wanted: Condition, problem: Problem) -> bool:
 def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition) -> tuple[Problem, Symbol]:
     """Return the problem with a situation type that a rule derives from a condition, and its symbol.
 
-    It is about the task, so that a goal of alternatives, or of some individual, is a fact like others.
+    The symbol is about the task. So a goal with alternatives, or about some individual, is a fact like other goals.
     """
     domain = problem.domain
     names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]
@@ -185,7 +185,7 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
 
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the value of a goal; for a negated one, the only other value on the first level that sees it.
+    """Return the value of a goal; for a negated goal, the only other value on the first level that sees the symbol.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return the goals that a goal stands for: one for each member if it names a class in place of an individual."""
+    """Return the goals that a goal denotes: one goal for each member if the goal names a class in place of an individual."""
     if is_a(parts.nodes.get(iri, {}), "AllOf") and not parts.flag(iri, "negated"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
@@ -233,7 +233,7 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
 
 
 def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
-    """Return of which symbol a goal wants an amount, and its bounds."""
+    """Return the symbol of a goal on an amount, and the bounds."""
     contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
     sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
     if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):

@@ -1,4 +1,4 @@
-"""The facts about some individuals of a scene, read by queries of their size and not of the scene's."""
+"""The facts about some individuals of a scene, read by queries whose size doesn't depend on the scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Individuals:
     Attributes
     ----------
     triples : set of triples
-        All facts about those in `seen`, and facts about others that were found backward, in the order of reading.
+        All facts about the individuals in `seen`, and facts about others that were found backward, in the order of reading.
     seen : set of individuals
     """
 

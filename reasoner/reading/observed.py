@@ -1,8 +1,8 @@
-"""Observed facts in the graph: a file of their own, beside the edited scene.
+"""Observed facts in the graph: a separate file beside the edited scene. Each fact is a situated object instance.
 
-Each fact is a situated object instance, an individual with object, situation type and value. It isn't the property assertion that
-the scene makes: the place of a cup in the scene, and its observed place in a file, don't contradict each other. A planning
-call that starts from observations puts these values in place of the scene's.
+An individual with object, situation type and value. It isn't a property assertion, so that the place of a cup in the scene
+doesn't contradict its observed place in the file. A planning call that starts from observations puts these values in place of
+the scene's.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
     state : State
         As perceived.
     names : Names
-        The scene's names, to lead back to IRIs.
+        The scene's names, which give the IRIs.
     scene : str
         IRI of the scene, which the file imports.
     """

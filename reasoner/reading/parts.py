@@ -164,7 +164,7 @@ class Parts(NodeReader):
         return found
 
     def classes_in(self, iri: str) -> list[str]:
-        """Return the classes in the place of individuals in a condition or effect that have no variable yet."""
+        """Return the classes that stand in place of individuals in a condition or effect and have no variable yet."""
         said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
@@ -201,7 +201,7 @@ class Parts(NodeReader):
         return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not self.flag(iri, "negated"))
 
     def effect(self, iri: str) -> Effect:
-        """Return an effect; with a class in the place of an individual, on every member for which `when` holds."""
+        """Return an effect; if a class stands in place of an individual, the effect is on every member for which `when` holds."""
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
         kinds = self.classes_in(iri)
@@ -284,7 +284,7 @@ class Parts(NodeReader):
         return self.seconds(iri, "duration")
 
     def seconds(self, iri: str, name: str) -> Fraction | None:
-        """Return the seconds of a duration that a property gives; None if it gives none."""
+        """Return the seconds of the duration that a property states; None if it states none."""
         if not self.values(iri, name):
             return None
         found = seconds_of(self.one(iri, name))

@@ -53,8 +53,8 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 class Reading:
     """A scene as a problem, with the table from its names back to IRIs.
 
-    `whole` says whether it contains all individuals of the scene, or only those that its task can need
-    (`confab.reasoner.reading.relevance`); `schema` has the rows common to all individuals.
+    `whole` is True if the problem contains all individuals of the scene, and False if it contains only those that its task can
+    need (`confab.reasoner.reading.relevance`); `schema` has the rows common to all individuals.
     """
 
     problem: Problem
@@ -64,7 +64,7 @@ class Reading:
 
 
 def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
-    """Read the planning problem out of a knowledge graph, with every individual that it has.
+    """Read the planning problem of a knowledge graph, with all of its individuals.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def reading_of(
     scene : str
     known : Frame
     facts : triples of IRIs
-        Of value properties and relations, between the individuals.
+        Facts of value properties and relations between the individuals.
     tuples : mapping of IRI to node
-        Facts that are nodes of their own.
+        Facts that are separate nodes.
     whole : bool
     """
     schema, names = known.schema, known.names

@@ -3,8 +3,8 @@
 The query has one sub-select per parameter, which yields the individuals of its type in declared order; together they yield
 every assignment in the order that numbers them (PAPER.md section 4): behaviours in declared order, then parameters in theirs,
 then individuals in theirs. `quantify` numbers the rows itself and leaves the order out of its query: the store then yields rows
-one after the other, ten times as fast, and a time limit ends the query. Whether a quantified behaviour can be done here is not
-asked: M counts them all.
+one after the other, ten times as fast, and a time limit ends the query. Applicability isn't tested: M counts all quantified
+behaviours.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
 
 
 def behavior_named(reading: Reading, name: str) -> Behavior:
-    """Return a behaviour by its name; the error of an unknown one has the nearest known name."""
+    """Return a behaviour by its name; the error for an unknown name has the nearest known name."""
     behaviors = reading.problem.domain.behaviors
     if name not in behaviors:
         raise KnowledgeError(f"unknown behaviour '{name}'{nearest(name, behaviors)} (known: {', '.join(behaviors)})")
@@ -63,14 +63,15 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
 def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str:
     """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
 
-    If ordered, the rows are in the order of IDs, but where individuals share an index, or have none and lie in several ontologies.
+    If `ordered`, the rows are in the order of IDs, except if individuals share an index, or have no index and lie in several
+    ontologies.
 
     If the reading isn't of the whole scene, only its individuals are queried.
 
     Raises
     ------
     KnowledgeError
-        The type of a parameter has no IRI, as the union of several classes hasn't.
+        The type of a parameter has no IRI, because it is the union of several classes.
     """
     names = [parameter.name for parameter in behavior.parameters]
     order = " ".join(f"{name}_index STR({name})" for name in names) if ordered else ""

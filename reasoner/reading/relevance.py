@@ -50,7 +50,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
-"""Queries that follow routes one step each; what lies farther is closed by a property path, of which the last is one."""
+"""Maximum number of queries that follow routes by one step each; after them, one property path closes the slice."""
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps that reach a term is taken
 
 
@@ -58,9 +58,9 @@ FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps 
 class Routes:
     """Routes from relevant individuals to others, as IRIs.
 
-    `forward` are the properties followed from subject to object; `backward` those followed from object to subject, each with
-    the constants from which it is followed too (a constant is a value that a behaviour names, such as "nothing", which many
-    symbols may have). `classes` are those all of whose individuals are relevant.
+    `forward` has the properties that are followed from subject to object. `backward` has the properties that are followed from
+    object to subject, each with the constants from which it is followed, too. (A constant is a value that a behaviour names,
+    such as "nothing"; many symbols may have it.) `classes` has the classes whose individuals are all relevant.
     """
 
     forward: set[str] = field(default_factory=set)
@@ -69,7 +69,7 @@ class Routes:
 
 
 def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
-    """Read those individuals of a scene that its task can need, in few queries however many there are.
+    """Read the individuals of a scene that its task can need; the number of queries doesn't depend on their number.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     Returns
     -------
     Reading
-        As `confab.reasoner.reading.problem.read` gives, with fewer individuals. IDs number the individuals read.
+        Like the result of `confab.reasoner.reading.problem.read`, with fewer individuals. IDs number these individuals.
 
     Raises
     ------
@@ -121,9 +121,9 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """Return the routes from the individuals of a goal to all individuals that relevant steps can involve or change.
 
-    A behaviour counts if it changes a situation type that counts, a rule if it defines one; the situation types in its conditions
-    and effects then count too. A situation type that is looked up from some of its terms alone is also followed from an effect
-    that gives it to these terms.
+    A behaviour counts if it changes a situation type that counts; a rule counts if it defines one. All situation types in the
+    conditions and effects of a counting behaviour or rule count, too. If a fact is looked up from some of its terms, routes
+    also lead from these terms in effects to the other terms of the behaviour.
 
     Parameters
     ----------
@@ -173,19 +173,19 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
-"""Places among the terms of situation types from which symbols are looked up, each with the constants that may occur there."""
+"""Positions among the terms of situation types from which symbols are looked up, each with the constants that may occur there."""
 
 
 class _Doing:
-    """A behaviour or rule as recognition follows it: from each effect to the whole step, and from the step to all that it changes.
+    """A behaviour or rule as recognition follows it: from each effect to the whole step, and from the step to all of its changes.
 
     Attributes
     ----------
     situations : set of str
         The situation types in its conditions and effects.
     step : set of str
-        The parameters, the variables in positive conditions, and those `always` needed: a total counts the individuals of a
-        variable that has no condition, too.
+        The parameters, the variables in positive conditions, and the variables that are `always` needed: a total also counts
+        the individuals of a variable without a condition.
     """
 
     def __init__(self, behavior: Behavior, always: Collection[str] = ()) -> None:
@@ -237,14 +237,20 @@ def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
 
 @dataclass(frozen=True)
 class _Scope:
-    """A conjunction with the terms in it: conditions that hold together when a behaviour is done, or would forbid it."""
+    """A conjunction with the classes of its terms.
+
+    The preconditions of a behaviour, or conditions that would prevent the behaviour.
+    """
 
     conditions: tuple[Condition, ...]
     kinds: Mapping[str, str]
 
 
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
-    """Return the conjunctions in nested conditions: the positive one, and with it each alternative and each negated group."""
+    """Return the conjunctions in nested conditions.
+
+    The positive conditions, and these with each alternative and each negated group.
+    """
     leaves: list[Condition] = []
     groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []
     waiting = list(conditions)
@@ -268,7 +274,7 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
 
 
 def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
-    """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
+    """Add the cheapest steps by which all terms of a conjunction, and some further terms, are reached from given terms."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more
     reached = start | {t for t in in_use if not t.startswith("?")}
@@ -295,7 +301,8 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 class _Step:
     """One route from a term to another: the properties to follow, and its cost.
 
-    `constants` may occur in place of the source; `looks_up` is this place, unless the source alone determines the symbol.
+    `constants` may occur in place of the source; `looks_up` is the position of the source, unless the source alone determines
+    the symbol.
     """
 
     source: str
@@ -363,7 +370,7 @@ def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
 
 
 class _Search(Individuals):
-    """What recognition has read so far, and where it leads."""
+    """The individuals that recognition has read, and the routes from them."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
         """Follow the routes from the first individuals until no new ones are found, in rounds and then by one property path."""
@@ -386,7 +393,7 @@ class _Search(Individuals):
             self._close_by_path(reached - asked, bounds)
 
     def _follow(self, triples: Sequence[Triple], bounds: Routes, reached: set[str]) -> None:
-        """Add to `reached` where some triples lead."""
+        """Add the individuals to which some triples lead to `reached`."""
         kinds = self.below(bounds.classes)
         facts = set[str]()
         backward = bounds.backward.keys() - {*PLACES}
@@ -405,7 +412,7 @@ class _Search(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read everything that the routes reach from a frontier; a path can't tell constants, so it may be more."""
+        """Read everything that the routes reach from a frontier; a path doesn't distinguish constants, so it may reach more."""
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
             node = "|".join(f"<{p}>" for p in PLACES)
@@ -420,11 +427,10 @@ class _Search(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return the individuals and classes with the same local name as one of a part of the scene, in all known namespaces.
+    """Return the namesakes of a part of the scene: individuals and classes with the same local name, in all known namespaces.
 
-    Each possible IRI is looked up separately, so that no other row is read. As in the whole scene, an individual counts
-    if it has a class (a property that is declared as one has none), and a class if it has individuals that aren't nodes of the
-    schema.
+    Each possible IRI is looked up separately, so that no other row is read. As in the whole scene, an individual counts if it
+    has a class, and a class counts if it has individuals that aren't nodes of the schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -448,7 +454,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
 
 
 def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[str]:
-    """Return the namespaces of some terms, those for which files have prefixes, and those of other ontologies."""
+    """Return the namespaces of some terms, the namespaces for which files have prefixes, and those of other ontologies."""
     found = {iri.removesuffix(local_name(iri)) for iri in terms if ":" in iri}
     found |= {*graph.prefixes.values()} - ({*PREFIXES.values()} - {CORE})
     for ontology in schema.ontologies:
@@ -470,7 +476,7 @@ def _goal_individuals(schema: Schema) -> set[str]:
 
 
 def _goal_classes(schema: Schema) -> set[str]:
-    """Return the classes of which goals want something of all individuals, or another value than they name."""
+    """Return the classes in goals about all individuals of a class, and in goals that exclude a value."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
     negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))
@@ -480,7 +486,7 @@ def _goal_classes(schema: Schema) -> set[str]:
 def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:
     """Return the individuals that the words of goals can mean, by their short names.
 
-    They are looked up in the namespaces that are known; if one isn't found there, among all individuals.
+    They are looked up in the known namespaces; an individual that isn't found there is looked up among all individuals.
     """
     words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split() if not BOUNDS.fullmatch(word)}
     if not words:

@@ -1,6 +1,6 @@
-"""A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it.
+"""A scene with other facts or goals: a copy of its graph in which a symbol has another value or another goal value.
 
-A refutation (`confab.reasoner.refutations`) is stated here, too, as a precondition that excludes it.
+Refutations (`confab.reasoner.refutations`) are also stated here, as preconditions.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
 
 
 def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
-    """Yield the triples of a fact: by its value property if possible, otherwise as a node; false isn't stated."""
+    """Yield the triples of a fact: by its value property if possible, otherwise as a node. False facts aren't stated."""
     iri, symbol, value = reading.names.iri, fact.symbol, fact.value
     if value == FALSE:
         return

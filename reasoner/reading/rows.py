@@ -1,4 +1,4 @@
-"""From the rows of queries to nodes (subject → property → values), once each value is of the kind that belongs there."""
+"""Converts the rows of queries to nodes (subject → property → values), and checks the kind of each value."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class Schema:
     """The rows that are the same for every individual: those of `SCHEMA`, as IRIs.
 
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
-    property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
-    facts are nodes of their own, and `facts` has those without arguments;
-    `expressions` are the definitions of classes, `axioms` those about value properties, `swrl` the rules; `ontologies` the
-    IRIs of the loaded files; `exclusive` are the situation types whose values physics gives to one individual at a time.
+    property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` is True if some facts
+    are separate nodes, and `facts` has the facts without arguments; `expressions` are the definitions of classes, `axioms` the
+    axioms about value properties, `swrl` the rules; `ontologies` the IRIs of the loaded files; `exclusive` are the situation
+    types whose values physics gives to one individual at a time.
     """
 
     nodes: Mapping[str, Node]
@@ -104,7 +104,7 @@ def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, lis
 
 
 def core_triple(row: Sequence[Term]) -> Triple:
-    """Return a triple as text, after checking that no text is confused with a name."""
+    """Return a triple as text, after a check that no text stands in place of a name."""
     subject, predicate, value = row
     named = text(predicate)
     return (
@@ -113,7 +113,7 @@ def core_triple(row: Sequence[Term]) -> Triple:
 
 
 def link(row: Sequence[Term], blank: bool = False) -> Triple:
-    """Return a triple that leads from one individual to another, as text; only the core's own nodes can go without a name.
+    """Return a triple that leads from one individual to another, as text; only nodes of the core may have no name.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
 
 
 def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
-    """Return a fact as text: a link, or by one of the properties that lead to numbers an amount."""
+    """Return a fact as text: a link, or an amount if its property leads to numbers."""
     subject, predicate, value = row
     if text(predicate) not in numbers:
         return link(row)
@@ -162,7 +162,7 @@ def decimal(text: str, what: str) -> Fraction:
 
 
 def index_of(iri: str, index: str) -> int:
-    """Return a node's place in the declared order; nodes without an index come last."""
+    """Return the position of a node in the declared order; nodes without an index come last."""
     if not index:
         return FIRST_INDEX_OF_NONE
     return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
@@ -183,7 +183,7 @@ def whole_number(text: str, what: str, least: int, most: int) -> int:
 
 
 def is_a(node: Node, *kinds: str) -> bool:
-    """Whether a node is of one of some classes of the core."""
+    """Return whether a node is of one of some classes of the core."""
     types = node[TYPE]
     return any(CORE + kind in types for kind in kinds)
 
@@ -244,7 +244,7 @@ def classes_of(
 
 
 def derived_goals(schema: Schema) -> list[str]:
-    """Return the goals that are no facts, but alternatives, witnesses, or comparisons of more than an amount and a number."""
+    """Return the goals that aren't facts: alternatives, witnesses, and comparisons of more than an amount and a number."""
     extrema = {
         situation
         for iri in schema.of_kind("Rule")

@@ -1,4 +1,4 @@
-"""What doesn't depend on the number of individuals, read in one query: behaviours, situation types, classes, definitions."""
+"""The part of an ontology without individuals, read in one query: behaviours, situation types, classes, definitions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nod
 from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
-"""Properties with texts, which endpoints return in full."""
+"""Properties whose values are texts; endpoints return these texts in full."""
 KINDS = (
     "SituationType",
     "Behavior",

@@ -1,7 +1,8 @@
 """A part of a scene that grows with the dependencies of a check, read without the routes of task recognition.
 
-A checker states the individuals that it looks up: members of a class that initially satisfy conditions. One query asks the graph
-for all of them. The individuals found are read with their values, and so on, until none that is looked up is missing.
+A checker states the individuals that it looks up: members of a class that initially satisfy conditions. One query asks the
+graph for all of them. The individuals found are read with their values. This is repeated until no individual that is looked up
+is missing.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ class Surroundings:
 
     @property
     def lifted(self) -> Mapping[str, Behavior]:
-        """The behaviours with effects on each of a class still in one."""
+        """The behaviours before effects on all of a class are expanded."""
         return self.frame.lifted
 
     def problem(self) -> Problem:
@@ -91,7 +92,7 @@ class Surroundings:
         return reading_of(self.graph.scene, self.frame, facts, tuples, whole=False).problem
 
     def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
-        """Read the individuals that some lookups find, for each row of known terms; return whether any is new."""
+        """Read the individuals that some lookups find, for each row of known terms; return whether an individual is new."""
         classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
         for (witness, known), rows in lookups.items():
             for row in rows:

@@ -12,8 +12,8 @@ head ``Heavy(?x)``                           `Rule` of the situation type that `
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
-A variable that the head doesn't name is determined by a functional value property, or else sought by a `Witness`. Rules are
-DL-safe: variables denote the scene's individuals.
+A variable that occurs only in the body is determined by a functional value property; otherwise it becomes the variable of a
+`Witness`. Rules are DL-safe: variables denote the scene's individuals.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -
     Parameters
     ----------
     definitions : Definitions
-        With the nodes of the SWRL rules among its own.
+        The definitions of the ontology, including the nodes of the SWRL rules.
     arguments : mapping of IRI of a situation type to the classes of its arguments
 
     Raises

@@ -19,14 +19,14 @@ def with_times(problem: Problem, parts: Parts, schema: Schema) -> Problem:
     Raises
     ------
     KnowledgeError
-        A deadline isn't that of a fact, a window ends before it begins, or it is of no individual.
+        A deadline belongs to a goal that is no fact, a window ends before it begins, or a window belongs to no individual.
     """
     times = Times(deadlines(problem, parts, schema), windows(problem, parts, schema), {}, happenings(parts, schema))
     return replace(problem, times=times) if times != Times() else problem
 
 
 def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fraction]:
-    """Return by when each goal holds that has a deadline."""
+    """Return the deadline of each goal that has one."""
     found: dict[Symbol, Fraction] = {}
     for task in schema.of_kind("Task"):
         for iri in parts.values(task, "goal"):
@@ -46,7 +46,7 @@ def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fr
 
 
 def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[tuple[Fraction, Fraction | None], ...]]:
-    """Return when individuals are available that have windows."""
+    """Return the windows of time in which individuals are available."""
     found: dict[str, list[tuple[Fraction, Fraction | None]]] = defaultdict(list)
     for iri in schema.of_kind("Window"):
         individual = parts.names.short(parts.one(iri, "ofIndividual"))
@@ -60,7 +60,7 @@ def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[t
 
 
 def happenings(parts: Parts, schema: Schema) -> dict[str, Fraction]:
-    """Return when behaviours happen that no actor decides on."""
+    """Return the times of the behaviours that happen by themselves."""
     found = {}
     for iri in schema.of_kind("Behavior"):
         at = parts.seconds(iri, "happensAt")

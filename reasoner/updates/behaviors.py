@@ -46,7 +46,7 @@ from confab.reasoner.updates.words import (
 )
 
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
-"""The change of an amount that becomes itself, an operator, and a term."""
+"""The changes of an amount, by operator: the amount becomes itself, the operator, and a term."""
 
 
 class UpdateCompiler:
@@ -66,7 +66,7 @@ class UpdateCompiler:
         self.known: set[str] = set()
 
     def write(self, update: Update) -> None:
-        """Add an update; its first operation is the behaviour's, further ones are conditional."""
+        """Add an update; its first operation belongs to the behaviour, further operations are conditional effects."""
         own, operations = parsed(update.text)
         self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
         for name, (node, kind, number) in self.scope.declared.items():
@@ -123,7 +123,7 @@ class UpdateCompiler:
         self.nodes.links = {key: values for key, values in self.nodes.links.items() if values}
 
     def total(self, rule: Construction, group: Group, within: set[str]) -> None:
-        """Add an aggregate: its amount, the variables it aggregates over, and the number of each tuple."""
+        """Add an aggregate: its amount, the variables that it aggregates over, and the number that each tuple contributes."""
         at = rule.head.subject.at
         if last_of(rule.head) != rule.name or not self.scope.vocabulary.numeric(self.scope.iri(rule.head.predicate)):
             raise UpdateError(

@@ -18,7 +18,7 @@ UPDATES = """SELECT ?behavior ?property ?value WHERE {
   FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
   FILTER(?property != :construct || NOT EXISTS { ?behavior :situationType ?situation })
 } ORDER BY ?behavior ?property ?value"""
-"""Updates of behaviours without individuals; a store that was filled from files has these already."""
+"""Updates of behaviours that have no individuals yet; in a store that was filled from files all behaviours have them."""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
   ?behavior a/rdfs:subClassOf* :Behavior . { ?behavior :update ?text } UNION { ?behavior :extends ?other }
   ?term :termType ?type . FILTER(STRSTARTS(STR(?term), CONCAT(STR(?behavior), ".")) || EXISTS { ?behavior :parameter ?term })

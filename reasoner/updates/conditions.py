@@ -98,7 +98,7 @@ class Conditions:
         return self.sought(self.scope.group(parts(graph), known), known, place(graph))
 
     def filter(self, expression: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions whose conjunction a FILTER means."""
+        """Return the conditions whose conjunction is equivalent to a FILTER."""
         one = unwrapped(expression)
         name = getattr(one, "name", "")
         if name == "ConditionalAndExpression":
@@ -180,7 +180,7 @@ class Conditions:
         return self.absence(conditions[0])
 
     def absence(self, witness: str) -> str:
-        """Return a witness that only tests a value as the equivalent absence condition."""
+        """Return the absence condition that is equivalent to a witness which only tests a value."""
         said = self.nodes.said[witness]
         sought, inner = said.get("witness", [""])[0], said.get("condition", [])
         if sought.rpartition(".")[2] != ANYONE[1:] or len(inner) != 1:
@@ -219,7 +219,7 @@ class Conditions:
         return self.nodes.condition("ValueCondition", at, self.situation(one, known))
 
     def arguments(self, one: Triple, known: Collection[str]) -> list[str]:
-        """Return the nodes of subject and object, ``true`` left out."""
+        """Return the nodes of subject and object without ``true``."""
         said = one.object if isinstance(one.object, tuple) else (one.object,)
         at = one.predicate.at
         if said and isinstance(said[-1], Truth):

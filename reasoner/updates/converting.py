@@ -1,7 +1,7 @@
 """Conversion of the behaviours in a Turtle file to updates or to individuals; the rest of the file is unchanged.
 
-The file is split into statements. Those of a behaviour and its parts are replaced; a behaviour that the other form can't
-express stays, with a note why.
+The file is split into statements. The statements of a behaviour and its parts are replaced. A behaviour that the other form
+can't express is unchanged, and the reason is noted.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ class _Statement:
 
 @dataclass
 class _File:
-    """A Turtle file as statements, with the spelling of its names."""
+    """A Turtle file as statements, with the notation of its names."""
 
     statements: list[_Statement]
     prefixes: Mapping[str, str]
     said: dict[str, list[_Statement]] = field(default_factory=dict)
 
     def spell(self, iri: str) -> str:
-        """Return how an IRI is written in this file, and in its updates."""
+        """Return the notation of an IRI in this file and its updates."""
         for prefix, namespace in sorted(self.prefixes.items(), key=lambda pair: -len(pair[1])):
             local = iri.removeprefix(namespace)
             if iri.startswith(namespace) and LOCAL.fullmatch(local):
@@ -107,7 +107,7 @@ def convert(path: Path, form: Form) -> Converted:
     Raises
     ------
     KnowledgeError
-        It isn't Turtle, it or an import can't be read, or an update in it has a fault.
+        The file isn't Turtle, it or an import can't be read, or an update in it has a fault.
     """
     path = Path(os.path.realpath(path))
     if path.suffix != ".ttl":
@@ -226,7 +226,7 @@ def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> C
 def _exchange(
     file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
 ) -> None:
-    """Replace the parts of a behaviour in its statements; its own statements follow the first of them."""
+    """Replace the parts of a behaviour in its statements; the statements of the behaviour itself follow the first replaced one."""
     node = ox.NamedNode(iri)
     for number, statement in enumerate(file.said[iri]):
         rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]
@@ -292,7 +292,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Return whether the other form expresses a triple of a part, or omits it as the label of a condition."""
+    """Return whether the other form expresses a triple of a part, or may omit it because it is the label of a condition."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
@@ -371,7 +371,7 @@ def plainly(behavior: Behavior) -> object:
 
 
 def spans_of(behavior: Behavior) -> frozenset[object]:
-    """Return which conditions and effects of a behaviour aren't throughout, with their spans."""
+    """Return the conditions and effects of a behaviour that aren't throughout, with their spans."""
     if behavior.timing is None:
         return frozenset()
     asked = ((span, _plain([c])) for span, c in behavior.timing.conditions if span is not Span.THROUGHOUT)

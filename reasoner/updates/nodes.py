@@ -38,7 +38,7 @@ class Nodes:
     now: Update = field(default_factory=lambda: Update("", "", {}))
 
     def new(self, name: str, kind: str, at: int) -> str:
-        """Return a new node, named by a number."""
+        """Return a new node with a number in its name."""
         self.count[name] = self.count.get(name, 0) + 1
         node = f"{self.behavior}.{name}{self.count[name]:03}"
         self.said[node] = {TYPE: [INDIVIDUAL, CORE + kind]}
@@ -54,7 +54,7 @@ class Nodes:
         return node
 
     def negate(self, node: str) -> None:
-        """Negate a condition or effect, or take its negation away."""
+        """Negate a condition or effect; a negated one becomes positive."""
         if self.said[node].pop("negated", None) is None:
             self.said[node]["negated"] = ["true"]
 

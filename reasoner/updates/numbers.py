@@ -19,7 +19,7 @@ ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 
 @dataclass(frozen=True)
 class Measured:
-    """The amount of some individuals, or the number that a relation gives for them."""
+    """The amount of some individuals, or the number that a relation states for them."""
 
     kind: str
     of: str
@@ -27,7 +27,7 @@ class Measured:
 
     @property
     def properties(self) -> Properties:
-        """The properties that name it."""
+        """The properties that name the amount."""
         return {self.kind: [self.of], **argument_properties(self.terms)}
 
 

@@ -16,11 +16,11 @@ from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 @dataclass
 class Group:
-    """A group of patterns, without those that only introduce variables.
+    """A group of patterns, without the patterns that only introduce variables.
 
-    `chosen` are variables introduced with their type; `determined` those introduced as the value of a situation, each with
-    its type (a word), or the situation type if it has none, and its place; `numbers` those that denote a number, each with
-    the triple that gives it or the expression of its BIND.
+    `chosen` has the variables that are introduced with their type. `determined` has the variables that are introduced as the
+    value of a situation, each with its position and its type (a word), or the situation type if it has no type. `numbers` has
+    the variables that denote a number, each with the triple or the BIND expression that gives the number.
     """
 
     parts: list[Any] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Scope:
         The terms that the file declares besides the update.
     terms : mapping of variable to node
     kinds : mapping of node to (role, class, whether a witness seeks it)
-        Two things of one name become two nodes.
+        Two variables of one name become two nodes.
     prefixes : mapping of prefix to namespace
     numbers : mapping of variable to the triple or expression that gives its number
     """
@@ -80,7 +80,7 @@ class Scope:
                 self.nodes.said[iri]["index"] = [str(len(self.nodes.links["parameter"]))]
 
     def determine(self, group: Group) -> None:
-        """Make variables of the terms that value conditions determine."""
+        """Make terms of the variables that value conditions determine."""
         for name, (kind, at) in group.determined.items():
             iri = self.iri(kind) if isinstance(kind, Word) else kind
             self.bind(name, iri, "Variable", "", self.nodes.now.place(at))
@@ -143,7 +143,7 @@ class Scope:
         return found
 
     def begins(self, one: Triple, group: Group, known: Collection[str]) -> bool:
-        """Record a triple about new variables; return whether it has no other meaning."""
+        """Record a triple that introduces new variables; return whether the triple has no other meaning."""
         subject, value = one.subject, one.object
         if one.predicate == A:
             if subject.variable and isinstance(value, Word) and not value.variable and subject not in known:
@@ -168,13 +168,13 @@ class Scope:
 
 
 def variables_in(one: Triple) -> list[Word]:
-    """Return the variables of a triple, without that of its predicate."""
+    """Return the variables in the subject and the object of a triple."""
     said = one.object if isinstance(one.object, tuple) else (one.object,)
     return [word for word in (one.subject, *said) if isinstance(word, Word) and word.variable]
 
 
 def last_of(one: Triple) -> Said:
-    """Return the object of a triple, of a list its last part."""
+    """Return the object of a triple; if it is a list, return its last part."""
     return one.object[-1] if isinstance(one.object, tuple) else one.object
 
 

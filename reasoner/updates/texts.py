@@ -9,7 +9,7 @@ from typing import Any
 from confab.reasoner.names import local_name
 
 Ask = Callable[[str], Sequence[Sequence[Any]]]
-"""Returns the rows of a query."""
+"""Function that returns the rows of a query."""
 
 VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
   { ?term a/rdfs:subClassOf* :SituationType . BIND("situation" AS ?kind) OPTIONAL { ?term :valueProperty ?other } }
@@ -58,8 +58,8 @@ class Update:
 class Vocabulary:
     """The properties that an update can use, as IRIs.
 
-    `properties` maps a value property to its situation type; `functional` are those of one value at a time; `bare` are
-    the situation types without a property, whose names are used instead; `amounts` are the situation types, and `measures`
+    `properties` maps a value property to its situation type; `functional` has the properties with one value at a time. `bare`
+    has the situation types without a property; their names are used instead. `amounts` has the situation types, and `measures`
     the relations, that give numbers.
     """
 

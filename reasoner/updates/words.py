@@ -56,7 +56,7 @@ Value = Word | Truth | Number | tuple[Said, ...]
 
 @dataclass(frozen=True)
 class Triple:
-    """A pattern; its object is a tuple where it was written as a list, ``(?shelf true)``."""
+    """A triple pattern; an object that is written as a list, ``(?shelf true)``, is a tuple."""
 
     subject: Word
     predicate: Word
@@ -104,7 +104,7 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
     Raises
     ------
     UpdateError
-        It is no SPARQL update, or one that does something else than delete and insert.
+        The text is no SPARQL update, or an update with other operations than deletion and insertion.
     """
     write = "write DELETE { … } INSERT { … } WHERE { … }"
     tree = _tree("UpdateUnit", text, "update", write)[0]
@@ -130,7 +130,7 @@ def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
     Raises
     ------
     UpdateError
-        It is none, or one with more than one pattern in its head.
+        The text is no CONSTRUCT query, or has more than one pattern in its head.
     """
     prologue, tree = _tree("QueryUnit", text, "CONSTRUCT query", CONSTRUCT)
     if tree.name != "ConstructQuery" or tree.datasetClause or not tree.template:
@@ -181,7 +181,7 @@ def _tree(unit: str, text: str, what: str, write: str) -> Any:
     Raises
     ------
     UpdateError
-        It isn't of that language; the place is where reading it ends.
+        The text isn't of that language; the error has the position where parsing stopped.
     """
     try:
         return _grammar(unit).parse_string(text, parse_all=True)
@@ -296,7 +296,7 @@ def parts(group: Any) -> Sequence[Any]:
 
 
 def triples(block: Sequence[Any]) -> Iterator[Triple]:
-    """Yield the triples of a flat list of terms, lists put together again."""
+    """Yield the triples of a flat list of terms; lists in it become tuples."""
     cells: dict[object, list[Any]] = {}
     rows = [(block[i], block[i + 1], block[i + 2]) for i in range(0, len(block), 3)]
     for subject, predicate, value in rows:
@@ -331,7 +331,7 @@ def term(value: Any, at: int) -> Said:
     Raises
     ------
     UpdateError
-        It is something else.
+        It is of another kind.
     """
     if isinstance(value, Word):
         return value

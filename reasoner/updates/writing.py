@@ -1,7 +1,7 @@
 """A behaviour written as the SPARQL update that `confab.reasoner.updates.compiling` reads as the same behaviour.
 
-Parameters come first, each with its type; then one condition a line. The type of a determined variable follows the
-condition that determines it, unless every value of the situation is allowed.
+Parameters come first, each with its type; then one condition per line. The type of a determined variable follows the condition
+that determines it, unless every value of the situation is allowed.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from confab.reasoner.symbols import (
 
 CHANGES = {"increase": "+", "decrease": "-", "scale": "*"}
 Spell = Callable[[str], str]
-"""Returns the written form of an individual, class or property."""
+"""Function that returns the notation of an individual, class or property."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     situations : Situations
         By the names that the behaviour uses.
     spell : callable
-        Returns how a name is written, e.g. ``:cup1``; its truth values are `TRUE` and `FALSE`.
+        Returns the notation of a name, e.g. ``:cup1``; the truth values are `TRUE` and `FALSE`.
     labels : sequence of str
-        Of its preconditions, in order; they become comments.
+        Labels of the preconditions, in order; they become comments.
     """
     writer = _Writer(behavior, situations, spell)
     behavior = _by_their_class(behavior)
@@ -77,7 +77,7 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
     """Return the operations: conditions besides the preconditions, and effects; the first has no condition.
 
-    They are in the order of effects, which matters only if no effect makes a fact false.
+    The operations are in the order of the effects; the order matters only if no effect makes a fact false.
     """
     found: list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]] = [((), [])]
     for effect in (e for e in behavior.effects if e.value != FALSE):
@@ -247,7 +247,7 @@ class _Writer:
                 return " ".join([*patterns, compared])
 
     def number(self, expression: Expression, patterns: list[str], given: dict[Expression, str]) -> str:
-        """Return an expression over variables; the patterns that give them their amounts are added, unless they are there."""
+        """Return an expression over variables; missing patterns that give the variables their amounts are added."""
         match expression:
             case Fraction():
                 said = written(expression)
@@ -290,7 +290,7 @@ class _Writer:
             yield f"{self.put(value)} a {self.spell(kind)} ."
 
     def asked_of_class(self, term: str) -> bool:
-        """Return whether a condition on a term's class exists, whose line could be taken for the term's declaration."""
+        """Return whether there is a class condition on a term, whose line could be mistaken for its declaration."""
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
             for condition in self.behavior.conditions

@@ -104,8 +104,8 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     """Find values that behaviours or goals require and that are neither initial nor the effect of any behaviour.
 
-    A value that is unreachable only because another one is, is reported with that one. Behaviours without objects in the scene
-    belong to other scenes: neither they nor what depends on them is reported.
+    A value that is unreachable only because of another unreachable value is reported with the other value. Behaviours without
+    objects in the scene belong to other scenes: these behaviours, and values that depend on them, aren't reported.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -185,7 +185,7 @@ def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
 
 
 def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
-    """Return the behaviours that one needs, directly or indirectly."""
+    """Return the behaviours that a behaviour needs, directly or indirectly."""
     found, left = set[str](), [name]
     while left:
         left += (more := {*needs.get(left.pop(), ())} - found)
@@ -194,7 +194,7 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield groups of behaviours that depend on each other only: the causes of the other findings."""
+    """Yield groups of behaviours that depend only on each other: the causes of the other findings."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
@@ -227,13 +227,13 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
 
 
 def _words(condition: Condition, behavior: Behavior) -> str:
-    """Return the requirement of a condition, with classes in the place of its terms."""
+    """Return the requirement of a condition in words, with classes in place of its terms."""
     kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
     return said(substituted(condition, kinds)).replace("?", "")
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects of which no value is an effect on the next level."""
+    """Find effects none of whose values is an effect on the next level."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -14,7 +14,7 @@ from confab.reasoner.reading.problem import Reading
 from confab.reasoner.vocabulary import RDF
 
 Fault = tuple[str, str, str, str]
-"""A finding of a rule: node, what, why, remedy."""
+"""A finding of a rule: the node, the fault, its effect, and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Case:
 
     @cached_property
     def triples(self) -> Sequence[ox.Triple]:
-        """All triples of the graphs that planning begins with."""
+        """All triples of the graphs that planning reads."""
         names = [ox.NamedNode(BASE + name) for name in SCENE]
         return [quad.triple for name in names for quad in self.graph.store.quads_for_pattern(None, None, None, name)]
 

@@ -66,7 +66,7 @@ def dead(problem: Problem) -> frozenset[str]:
 
 
 def _clashes(behavior: Behavior, problem: Problem) -> Iterator[tuple[Clash, str]]:
-    """Yield conditions that exclude each other, with their place if it isn't the preconditions."""
+    """Yield conditions that exclude each other, with their place unless they are preconditions."""
     if clash := clashing(behavior.preconditions, problem, behavior.kinds):
         yield clash, ""
         return

@@ -87,7 +87,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
 
 
 def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
-    """Return why planning doesn't evaluate an axiom about a value property, unless the effects are at fault."""
+    """Return the reason that planning doesn't evaluate an axiom about a value property, unless effects are the cause."""
     name, what = local_name(prop), f"planning doesn't evaluate that {said}, since "
     nodes = {**schema.axioms, **schema.expressions}
     into = any(
@@ -118,7 +118,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
 
 
 def defined(case: Case) -> Iterator[Fault]:
-    """Report for each defined situation type whether it is static, or evaluated in every state and its dependencies."""
+    """Report for each defined situation type whether it is static; otherwise report the types on which its value depends."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -145,7 +145,7 @@ def defined(case: Case) -> Iterator[Fault]:
 
 
 def conclusions_outside_class(case: Case) -> Iterator[Fault]:
-    """Find rules that conclude a situation of an individual that can't have it, for example with swapped arguments."""
+    """Find rules whose conclusion is about an individual that can't have the situation, for example with swapped arguments."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -181,7 +181,7 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
 
 
 def both(case: Case, one: str, other: str) -> bool:
-    """Whether an individual is, or could be, in both of two sets of classes: some class is below both."""
+    """Return whether an individual is, or could be, in two sets of classes: whether some class is below both."""
     assert case.reading is not None
     problem = case.reading.problem
     if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
@@ -203,7 +203,7 @@ NOT_ENFORCED = {
 
 
 def axioms_not_watched(case: Case) -> Iterator[Fault]:
-    """Find axioms that restrict every state, or that classify without a definition: planning does neither."""
+    """Find axioms that restrict every state, or that classify without a definition: planning doesn't evaluate these."""
     if case.reading is None:
         return
     known = case.reading.schema.expressions

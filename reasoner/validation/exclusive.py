@@ -1,12 +1,12 @@
-"""The rule of exclusive values: behaviours must not give to two individuals what physics gives to one.
+"""The rule of exclusive values: behaviours must not give a value to two individuals if in physics only one can have it.
 
-The ontology declares these values (``e:exclusive`` of a perceiver): at most one hand holds an object. A behaviour that gives such
-a value keeps it exclusive in one of three ways, on each level separately:
+The ontology declares such values (``e:exclusive`` of a perceiver): at most one hand holds an object. A behaviour that gives an
+exclusive value keeps it exclusive in one of three ways, on each level separately:
 
 - *free*: its preconditions require that no individual has the value;
 - *handed over*: the individual that has the value loses it by the same behaviour;
-- *taken*: the value itself leaves a state in which no individual has it. A cup at a place is in no hand; picking it up takes it
-  from the place, and each behaviour that brings a cup to a place takes it from a hand.
+- *taken*: the value itself leaves a state in which no individual has it. (Example: a cup at a place is in no hand. Picking it
+  up takes the cup from the place, and each behaviour that brings a cup to a place takes it from a hand.)
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state of values in which no individual has them: ``situation(value)`` is in a class, or is one value."""
+    """A state in which no individual has a value: ``situation(value)`` is in a class, or has a given value."""
 
     situation: str
     kind: str
@@ -100,7 +100,7 @@ class _Exclusive:
             )
 
     def given(self, behavior: Behavior) -> Iterator[ValueEffect]:
-        """Yield the effects that give a value which isn't shared."""
+        """Yield the effects that give an unshared value."""
         for effect in behavior.effects:
             if effect.situation == self.situation and effect.value not in self.shared:
                 yield effect
@@ -134,7 +134,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the holder of an effect's value loses it, or is the one that gets it."""
+        """Return whether the holder of an effect's value loses the value, or is the individual that gets it."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)
@@ -151,7 +151,7 @@ class _Exclusive:
                     pass
 
     def releases(self, behavior: Behavior, when: Sequence[Condition], holder: str, value: str) -> bool:
-        """Return whether a behaviour gives the holder of a value another one whenever some conditions hold."""
+        """Return whether a behaviour gives the holder of a value another value whenever some conditions hold."""
         return any(
             (effect.situation, effect.arguments) == (self.situation, (holder,))
             and effect.value != value
@@ -187,7 +187,7 @@ class _Exclusive:
         )
 
     def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours after which an individual may have a value that is in such a state, with the effect."""
+        """Yield the behaviours, with the effect, that may give an individual a value in such a state."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):

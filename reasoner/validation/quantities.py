@@ -34,7 +34,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     }
 
     def unit(expression: Expression) -> tuple[str, str]:
-        """Return the unit of an amount (None if it has none, or any fits), and two units that don't match."""
+        """Return the unit of an amount (None if it has no unit, or every unit fits), and a pair of units that don't match."""
         match expression:
             case Amount(situation):
                 return units.get(situation, ""), ""
@@ -112,7 +112,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals without a number that a behaviour requires of their class: no behaviour can use them."""
+    """Find individuals that lack a number which a behaviour requires of their class: the behaviour can't use them."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -205,7 +205,7 @@ def _compares(behavior: Behavior) -> bool:
 
 
 class _Ranges:
-    """For each situation type the range of its amounts, over all individuals and all sequences of behaviours."""
+    """The range of amounts of each situation type, over all individuals and all sequences of behaviours."""
 
     def __init__(self, problem: Problem) -> None:
         self.quantities = {name: s.quantity for name, s in problem.domain.situations.items() if s.quantity is not None}

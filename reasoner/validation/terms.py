@@ -71,7 +71,7 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return the nodes that name an undeclared term, and those that name these nodes: their other faults may be consequences."""
+    """Return the nodes that name an undeclared term, and the nodes that name these: their other faults may be consequences."""
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value

@@ -60,17 +60,19 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""Rules that are silent about a node with an undeclared term, and about nodes that name it: they may hold once the name is
-corrected."""
+"""Rules that are skipped for a node with an undeclared term, and for nodes that name it.
+
+After the correction there may be no finding.
+"""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
-"""Checks that are silent about a node with a finding of another check, whose remedy could make theirs worse."""
+"""Checks that are skipped for a node with a finding of another check, because the other remedy comes first."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
 """Checks that report facts or bounds, as `impossible-situation` does."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
-"""Rules that depend on the initial situation: they wait until its facts are correct."""
+"""Rules that depend on the initial situation; they are skipped until its facts are correct."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach", "no-value"}
-"""Rules that are silent as long as the text of some behaviour or rule can't be read."""
+"""Rules that are skipped as long as the text of some behaviour or rule can't be read."""
 
 MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_checks.RULES
 """Rules on an embodiment."""
@@ -78,7 +80,7 @@ MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_chec
 STAGES = 4
 """Rules on a file."""
 QUICK = 100_000
-"""Maximum number of triples for which errors are looked for during planning."""
+"""Maximum number of triples of a graph that is checked for errors during planning."""
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
@@ -103,8 +105,8 @@ def validate(
     Returns
     -------
     list of Finding
-        In order of file and line, undeclared terms first; empty if the ontology has no faults. Those that aren't `serious` are
-        warnings.
+        In order of file and line, undeclared terms first; empty if the ontology has no faults. Findings that aren't `serious`
+        are warnings or remarks.
 
     Raises
     ------
@@ -197,7 +199,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
 
 def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
-    """Return some behaviours and those that extend them, whose updates can't be read without theirs."""
+    """Return some behaviours and the behaviours that extend them; the updates of the latter can't be read without the former."""
     pairs = [(text(one), text(other)) for one, other in graph.select("SELECT ?one ?other { ?one :extends ?other }")]
     found = set(behaviors)
     while more := {one for one, other in pairs if other in found} - found:
