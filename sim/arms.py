@@ -27,7 +27,8 @@ DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 class Arm:
     """An arm with its hand, at the zero posture in world coordinates, and its posture at rest.
 
-    `wrist` is where the two axes before the last one meet; in an arm without a closed form it is a point of the last joint.
+    `wrist` is the intersection of the two axes before the last one. In an arm without a closed form it is a point of the last
+    joint.
     """
 
     joints: tuple[str, ...]
@@ -72,7 +73,7 @@ class Arm:
 
     @cached_property
     def hang(self) -> Array:
-        """Direction of the elbow at swivel 0: down, or up for an arm whose upper arm stands up at the zero posture."""
+        """Direction of the elbow at swivel 0: down; up if the upper arm points up at the zero posture."""
         return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
 
     @cached_property
@@ -105,7 +106,7 @@ def read_arm(
 ) -> Arm:
     """Return the arm of `joints` that ends in link `tip`, in which the hand's frame is `turned` by roll, pitch and yaw.
 
-    Its posture at rest is `home`, else the middle of the joints' limits.
+    Its posture at rest is `home`; if that is empty, the middle of the joints' limits.
 
     Raises
     ------
@@ -150,7 +151,7 @@ def read_arm(
 
 
 def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
-    """Return shoulder, elbow and wrist of an arm whose neighbouring axes meet at right angles (closed form), else None."""
+    """Return shoulder, elbow and wrist if neighbouring axes of the arm meet at right angles (closed form); otherwise None."""
     if len(axes) != 7 or any(abs(axes[i] @ axes[j]) > 1e-6 for i, j in ((0, 1), (1, 2), (4, 5), (5, 6))):
         return None
     shoulder, wrist = _meeting(origins[:3], axes[:3]), _meeting(origins[4:6], axes[4:6])
@@ -169,7 +170,7 @@ def _meeting(origins: Array, axes: Array) -> Array | None:
 
 
 def cross_matrix(axis: Array) -> Array:
-    """Return the matrix (3, 3) that takes a vector to its product ``axis x vector``."""
+    """Return the matrix (3, 3) that maps a vector to the product ``axis x vector``."""
     x, y, z = axis
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

@@ -34,16 +34,19 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
+"""Margin in metres on short lines whose ends were chosen with the full margin; the load may have slipped a little since then."""
 
 TOPPLED = 0.5
-"""Tilt in radians from which on a body counts as toppled."""
+"""Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
 """Minimum distance in metres of a pose that counts as unreachable for the hand."""
 
 TIGHT = (0.006, 0.004, 0.003)
-"""Margins in metres tried in turn where the full one leaves no candidate; above `CLOSE`, since the load may slip on the way."""
+"""Margins in metres that are tried in turn if the full margin leaves no candidate.
+
+Above `CLOSE`, since the load may slip on the way.
+"""
 
 ROUNDED = 3
 """Maximum number of samples on either side over which corners of a path are rounded."""
@@ -61,7 +64,7 @@ FINER = 4
 """Factor by which a line that ends at a guard is sampled more finely than others."""
 
 BATCH, ENOUGH = 24, 6
-"""Number of candidates checked for collisions at a time, and number of free ones that end the check."""
+"""Number of candidates that are checked for collisions at a time, and number of free candidates that end the check."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class Attempt:
 
     @classmethod
     def begin(cls, world: Engine, hand: str) -> Attempt:
-        """Return the attempt of a hand that begins now."""
+        """Return a new attempt of a hand."""
         before = {}
         for name in world.bodies:
             carrier = world.carried_by(name)
@@ -93,7 +96,7 @@ class Attempt:
         return replace(self, held=None)
 
     def body(self, name: str) -> str:
-        """Return the name of a body that is in the world and whose pose is known, else raise `SkillError`."""
+        """Return the name of a body; raise `SkillError` if it isn't in the world, or its pose is unknown."""
         if name not in self.world.bodies or not self.world.knows(name):
             raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen", seen=0.0)
         return name
@@ -122,7 +125,7 @@ class Attempt:
     def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None) -> list[int]:
         """Return the numbers of candidates whose stages are all reachable and free, the most comfortable first.
 
-        With `opening`, the fingers are assumed to be open by that many metres, as after a release.
+        `opening` is the assumed opening of the fingers in metres, as after a release.
 
         Raises
         ------
@@ -166,7 +169,7 @@ class Attempt:
         )
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
-        """Return the candidates' costs: for cramped postures, for pointing aside and for the distance from the present pose."""
+        """Return the costs of candidates: for cramped postures, for pointing aside, and for the distance from the present pose."""
         arm, now = self.hand.arm, self.hand.pose
         ahead = np.arctan2(*(poses[:, :2] - arm.shoulder[:2]).T[::-1])
         cost: Array = np.sum([comfort(arm, q) for q in postures], axis=0)
@@ -208,7 +211,7 @@ class Attempt:
     ) -> int:
         """Move along a free path to one of the goal poses, the first if possible; return its number.
 
-        With `opening`, the fingers are assumed to be open by that many metres.
+        `opening` is the assumed opening of the fingers in metres.
         """
         with self.planning():
             reacher = self.reacher(*ignored, opening=opening, whole=True)
@@ -237,7 +240,7 @@ class Attempt:
         return reached[0]
 
     def _withdraw(self, q: Array) -> None:
-        """Move back along the postures passed so far, after something has stopped the arm."""
+        """Move back along the postures that the arm has passed before it was stopped."""
         now = self.hand.measured()
         self.hand.command(now)
         passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
@@ -253,7 +256,7 @@ class Attempt:
     ) -> None:
         """Move along the straight line to a pose, or until `stop` returns true; raise `SkillError` if the line isn't free.
 
-        With `stop`, the line only has to be free at its beginning. Without it, the elbow may turn on the way.
+        With `stop`, the line only has to be free at its beginning. Without `stop`, the elbow may turn on the way.
         """
         start = self.hand.pose
         if stop is not None:
@@ -306,7 +309,7 @@ class Attempt:
     # ------------------------------------------------------------------------------------------------- checks
 
     def check_others(self, numbers: Numbers, *moved: str) -> None:
-        """Raise `SkillError` if a body other than the `moved` and the held one was shifted or toppled."""
+        """Raise `SkillError` if a body was shifted or toppled, except for the `moved` body and the held body."""
         for name, (carrier, position, tilt) in self.before.items():
             if name in (*moved, self.held, *self.world.moved_by_others) or name not in self.world.bodies:
                 continue
@@ -320,7 +323,10 @@ class Attempt:
                 raise SkillError("object disturbed", (name,), message, moved_m=shift)
 
     def check_grip(self, numbers: Numbers) -> dict[str, float]:
-        """Return how far the held object has slipped since the grasp; raise `SkillError` if it slipped too far or is lost."""
+        """Return the distance that the held object has slipped since the grasp.
+
+        Raise `SkillError` if it slipped too far or is lost.
+        """
         if self.held is None or self.hand.grasp is None:
             return {}
         if self.held not in self.world.bodies:

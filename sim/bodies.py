@@ -1,9 +1,8 @@
-"""Bodies of the world: their shape, mass and appearance.
+"""Bodies of the world: their shape, mass and appearance. `KINDS` has a `ShapeKind` for each kind of shape.
 
-`KINDS` has a `ShapeKind` for each kind of shape: the function that makes it in PyBullet, and the cylinder that represents it in
-motion planning. A vessel is a wall of revolution. Its collision shape is a bottom cylinder and a ring of flat boxes for each
-segment of the profile; its visual shape is a smooth mesh. Metres and kilograms; a body's frame has its origin in the middle of the
-base, z up.
+The function that creates the body in PyBullet, and the cylinder that represents the body in motion planning. A vessel is a wall
+of revolution. Its collision shape is a bottom cylinder and a ring of flat boxes for each segment of the profile; its visual
+shape is a smooth mesh. Metres and kilograms; a body's frame has its origin in the middle of the base, z up.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
 
 STEP = 0.001
-"""Maximum height in metres of a segment of a turned solid's outline that is a mere step and gets no cylinder."""
+"""Maximum height in metres of a segment in the outline of a turned solid that gets no cylinder because it is only a step."""
 
 SIDES = 40
 """Number of corners of a circle in a visual mesh."""
@@ -69,7 +68,7 @@ def inner_radius(shape: Shape, height: Array) -> Array:
 
 
 def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a vessel from a generated URDF: PyBullet's compound shapes have at most 16 parts, a vessel's wall has more."""
+    """Make a vessel from a generated URDF, since PyBullet's compound shapes have at most 16 parts and a wall has more."""
     planks = [*_planks(shape)]
     base = shape.profile[0][1] + wall(shape)
     inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
@@ -92,8 +91,8 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
 def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
     """Load a URDF given as text, with an optional OBJ mesh that the URDF refers to by `file_name`; return the body.
 
-    The files are temporary. PyBullet caches files by name for good, so equal texts get equal names: new names would cost 50 KB a
-    vessel.
+    The files are temporary. Equal texts get equal names, since PyBullet caches files by name for ever: new names would cost 50
+    KB per vessel.
     """
     with _LOADING:
         folder = Path(tempfile.gettempdir()) / _folder(os.getpid())
@@ -141,7 +140,10 @@ PLANK = """<collision>
 
 
 def _planks(shape: Shape) -> Iterator[str]:
-    """Yield the wall's boxes as URDF text, a ring per segment of the profile, in short lines as PyBullet's parser requires."""
+    """Yield the boxes of the wall as URDF text, a ring for each segment of the profile.
+
+    Lines are short, as PyBullet's parser requires.
+    """
     thickness = wall(shape)
     for (low, r_low), (high, r_high) in pairwise(shape.profile):
         radius = (r_low + r_high) / 2 + thickness / 2
@@ -181,7 +183,7 @@ def _revolved(shape: Shape) -> str:
 
 
 def make_turned(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a solid of revolution, such as a lid with a knob: a cylinder per segment of its outline."""
+    """Make a solid of revolution, such as a lid with a knob, from one cylinder per segment of its outline."""
     lines = []
     for (low, below), (high, above) in pairwise(shape.profile):
         if high - low <= STEP:

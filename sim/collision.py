@@ -21,7 +21,7 @@ EDGE, BETWEEN = 0.004, 0.02
 """Radius of the spheres along the lower edge of a load, and distance between neighbours, in metres."""
 
 POINTS = 4000
-"""Number of points whose distances are computed at once; larger arrays no longer fit the processor's cache."""
+"""Number of points whose distances are computed at once; larger arrays don't fit into the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,10 @@ class Mover:
 
 
 def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
-    """Return for which of n postures the spheres (m,) at centres (n, m, 3) keep the margin; faster than `clearances`."""
+    """Return a flag for each of n postures: True if the spheres (m,) at centres (n, m, 3) keep the margin.
+
+    It is faster than `clearances`.
+    """
     some = max(POINTS // max(len(radii), 1), 1)
     return np.concatenate(
         [_free(centers[i : i + some], radii, around, margin) for i in range(0, max(len(centers), 1), some)]
@@ -170,7 +173,7 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
 
 
 def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the boxes `low` to `high` (m, 3) that meet any box `bottom` to `top` (s, 3), and those of the latter that are met.
+    """Return the boxes `low` to `high` (m, 3) and the boxes `bottom` to `top` (s, 3) that meet a box of the other group.
 
     Most spheres of an arm on a path are far from most obstacles, so this filter pays.
     """
@@ -208,7 +211,7 @@ def box(fixture: Fixture) -> Solid:
 def read_mover(model: UrdfModel, arm: Arm, openings: Mapping[str, float]) -> Mover:
     """Return the arm's moving spheres, with finger joints at `openings` (metres).
 
-    The links between the first and second joint are left out: they turn on the spot and touch the arm's mount.
+    The links between the first and the second joint are left out, since they turn on the spot and touch the mount of the arm.
     """
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():

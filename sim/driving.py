@@ -28,13 +28,16 @@ MARGIN = 0.02
 """Margin in metres between a driving robot and its obstacles."""
 
 RAMP_SECONDS = 0.8
-"""Seconds in which a base reaches its speed; slow enough that no load slips and no full cup spills."""
+"""Seconds in which a base reaches its speed, so slowly that no load slips and no full cup spills."""
 
 STOPPED_LAG = 0.03
-"""Lag in metres or radians behind its command from which on a base counts as stopped."""
+"""Minimum lag in metres or radians behind its command of a base that counts as stopped."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
-"""Distances in metres, tried in turn, by which a robot backs off before it turns, and from which it approaches its goal."""
+"""Distances in metres that are tried in turn.
+
+The robot backs off by the distance before it turns, and approaches its goal from this distance.
+"""
 
 SAMPLES = 600
 """Maximum number of samples in the search for a path."""
@@ -62,7 +65,7 @@ class Roller:
         return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the base's x, y, yaw at poses, and that all are within reach."""
+        """Return x, y and yaw of the base at poses, and flags that all poses are within reach."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
     def free(self, q: Array) -> Flags:
@@ -70,7 +73,7 @@ class Roller:
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
-        """Return the base's x, y, yaw along poses, or None if the robot touches something there."""
+        """Return x, y and yaw of the base along poses; None if the robot touches something."""
         q = poses[:, BASE]
         return q if self.free(q).all() else None
 
@@ -92,7 +95,7 @@ class Roller:
             yield np.stack([ends[0], turned, ends[1]])
 
     def blame(self, poses: Array) -> Blocked:
-        """Return the obstacles along poses."""
+        """Return the obstacles that the robot touches along poses."""
         gaps = {
             name: float(gap.min()) for name, gap in clearances(self.at(poses[:, BASE]), self.radii, self.around).items()
         }

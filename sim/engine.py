@@ -32,9 +32,10 @@ RATE = 240.0
 """Simulation steps per second."""
 
 CONTACT_SHIFT = 0.005
-"""Metres that two bodies may shift along each other before Bullet drops their contact and detects it anew.
+"""Distance in metres that two bodies may shift along each other before Bullet drops their contact and detects it again.
 
-Bullet's default of 2 cm suits larger bodies: a finger that has left a ledge would still press where the ledge was.
+Bullet's default of 2 cm is for larger bodies: with it, a finger that has left a ledge would still press at the position of the
+ledge.
 """
 
 LAG = 0.08
@@ -44,7 +45,7 @@ LOOKS = 6
 """Number of noisy measurements whose mean is a perceived position."""
 
 STEADY = 5.0
-"""Standard deviations of the perceived position within which a body counts as unmoved."""
+"""Number of standard deviations of the perceived position within which a body counts as unmoved."""
 
 NEAR_PLACE = 0.05
 """Maximum distance in metres between a place and a body that is at it."""
@@ -173,7 +174,7 @@ class Engine:
     def check_course(self, hand: Manipulator) -> None:
         """Raise `SkillError` if the skill's time limit has passed, or if a joint lags too far behind its command.
 
-        In the second case the error names the bodies that the arm touches, else the hand.
+        In the second case the error names the bodies that the arm touches; if there are none, the hand.
         """
         if self.steps > hand.deadline:
             raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)
@@ -182,7 +183,7 @@ class Engine:
             raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
 
     def touching(self, hand: Manipulator) -> tuple[str, ...]:
-        """Return the bodies in contact with a hand's robot, with the held body or with a body that the robot touches.
+        """Return the bodies in contact with the robot of a hand, with the held body, or with a body that the robot touches.
 
         The held body itself is left out.
         """
@@ -201,7 +202,7 @@ class Engine:
         return [contact for contact in found if contact[2] != body]
 
     def _contacts(self, body: int) -> set[str]:
-        """Return the names of the bodies and links that press against a body."""
+        """Return the names of the bodies and links in contact with a body."""
         found = {self.name_of(contact[2], contact[4]) for contact in self.contacts(body) if contact[9] > 0.5}
         return found - {""}
 
@@ -302,7 +303,7 @@ class Engine:
         return frame @ turned, origin + frame @ base
 
     def _cameras(self) -> Array:
-        """Return the cameras' positions (n, 3): those of the scene, else two over the shoulders of each robot."""
+        """Return the positions (n, 3) of the cameras: those of the scene; if it has none, two over the shoulders of each robot."""
         if self.embodiment.cameras:
             return np.array(self.embodiment.cameras)
         found = []
@@ -329,9 +330,10 @@ class Engine:
         return self.noise / float(np.sqrt(LOOKS))
 
     def look(self, before: int = 0) -> None:
-        """Draw new perception errors: for each mechanism until the next look, for each body until the next simulation step.
+        """Draw new perception errors.
 
-        The errors are means over several measurements; after `before` earlier looks at an unchanged world, means over all of them.
+        The error of a mechanism holds until the next look, the error of a body until the next simulation step. Errors are means
+        over several measurements; after `before` earlier looks at an unchanged world, they are means over all looks.
         """
         seen = {name: error for name, (steps, error) in self.errors.items() if before and steps == self.steps}
         self.errors.clear()
@@ -380,7 +382,10 @@ class Engine:
         return base + rotation[:, 2] * height_of(self.bodies[name].shape)
 
     def nearest_place(self, point: Array) -> tuple[str, float]:
-        """Return the horizontally nearest place to a point, and its distance; of places above one another, the next below it."""
+        """Return the horizontally nearest place to a point, and its distance.
+
+        Of several places above one another, the next one below the point is returned.
+        """
         points = {name: self.place(name) for name in self.embodiment.places}
         gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
         below = {name: float(point[2] - where[2]) for name, where in points.items()}
@@ -390,7 +395,7 @@ class Engine:
         return best, gaps[best]
 
     def acting(self, roles: Mapping[str, str]) -> str:
-        """Return the hand of a skill's roles, else the first hand of its robot; an empty string if the roles have neither."""
+        """Return the hand in the roles of a skill, or the first hand of the robot in them; an empty string if there is neither."""
         own = (name for name, hand in self.hands.items() if hand.robot.name == roles.get("robot"))
         return roles.get("hand") or next(own, "")
 
@@ -403,7 +408,7 @@ class Engine:
         return None
 
     def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> list[Bead]:
-        """Return the beads, of one filling or all, inside a vessel at its true pose, or its perceived one if `sensed`."""
+        """Return the beads (of one filling, or all) inside a vessel at its true pose; with `sensed`, at its perceived pose."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
@@ -490,7 +495,10 @@ class Engine:
         return rotation.T @ turned, rotation.T @ (base - point)
 
     def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
-        """Return spheres for a held body in the hand's frame; the lowest centimetres, which may touch a table, only if `whole`."""
+        """Return spheres for a held body in the hand's frame.
+
+        The lowest centimetres, which may touch a table, are included if `whole`.
+        """
         shape = self.bodies[body].shape
         rotation, base = self.in_hand(hand, body)
         spheres = column(*outline(shape), bottom=outer_radius(shape) / 3 if whole else min(0.03, height_of(shape) / 3))

@@ -1,4 +1,6 @@
-"""Faults to plant in a world, so that tests see verification detect them: pass one to `confab.sim.verify.verify` as `prepare`.
+"""Faults that tests plant in a world to see that verification detects them.
+
+Pass a fault to `confab.sim.verify.verify` as `prepare`.
 
 Each function of the table below returns a `PlantedFault`, which can be sent to another process. A fault that may occur during a
 task takes `step`, the number of a primitive, and `seconds` after the beginning of that primitive.
@@ -93,7 +95,7 @@ def later(world: Engine, step: int, seconds: float, act: Callable[[Engine], None
 def hidden_wall(
     world: Engine, before: str, distance: float = 0.075, size: tuple[float, float, float] = (0.02, 0.12, 0.16)
 ) -> None:
-    """Put up a wall that the robot does not perceive, `distance` metres on the robot's side of an object or place.
+    """Put up a wall that the robot does not perceive, at `distance` metres from an object or place, on the robot's side.
 
     `size` is its extent in metres along the line from robot to object, across it, and up.
     """

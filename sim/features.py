@@ -1,7 +1,7 @@
 """Grasp features of things as frames, and the hand's candidate turns at them.
 
-In a feature's frame, x is the fingers' direction, y leads from finger to finger, and z is the axis that the fingers close around.
-A hand always points level. That allows every turn about z if z is upright, else at most two.
+In a feature's frame, x is the fingers' direction, y leads from finger to finger, and z is the axis that the fingers close
+around. A hand always points horizontally. This allows every turn about z if z is vertical, otherwise at most two turns.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 AROUND = 2 * np.pi - 0.01
-"""Range in radians from which on a hand may turn all the way round."""
+"""Minimum range in radians that counts as a full turn."""
 
 TURNS = 13
 """Number of turns tried about an upright bar with limited range."""
@@ -50,7 +50,7 @@ class FeatureFrame:
         return np.array([angle for angle in self.level() if self.low - 1e-6 <= angle <= self.high + 1e-6])
 
     def level(self) -> tuple[float, float]:
-        """Return the two angles about a z that isn't upright at which x is level."""
+        """Return the two angles about z at which x is horizontal, for a z that isn't vertical."""
         angle = float(np.arctan2(-self.rotation[2, 0], self.rotation[2, 1]))
         return angle, float(np.angle(np.exp(1j * (angle + np.pi))))
 
@@ -103,7 +103,7 @@ def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] 
 
 
 def touched(engine: Engine, name: str, feature: str) -> tuple[str, ...]:
-    """Return the parts of a link that a hand touches at a feature; for anything else its name."""
+    """Return the parts of a link that a hand touches at a feature; for an object or a place, return its name."""
     if name in engine.links:
         found: Feature | None = engine.links[name].link(name).features.get(feature)
         return found.parts if found is not None else ()

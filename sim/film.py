@@ -44,16 +44,19 @@ VIEWS = (
     *((around, DOWN) for around in (0.8, -0.8, 1.6, -1.6, 2.2, -2.2)),
     *((around, 0.08) for around in (1.6, -1.6, 2.2, -2.2)),
 )
-"""Cameras of which the one that sees most participants shows a primitive: radians around the tables, and downwards as a tangent."""
+"""Cameras: radians around the tables, and the tangent of the angle downwards.
+
+The camera that sees most participants shows a primitive.
+"""
 
 ABOVE = 0.01
-"""Metres above a place or an object's top of the point that has to be visible for its name to be written."""
+"""Height in metres, above a place or the top of an object, of the point that has to be visible for the name to be written."""
 
 NEARLY = 0.97
-"""Share of the way to a point of a link from which on a ray has reached the handle, and not another side of the furniture."""
+"""Minimum share of the distance to a point of a link at which a ray has reached the handle, and not other furniture."""
 
 STACKED = 3
-"""Number of rows of names, one above another, where they would overlap."""
+"""Number of rows in which names are stacked if they would overlap."""
 
 DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
 
@@ -70,8 +73,8 @@ class Film:
     titles : mapping of path to text
         Captions of steps by their position in the plan's tree. Steps above the primitives without a caption are left out.
     camera : Camera, optional
-        By default one that shows the table, with pictures of `width` by `height` pixels (divisible by 16); another one farther
-        around the table where something hides the objects and handles of a primitive.
+        By default a camera that shows the table, with pictures of `width` by `height` pixels (divisible by 16). If something
+        hides the objects and handles of a primitive, a camera farther around the table is used.
     frames : int
         Frames per second of the film.
     speed : float
@@ -79,7 +82,7 @@ class Film:
     stills : str or Path, optional
         Folder for a PNG per primitive, taken at its end.
     names : mapping of name to text, optional
-        Displayed names of places and objects; the others keep their own.
+        Displayed names of places and objects; others are displayed with their own names.
     """
 
     def __init__(
@@ -146,7 +149,7 @@ class Film:
         return self._caption(self._named(picture(world, self.camera), world), world.current)
 
     def _turn_to_action(self, world: Engine) -> None:
-        """Choose the camera that sees most participants of the present primitive, the present one if none sees more."""
+        """Choose the camera that sees most participants of the present primitive; keep the present camera if none sees more."""
         if not self._views:
             size = self.width, self.height, BAR
             self._views = [view_of(world.embodiment, *size, around, down) for around, down in VIEWS]
@@ -193,7 +196,7 @@ class Film:
         self._writer.append_data(image)
 
     def _named(self, image: Array, world: Engine) -> Array:
-        """Write the names of visible places below them, and of visible objects above them, none over another."""
+        """Write the names of visible places below them, and the names of visible objects above them, without overlap."""
         if self.width < NAMED or self.camera is None:
             return image
         canvas = Image.fromarray(image)
@@ -246,7 +249,10 @@ class Film:
 
 
 def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
-    """Return points of a place, of an object's top, or of a link's features, each with the name; none of anything else."""
+    """Return the points of a place, of the top of an object, or of a link's features, each with the name.
+
+    None for other individuals.
+    """
     if name in world.embodiment.places:
         return [(world.place(name) + np.array([0.0, 0.0, ABOVE]), name)]
     if name in world.bodies:
@@ -262,7 +268,7 @@ def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
 
 
 def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
-    """Return whether nothing is between a camera and a point but the named thing itself, or what stands at the named place."""
+    """Return whether only the named thing, or an object at the named place, is between a camera and a point."""
     hit = pybullet.rayTest(camera.eye, point.tolist(), physicsClientId=world.client)[0]
     if hit[0] < 0:
         return True

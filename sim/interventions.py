@@ -1,4 +1,4 @@
-"""Interventions on the bodies of a physical world: what a person does to objects, vessels and links."""
+"""Interventions on the bodies of a physical world: actions of a person on objects, vessels and links."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def put(world: PhysicsWorld, name: str, base: Array, orientation: Sequence[float
 
 
 def push(world: PhysicsWorld, name: str, by: Sequence[float]) -> None:
-    """Push a standing object with its contents by metres along x and y; one that a hand holds stays where it is."""
+    """Push a standing object with its contents by metres along x and y; a held object isn't moved."""
     if name in world.bodies and not any(world.held(hand) == name for hand in world.hands):
         orientation = pybullet.getBasePositionAndOrientation(world.bodies[name].body, physicsClientId=world.client)[1]
         put(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)
@@ -126,11 +126,11 @@ HANDLED: Mapping[InterventionKind, Callable[[PhysicsWorld, str, Sequence[float]]
     InterventionKind.KNOCK: knock,
     InterventionKind.PUSH: push,
 }
-"""By kind of intervention: the function that does it to an object."""
+"""The function that applies each kind of intervention to an object."""
 
 DISTURBERS: Mapping[str, Callable[[PhysicsWorld, PerceiverUse, Symbol, str], None]] = {
     "perceive_place": move,
     "perceive_content": fill,
     "perceive_joint": push_joint,
 }
-"""By perceiver: the function that makes a value of its situation types true."""
+"""The function that makes a value of a perceiver's situation types true, by perceiver."""

@@ -1,12 +1,12 @@
-"""Inverse kinematics: the posture for a pose of the hand, in closed form where the arm has one, else numerically.
+"""Inverse kinematics: the posture for a pose of the hand, in closed form if the arm has one, otherwise numerically.
 
-An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A pose of the hand leaves it
-one degree of freedom, the *swivel*. There are two kinds. If all three axes of the wrist meet (KUKA's iiwa), the swivel is the
-elbow's angle about the line from shoulder to wrist. At 0 the elbow hangs down, or is up if the arm rises from its shoulder at the
-zero posture, as on a table. If the last axis misses the point where the two before it meet (Franka's Panda), the swivel is the
-angle of the last joint from the middle of its limits, less the hand's roll, which that joint makes; given it, the other six joints
-have a closed form. `confab.sim.numeric` solves all other arms. With seven joints the swivel is the angle of the third; with six
-it is always 0.
+An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A pose of the hand
+leaves it one degree of freedom, the *swivel*. There are two kinds. If all three axes of the wrist meet (KUKA's iiwa), the
+swivel is the elbow's angle about the line from shoulder to wrist. At 0 the elbow hangs down, or is up if the arm rises from its
+shoulder at the zero posture, as on a table. If the last axis misses the intersection of the two axes before it (Franka's
+Panda), the swivel is the angle of the last joint from the middle of its limits, minus the hand's roll, which that joint makes.
+For a given swivel the other six joints have a closed form. `confab.sim.numeric` solves all other arms. With seven joints the
+swivel is the angle of the third; with six it is always 0.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
 shoulder, elbow, wrist.
@@ -21,7 +21,7 @@ from confab.sim.numeric import REDUNDANT, solved
 from confab.sim.urdf import Array
 
 STRETCHED = 0.9999
-"""Largest cosine of the angle between a joint and the point where its two solutions meet, at which they still differ."""
+"""Maximum cosine of a joint's angle, from the point where its two solutions meet, at which the solutions still differ."""
 
 
 def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Flags]:
@@ -34,16 +34,18 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     margin : float
         Distance in radians that every joint keeps from its limits.
     fold : float
-        Distance in radians that a joint keeps from the point where its two solutions meet, beyond which the hand is out of reach.
+        Distance in radians that a joint keeps from the point where its two solutions meet; beyond that point the hand is out of
+        reach.
 
     Returns
     -------
     q : array (n, k), radians
         Meaningless where not valid.
     valid : array (n,) of bool
-        The point is in reach and every joint within its limits. Only one of the two postures of a spherical joint is considered, so
-        that neighbouring poses have neighbouring postures: the one with the middle joint within ±90°; with parallel axes, the one
-        farther from the limits; without a closed form, the one that the arm reaches when it is led from rest.
+        The point is in reach and every joint within its limits. Only one of the two postures of a spherical joint is
+        considered, so that neighbouring poses have neighbouring postures. It is the posture with the middle joint within ±90°;
+        with parallel axes, the posture farther from the limits; without a closed form, the posture that the arm reaches when it
+        is led from rest.
     """
     if not arm.closed:
         return solved(arm, r, p, swivel, margin, fold)
@@ -144,7 +146,7 @@ def _phase(axis: Array, a: Array, b: Array) -> float:
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
-    """Return both angles (n, 2) about an axis at which `b` (3,), turned, has the given product with `a` (n, 3), and which exist.
+    """Return both angles (n, 2) about an axis at which `b` (3,) has a given product with `a` (n, 3), and which of them exist.
 
     An angle exists if the cosine that determines it is below `most`.
     """

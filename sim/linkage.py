@@ -16,7 +16,7 @@ from confab.sim.collision import Solid
 from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 
 WIDER = 0.25
-"""Share of the range from `opened` to a joint's upper limit by which the joint is opened further."""
+"""Share of the range from `opened` to the upper limit by which a joint is opened beyond `opened`."""
 
 HERE = np.zeros(3)
 
@@ -64,7 +64,7 @@ def open_values(mechanism: Mechanism) -> dict[str, float]:
 
 
 def wide(link: Link) -> float:
-    """Return the value to which a joint is opened, somewhat beyond the value from which on it counts as open.
+    """Return the value to which a joint is opened, somewhat beyond the value at which it counts as open.
 
     >>> wide(Link("lid", "revolute", opened=1.2, upper=1.6))
     1.3

@@ -1,9 +1,9 @@
 """A physical world with interventions, in which the executive acts (`confab.planner.acting.executive`).
 
-Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents.
-Rule 2: an intervention that changes an object of the running primitive stops the primitive.
-Rule 3: a hand at a position without a fact, or an empty tilted hand, is brought upright and lifted before facts are observed.
-Rule 4: an object that stands at no place of the scene gets a spot (`confab.sim.lookout`).
+Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents. Rule 2: an intervention that
+changes an object of the running primitive stops the primitive. Rule 3: before facts are observed, a hand whose position no fact
+can state, or an empty tilted hand, is brought upright and lifted. Rule 4: an object that stands at no place of the scene gets a
+spot (`confab.sim.lookout`).
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
 STOPPED = 0.02
-"""Lag in radians of a joint behind its command from which on its arm counts as stopped."""
+"""Minimum lag in radians of a joint behind its command at which the arm counts as stopped."""
 
 UPRIGHT = 0.1
 """Maximum tilt in radians of an upright hand."""
 
 PAUSE = 60
-"""Simulation steps after an intervention in which bodies come to rest."""
+"""Number of simulation steps after an intervention in which bodies come to rest."""
 
 
 class LiveWorld:
@@ -49,7 +49,7 @@ class LiveWorld:
     classes : mapping of class to individuals
         An object that an intervention adds gets the shape of an object of its class.
     problem : Problem, optional
-        The problem with which interventions are checked; without it, there are no discoveries.
+        The problem against which interventions are checked; without a problem, there are no discoveries.
     reaching : str
         The relation of reach facts, for spots that are discovered.
     """
@@ -164,7 +164,7 @@ class LiveWorld:
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a hand with a load upright and up, or an empty one home, as far as possible."""
+        """Bring a loaded hand upright and up, or an empty hand home, as far as possible."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):

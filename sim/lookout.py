@@ -1,8 +1,8 @@
 """Discoveries of a live world: objects that no fact mentions, and spots that are no places of the scene.
 
-A *spot* is a place that is created on demand: for an object that stands at none of the scene's places, or where there is
-room on the furniture to put something down. It belongs to the classes that all places of the scene have in common, and shares the
-static facts of the place beside it; which hands reach it is computed.
+A *spot* is a place that is created on demand: for an object that stands at none of the scene's places, or as free room on the
+furniture to put something down. It belongs to the common classes of all places of the scene, and has the static facts of the
+place beside it; its reach facts are computed.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ BESIDE = 0.3
 """Maximum distance in metres between a spot and the place whose static facts it shares."""
 
 GRID = 0.08
-"""Distance in metres between the points of furniture that are looked at for room."""
+"""Distance in metres between the points of furniture that are tested for room."""
 
 ROOMY = 0.1
 """Minimum distance in metres between a free spot and every place, object and edge."""
 
 SPOTS, TRIED = 3, 12
-"""Maximum numbers of free spots that are offered, and of points whose reach is computed."""
+"""Maximum number of free spots that are offered, and of points whose reach is computed."""
 
 HEIGHTS = (0.06, 0.12, 0.18)
 """Heights in metres above a free spot that must be empty."""
@@ -47,7 +47,7 @@ HEIGHTS = (0.06, 0.12, 0.18)
 
 @dataclass
 class Lookout:
-    """Discovers things and spots in a world. `problem` has them, too; `reaching` is the relation of reach facts, or empty."""
+    """Discovers things and spots in a world, and adds them to `problem`. `reaching` is the relation of reach facts, or empty."""
 
     world: PhysicsWorld
     problem: Problem
@@ -90,7 +90,10 @@ class Lookout:
     # ------------------------------------------------------------------------------------------------- things
 
     def _meet(self, name: str) -> None:
-        """Discover a thing: of the class whose objects have places, and fixed if no hand can open wide enough for it."""
+        """Discover a thing.
+
+        It belongs to the class of objects that have places, and is fixed if no hand can open wide enough for it.
+        """
         world, problem = self.world, self.problem
         uses = world.embodiment.perceivers
         wheres = [s for s in problem.domain.situations.values() if s.name in uses]
@@ -142,7 +145,7 @@ class Lookout:
         return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
 
     def _covered(self, name: str, own: str) -> tuple[str, ...]:
-        """Return the places but `own` at which no object of the scene has room beside a thing, as motions are planned."""
+        """Return the places, except `own`, at which objects have no room beside a thing, by the margins of motion planning."""
         world = self.world
         base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
         least = (
@@ -176,7 +179,7 @@ class Lookout:
         return spot
 
     def _support(self, name: str) -> str:
-        """Return the link or body on which an object stands, an empty string if that doesn't move."""
+        """Return the link or body on which an object stands; an empty string if the object stands on fixed furniture."""
         world = self.world
         below = (c for c in world.contacts(world.bodies[name].body) if c[7][2] > 0.5)
         carriers = (world.name_of(contact[2], contact[4]) for contact in below)
@@ -209,7 +212,7 @@ class Lookout:
         return Discovery(name, shared_kinds(problem, fixed), (*shared, *reached))
 
     def _beside(self, point: Array, carrier: str, places: Sequence[str]) -> str:
-        """Return the place beside a point: at its height, of the same carrier, not far away; else an empty string."""
+        """Return the place beside a point: near it, at its height, and on the same carrier; an empty string if there is none."""
         world = self.world
         gaps = {
             name: float(np.hypot(*(world.place(name) - point)[:2]))

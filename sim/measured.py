@@ -27,7 +27,7 @@ def _pose(world: Engine, name: str) -> tuple[Array, Array] | None:
 
 
 def _between(measure: Callable[[Engine, str, tuple[Array, Array], tuple[Array, Array]], float]) -> Measure:
-    """Return a measure of two known individuals, from the world, the second one's name, and both poses."""
+    """Return a measure of two individuals by a function of the world, the name of the second one, and both poses."""
 
     def measured(world: Engine, one: str, other: str) -> float | None:
         poses = _pose(world, one), _pose(world, other)
@@ -81,13 +81,13 @@ MEASURES: Mapping[str, Measure] = {
     "tilt": _tilt,
     "joint": _joint,
 }
-"""By quantity: the function that measures it, of a world and two individuals, in metres, radians and newtons."""
+"""The function that measures each quantity, given a world and two individuals, in metres, radians and newtons."""
 
 
 def observe_measured(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether the bounds hold of the arguments; of a type with values, the first value of which they hold.
+    """Return whether the bounds hold for the arguments. For a type with values, return the first value for which they hold.
 
-    None if something can't be measured; for a type with values, the special value `nothing`, if there is one, where no value fits.
+    If no value fits, the special value `nothing` if there is one. Return None if something can't be measured.
     """
     if use.asked:
         holds = _hold(world, use, arguments[0], arguments[-1])

@@ -1,7 +1,7 @@
 """Mechanisms, which are furniture with moving links, in a physics world.
 
-Joints resist by friction and damping; springs push back and latches hold. Links are solid to each other and to their base, but for
-those that are stated to touch, or touch before anything has moved.
+Joints resist by friction and damping; springs push back and latches hold. Links collide with each other and with their base,
+except for links that are stated to touch, or that touch before anything has moved.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, w
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which it is then held."""
+"""Shares of the range from `opened` to the upper limit: at the first a latching joint trips, at the second it is then held."""
 
 
 SLIGHT = 0.0002
-"""Metres of overlap at rest from which on the friction between two links would jam the joint."""
+"""Minimum overlap in metres of two links at rest whose friction would jam the joint."""
 
 
 @dataclass
@@ -117,7 +117,7 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
 
 
 def _let_touch(mechanic: Mechanic) -> None:
-    """Let links pass each other or their base where that is stated, or where they touch before anything has moved.
+    """Let links pass each other or their base if that is stated, or if they touch before anything has moved.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def _touches(one: Mechanism | Link, other: Mechanism | Link) -> bool:
 
 
 def overlap_of(client: int, one: tuple[int, int], other: tuple[int, int]) -> float:
-    """Return by how many metres two links (body, number) of a physics world overlap; 0 if they don't."""
+    """Return the overlap in metres of two links (body, number) of a physics world; 0 if they don't overlap."""
     (body, i), (second, j) = one, other
     points = pybullet.getClosestPoints(body, second, 0.001, i, j, physicsClientId=client)
     return max((-float(point[8]) for point in points if point[8] < 0), default=0.0)

@@ -17,8 +17,7 @@ SPACING = 0.008
 SLACK, LEAST, MOST = 0.2, 0.004, 0.02
 """Maximum protrusion of spheres: share of the mesh's thickness, and its bounds in metres. Larger values need fewer spheres."""
 MOST_POINTS, CANDIDATES, SHARES = 1_500, 150, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Maximum number of points to cover, maximum number of candidate centres per shell, and the shells: shares of the way from the
-middle to the surface."""
+"""Maximum number of points to cover and of candidate centres per shell; the shells, as shares of the way to the surface."""
 MOST_PIECES, FARTHEST = 400_000, 1_000.0
 """Maximum number of surface points of a mesh, and maximum distance in metres of its points from the link's origin."""
 DIRECTIONS = np.array(

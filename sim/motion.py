@@ -1,9 +1,9 @@
 """Collision-free motion of a hand, planned in the hand's coordinates and timed within the joints' limits.
 
-A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres; in radians the heading of its level pointing direction, the
-roll about it (0 is upright; pouring changes it), and the elbow's swivel. `confab.sim.kinematics` maps a pose to a posture. A
-path with
-roll 0 keeps a cup upright: a straight line where that is free, else the path of a short RRT-Connect in the same six coordinates.
+A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres; in radians the heading of its level pointing direction,
+the roll about it (0 is upright; pouring changes it), and the elbow's swivel. `confab.sim.kinematics` maps a pose to a posture.
+A path with roll 0 keeps a cup upright. The path is a straight line if that is free, otherwise the result of a short RRT-Connect
+in the same six coordinates.
 
 ``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
 """
@@ -26,20 +26,20 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 """Maximum distance between checked poses of a path (metres, radians)."""
 
 COARSE = 6
-"""Every `COARSE`-th sample of a path is checked before all others, which rejects most blocked paths early."""
+"""Every sample with a number divisible by `COARSE` is checked before all others, which rejects most blocked paths early."""
 
 JUMP = 0.35
 """Maximum motion in radians of a joint between neighbouring poses of a path; more indicates a singularity."""
 
 APPROACH_TOLERANCE = 0.001
-"""Metres by which a hand that leaves an obstacle within the margin may still approach it."""
+"""Maximum distance in metres by which a hand may still approach an obstacle within the margin while it leaves it."""
 
 FEWEST = 5
-"""Minimum number of samples of a timed path, which is at rest at both ends and accelerates and brakes between them."""
+"""Minimum number of samples of a timed path, which is at rest at both ends and accelerates and brakes in between."""
 
 YAWS = np.linspace(-np.pi, np.pi, 48, endpoint=False)
 SWIVELS = np.linspace(-1.6, 1.6, 17)
-"""Headings of a hand and swivels of an elbow tried at a point."""
+"""Headings of a hand, and swivels of an elbow, that are tried at a point."""
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
@@ -70,7 +70,7 @@ class Traveller(Protocol):
         """Return the joint values along poses, or None if these can't be followed."""
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some paths of sampled poses that can be followed, or None."""
+        """Return the number of the first path, among paths of sampled poses, that can be followed; None if there is none."""
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
         """Yield via poses (n, 6) to try before a search."""
@@ -113,7 +113,10 @@ class Reacher:
         return q if self._feasible(q, valid) else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some paths that can be followed, or None. All are solved at once, which is faster."""
+        """Return the number of the first path that can be followed; None if there is none.
+
+        All paths are solved at once, which is faster.
+        """
         q, valid = self.solve(np.concatenate(ways))
         ends = np.cumsum([len(way) for way in ways])[:-1]
         pairs = zip(np.split(q, ends), np.split(valid, ends), strict=True)
@@ -157,7 +160,7 @@ def rotations(poses: Array) -> Array:
 
 
 def poses_at(points: Array, yaw: Array, roll: Array | float, swivel: Array) -> Array:
-    """Return poses (n, 6) at points (n, 3), or all at one point (3,)."""
+    """Return poses (n, 6) at points (n, 3), or at one point (3,)."""
     columns = [
         np.broadcast_to(part, yaw.shape) for part in (*np.broadcast_to(points, (len(yaw), 3)).T, yaw, roll, swivel)
     ]
@@ -204,7 +207,9 @@ def polyline(corners: Array) -> Array:
 def connect(
     reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int = 400
 ) -> tuple[int, Array] | None:
-    """Return the number of a goal and the corner poses of a free path to it: a line, a detour, or found by RRT-Connect; else None.
+    """Return the number of a goal and the corner poses of a free path to it; None if none is found.
+
+    The path is a line, a detour, or the result of RRT-Connect.
 
     Parameters
     ----------
@@ -230,7 +235,10 @@ def connect(
 
 
 def leave(reacher: Reacher, start: Array) -> Array | None:
-    """Return a free pose at the end of a line from `start` that comes no nearer to any obstacle than `start`; else None."""
+    """Return a free pose at the end of a line from `start` that comes no nearer to any obstacle than `start`.
+
+    None if there is none.
+    """
     ahead = np.array([np.cos(start[3]), np.sin(start[3]), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
     for metres in (0.03, 0.06, 0.1, 0.15):
@@ -301,7 +309,7 @@ def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
 
 
 def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
-    """Replace the stretch between two random points of the path by a straight line where that is free, `attempts` times."""
+    """Replace the part between two random points of the path by a straight line if that is free; repeat this `attempts` times."""
     for _ in range(attempts):
         if len(corners) < 3:
             break

@@ -1,8 +1,8 @@
 """Inverse kinematics of arms without a closed form: damped least squares within the joints' limits.
 
-The arm at rest is turned about its first axis until it points to the goal, and the hand is led straight there, a stretch at a time.
-So equal poses have equal postures, and neighbouring poses have neighbouring postures except where the arm has to reconfigure. If
-that fails, further searches start from postures drawn with a fixed seed.
+The arm at rest is turned about its first axis until it points to the goal, and the hand is led straight to the goal in several
+stretches. So equal poses have equal postures, and neighbouring poses have neighbouring postures unless the arm has to
+reconfigure. If that fails, further searches start from postures drawn with a fixed seed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ EXACT, CLOSE = 1e-10, 1e-7
 """Errors in metres and radians at which a search ends early, and up to which its result is valid."""
 
 DAMPING = 1e-6
-"""Damping of the normal equations in addition to the error; more is slower, less is unstable near singularities."""
+"""Damping of the normal equations in addition to the error. More damping is slower; less is unstable near singularities."""
 
 SINGULAR = 0.45
 """Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between them."""

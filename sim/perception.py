@@ -1,4 +1,4 @@
-"""Perceivers: each reads the values of one kind of situation type off the world, and can set them up in a new world.
+"""Perceivers: each one reads the values of a kind of situation type from the world, and can set them up in a new world.
 
 `BUILT_IN` lists them. `observe` returns the value that holds for the arguments, or None; `arrange` makes a value true in the draft
 of a new world; `code` is the failure code of a primitive whose expected value is not observed. The ontology states the perceiver of
@@ -39,7 +39,7 @@ class Draft:
 
 @dataclass(frozen=True)
 class Perceiver:
-    """The functions that read a kind of situation type off the world and set it up, and its failure code.
+    """The functions that read a kind of situation type from the world and set it up, and its failure code.
 
     `spatial` says that the values are positions. `measure` returns the numbers that determine the value, and their thresholds.
     """
@@ -60,7 +60,7 @@ def tilt_of(rotation: Array) -> float:
 
 
 def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the place on which the object stands, or `in_hand` if a hand holds it."""
+    """Return the place at which the object stands, or `in_hand` if a hand holds it."""
     body = arguments[0]
     if not world.knows(body):
         return None
@@ -99,7 +99,7 @@ def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def observe_content(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the value of which the vessel contains most, at least `least` servings, or `empty`."""
+    """Return the filling of which the vessel contains most, or `empty` if it contains less than `least` servings."""
     if not world.knows(arguments[0]):
         return None
     amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings if name in use.choices}
@@ -135,9 +135,9 @@ def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return where a hand's own motions have brought it: `raised`, an object, or a place.
+    """Return the position to which a hand's own motions have brought it: `raised`, an object, or a place.
 
-    None if it was stopped on its way, or if the object at which it is has left since and the hand doesn't hold it.
+    Return None if the hand was stopped on its way, or if the object at its position has left and the hand doesn't hold it.
     """
     hand = arguments[0]
     at = world.hands[hand].at
@@ -177,7 +177,7 @@ def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def measure_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> Mapping[str, float]:
-    """Return a joint's present value and the thresholds from which on it is open and up to which it is shut."""
+    """Return the present value of a joint, the minimum value at which it is open, and the maximum value at which it is shut."""
     if arguments[0] not in world.links:
         return {}
     name, mechanic = arguments[0], world.links[arguments[0]]
@@ -229,7 +229,7 @@ def arrange_stand(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]:
-    """Return an `arrange` function for hands: a world begins with them at rest, so that only the value `special` can be set up."""
+    """Return an `arrange` function for hands. They are at rest in a new world, so only the value `special` can be set up."""
 
     def arrange(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
         """Accept the rest value; raise `ValueError` for any other."""

@@ -45,7 +45,7 @@ from confab.sim.verdict import REFUTED, SkillError
 from confab.sim.whereabouts import arrived, floor_below, stopping
 
 LOOKS = 3
-"""Number of attempts at a motion with noisy perception, each after a new look, before its failure counts."""
+"""Number of attempts at a motion with noisy perception before its failure counts; there is a new look before each attempt."""
 
 ANCHORS = 8
 """Number of stretches of a joint's path, each planned from the present positions of hand and joint."""
@@ -59,7 +59,7 @@ SLACK = 0.1
 """Margin in radians to the limits of the arm's joints in planning a joint's path, left for corrections on the way."""
 
 TURNED = 0.02
-"""Margin in radians to the limits of the arm's joints where noise or a narrow grasp may require corrections."""
+"""Margin in radians to the limits of the arm's joints if noise or a narrow grasp may require corrections."""
 
 NARROW = 0.02
 """Opening in metres of each finger at a handle with little room beside it."""
@@ -220,7 +220,7 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
 
 
 def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
-    """Return the candidates that allow all stages, if possible with room for corrections, else with narrower fingers."""
+    """Return the candidates that allow all stages: with room for corrections if possible, otherwise with narrower fingers."""
     narrow = any(one.motion == "yielding" and room(run, run.feature_of(one.to)[0]) < ROOM for one in chain)
     if narrow or run.world.blur:
         with suppress(SkillError):  # corrections on the way are impossible with a stretched arm
@@ -320,7 +320,7 @@ def _rise(run: Run, phase: Phase) -> None:
 
 
 def _home(run: Run, phase: Phase) -> None:
-    """Move to the home pose, or near it if an opened link is there."""
+    """Move to the home pose, or near it if an opened link is in the way."""
     hand = run.attempt.hand
     home = pose_of(hand.arm, np.array(hand.hand.home))
     run.attempt.move_to_any(

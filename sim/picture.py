@@ -1,8 +1,8 @@
 """Pictures of the world without a screen or graphics card: opaque bodies by PyBullet's renderer, vessels and drops by ray casting.
 
-PyBullet's software renderer has no translucency, and hundreds of small spheres make it slow. So it draws the robot, furniture
-and solid objects; drops (spheres) and vessels (surfaces of revolution) are then cast pixel by pixel against its depth image. That
-looks better and takes a fifth of the time. Metres; images are (height, width, 3) of uint8.
+PyBullet's software renderer has no translucency, and is slow with hundreds of small spheres. So it draws only the robot,
+furniture and solid objects. Drops (spheres) and vessels (surfaces of revolution) are then cast pixel by pixel against its depth
+image. The result looks better and takes a fifth of the time. Metres; images are (height, width, 3) of uint8.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def view_of(
     around: float = 0.0,
     down: float = DOWN,
 ) -> Camera:
-    """Return the nearest camera on the side opposite the robots that shows robots and tables completely.
+    """Return the nearest camera, on the side opposite the robots, that shows robots and tables completely.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def picture(world: Engine, camera: Camera) -> Array:
 
 
 def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> None:
-    """Darken table tops in the shadows of hands and bodies, which are softer for higher ones."""
+    """Darken table tops in the shadows of hands and bodies; the higher they are, the softer is the shadow."""
     casters = list(_casters(world))
     for fixture in world.embodiment.fixtures:
         top = fixture.position[2] + fixture.size[2] / 2
@@ -247,7 +247,7 @@ def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
 
 
 def _casters(world: Engine) -> Iterator[tuple[Array, float]]:
-    """Yield spheres (centre, radius) that cast shadows: those of the arms, and a column of them for each body."""
+    """Yield the spheres (centre, radius) that cast shadows: the spheres of the arms, and a column of spheres for each body."""
     for hand in world.hands.values():
         mover = hand.mover()
         yield from zip(mover.at(hand.measured()[None])[0], mover.spheres.radii.tolist(), strict=True)
@@ -335,7 +335,7 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
 def _look(
     camera: Camera, rotation: Array, base: Array, shape: Shape
 ) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
-    """Return a vessel's window in the picture, the rays and the eye in the vessel's frame, and its outer heights and radii.
+    """Return the window of a vessel in the picture, the rays and the eye in the vessel's frame, and its outer heights and radii.
 
     None if the vessel lies outside the picture.
     """
@@ -372,7 +372,7 @@ def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, ba
 
 
 def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Blend a vessel's far and near walls over the picture, more transparent where the view is perpendicular."""
+    """Blend the far and the near wall of a vessel over the picture; a wall is more transparent where the view is perpendicular."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return

@@ -1,7 +1,7 @@
 """Pouring: a held vessel is rolled about its lip, which stays over the other vessel, until a serving has left it.
 
-The controller watches the flow: it rolls on slowly while nothing flows, waits while the beverage flows, and rolls the vessel back
-when enough has left. The rest stays behind the vessel's shoulder.
+The controller watches the flow: it rolls on slowly while nothing flows, waits while the beverage flows, and rolls the vessel
+back when enough has left. The remaining beverage stays behind the vessel's shoulder.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""
 
 FOLD = 0.1
-"""Margin in radians to the stretched arm, kept if possible, since the load slips a little on the way."""
+"""Margin in radians to the stretched arm. It is kept if possible, since the load slips a little on the way."""
 
 SHARES = (1.0, 0.95, 0.9, 0.8)
 """Shares, tried in turn, of the shift that keeps the lip in place while a hand rolls back."""
@@ -47,9 +47,10 @@ SUFFICIENT = 0.9
 """Share of the wanted amount that suffices when the flow stops."""
 
 SURPLUS = 0.25
-"""Fraction of a serving beyond whole ones that should stay in the source: half of the tolerance of rounding. Beads stuck in a neck
-come
-all at once and cannot be put back, whereas too little only takes another tilt."""
+"""Fraction of a serving that should stay in the source in addition to whole servings: half of the tolerance of rounding.
+
+Beads that are stuck in a neck come all at once and cannot be put back, whereas a missing amount only takes another tilt.
+"""
 
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
@@ -175,7 +176,8 @@ def _poses(
 ) -> Array:
     """Return hand poses (n, 6) that hold the source tilted by `angle` with its lip over the target.
 
-    The lip is `clearance` above the target's rim, and higher while the source is steep, so that its base clears the rim as well.
+    The lip is `clearance` above the rim of the target. It is higher while the source is steep, so that the base of the source
+    clears the rim as well.
     """
     poses = poses_at(np.zeros(3), yaw, side * angle, swivel)
     height, lip = _lip(attempt, source, side)
@@ -228,7 +230,7 @@ def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]
 
 
 def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _Way:
-    """Return a path back on which the lip stays in place, or nearly so if the arm doesn't reach that far."""
+    """Return a path back on which the lip stays in place, or nearly in place if the arm can't reach the exact path."""
     for share in SHARES:
         moved = poses.copy()
         moved[:, :3] += share * shifts
@@ -265,8 +267,8 @@ class _Servo:
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
         """Roll on slowly while there is no flow, and wait while beverage flows; return whether `enough` is `poured`.
 
-        The flow of the `lag` seconds in which the hand rolls back counts as poured. If the flow stops, `nearly` suffices. The
-        result is False if nothing has flowed for a while at the steepest angle.
+        The flow during the `lag` seconds in which the hand rolls back counts as poured. If the flow stops, the amount `nearly`
+        suffices. The result is False if nothing has flowed for a while at the steepest angle.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))

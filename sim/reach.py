@@ -24,7 +24,7 @@ from confab.sim.stages import MARGIN, Numbers, grip_stages
 from confab.sim.urdf import UrdfModel
 
 VERSION = "1"
-"""Version of the method, part of the fingerprint, so that stored results of an older one count as outdated."""
+"""Version of the method. It is part of the fingerprint, so that stored results of an older version count as outdated."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""
@@ -64,7 +64,7 @@ def reach(embodiment: Embodiment) -> Reach:
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
-    """Return for each hand that does not reach a place the first failing stage of a grasp and its obstacle, with every joint open.
+    """Return the first failing stage of a grasp and its obstacle for each hand that does not reach a place, with every joint open.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
 
 
 def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str:
-    """Return the reason of the first stage of a grasp at a height above a place that no posture passes."""
+    """Return the reason for which no posture passes a stage of a grasp at a height above a place."""
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     left = np.ones(1, dtype=bool)
     for name, stage in zip(STAGES, grip_stages(grip, numbers), strict=True):

@@ -19,7 +19,7 @@ from confab.sim.motion import MotionLimits, pose_of
 from confab.sim.urdf import Array, Spheres, UrdfModel
 
 CENTERING = 400.0
-"""Newtons per metre by which a finger ahead of the other one yields, which simulates the gear of a parallel gripper."""
+"""Newtons per metre by which the leading finger yields; this simulates the gear of a parallel gripper."""
 
 POSITION_GAIN, VELOCITY_GAIN = 0.4, 1.0
 """Gains of an arm's motors."""
@@ -98,7 +98,7 @@ class Manipulator:
         return tuple(state[0] for state in states)
 
     def mover(self, opening: float | None = None) -> Mover:
-        """Return the arm as spheres, with its fingers at their present opening or at `opening` metres."""
+        """Return the arm as spheres, with its fingers at their present opening, or open by `opening` metres."""
         openings = self.openings() if opening is None else [opening] * len(self.fingers)
         return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, openings, strict=True)))
 
@@ -127,7 +127,7 @@ class Manipulator:
         self.closing = True
 
     def drive(self) -> None:
-        """Drive closing fingers for one step with equal force, the one ahead yielding."""
+        """Drive closing fingers for one step with equal force; the leading finger yields."""
         if not self.closing:
             return
         (first, *_), (second, *_) = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)

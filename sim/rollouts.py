@@ -28,7 +28,7 @@ from confab.sim.verify import Rollout, verify
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 TRIES = 3
-"""Number of processes that die at the same rollout before it is given up."""
+"""Number of processes that may die at a rollout before it is given up."""
 
 RAY = "ray"
 """Value of `workers`, or scheme of their address, that selects a Ray cluster."""
@@ -92,11 +92,12 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     Parameters
     ----------
     trial : Trial
-        Pickled if there is more than one worker, so `prepare` must be a function of a module or a `functools.partial` of one.
+        It is pickled if there is more than one worker, so `prepare` must be a function of a module, or a `functools.partial` of
+        such a function.
     seeds : sequence of int
     workers : int or str
-        Number of processes (1: this one); or ``ray`` for the Ray cluster of this machine, which is started if need be; or a
-        cluster's address, ``ray://HOST:PORT``.
+        Number of processes (1: this process); or ``ray`` for the Ray cluster of this machine, which is started if necessary; or
+        the address of a cluster, ``ray://HOST:PORT``.
     done : callable, optional
         Called with each rollout as soon as it is finished, in the order of completion.
 
@@ -233,7 +234,7 @@ class _Pool:
 
 
 def _on_ray(trial: Trial, seeds: Sequence[int], address: str) -> Iterator[Rollout]:
-    """Yield rollouts of a Ray cluster in the order of completion; Ray repeats those whose worker died."""
+    """Yield rollouts of a Ray cluster in the order of completion; Ray repeats a rollout whose worker died."""
     try:
         import ray
     except ImportError as error:

@@ -51,7 +51,10 @@ class Run:
         return name, feature
 
     def at(self, target: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
-        """Return the perceived frame of ``role.feature``; an object's is measured once per skill, so that noise doesn't move it."""
+        """Return the perceived frame of ``role.feature``.
+
+        The frame of an object is measured once per skill, so that noise doesn't move it.
+        """
         name, feature = self.feature_of(target)
         if name in self.world.links:
             frame = locate(self.world, name, feature, values)
@@ -88,7 +91,10 @@ class Run:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 
     def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the names that a phase may touch: objects, the parts of a link at a feature, fixtures and carriers of a place."""
+        """Return the names of what a phase may touch.
+
+        Objects, the parts of a link at a feature, and the fixtures and carriers of a place.
+        """
         found: list[str] = []
         for word in phase.touches:
             if word == "supports":

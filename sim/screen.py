@@ -78,7 +78,7 @@ class Screen:
                 time.sleep(ahead)
 
     def _look(self, world: Engine) -> None:
-        """Set the window's camera to the view of films."""
+        """Set the camera of the window to the view of films."""
         camera = view_of(world.embodiment)
         x, y, z = np.array(camera.target) - np.array(camera.eye)
         distance = float(np.linalg.norm([x, y, z]))

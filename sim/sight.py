@@ -1,4 +1,4 @@
-"""Visibility: a body of which a camera sees too small a share is hidden, and its last known position is believed.
+"""Visibility: a body is hidden if the cameras see too small a share of it; its last known position is then believed.
 
 Rays are cast from each camera to points on the body's surface. Beads are not checked; furniture, links and robots are always known.
 """
@@ -19,7 +19,7 @@ SHARE = 0.1
 """Minimum share of a body's points that a camera has to see for the body to count as seen."""
 
 BARED = 0.5
-"""Minimum share of points at a body's believed pose that a camera has to see empty for the body to count as gone."""
+"""Minimum share of empty points at the believed pose of a body that a camera has to see for the body to count as gone."""
 
 BEHIND, ABOVE, ASIDE = 0.1, 0.8, 0.5
 """Position in metres of a robot's default cameras relative to the middle of its shoulders: back, up and to either side."""
@@ -34,12 +34,15 @@ BEYOND = 0.01
 """Metres by which a ray continues behind a point on the surface."""
 
 WITHIN = 0.8
-"""Share of the radius at which points must be empty for a body to count as gone; full radius might meet a wall beside it."""
+"""Share of the radius at which points must be empty for a body to count as gone.
+
+At the full radius, points could be inside a wall beside the body.
+"""
 
 
 @dataclass(frozen=True)
 class Sight:
-    """The seen bodies, those gone from their believed pose, and for each hidden body the number of the one that covers it most."""
+    """The seen bodies, the bodies gone from their believed pose, and the number of the body that covers each hidden body most."""
 
     seen: frozenset[str] = frozenset()
     gone: frozenset[str] = frozenset()

@@ -19,11 +19,12 @@ MARGIN = 0.008
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of a motion: a pose (n, 6) for each candidate, `ignored` obstacles, and the surroundings by then if they differ.
+    """One stage of a motion.
 
-    The fingers are `closed` around something. The hand is `near` the thing whose handle it holds, so its margin is small. Every
-    joint keeps `slack` radians more than usual from its limits, and `fold` radians from the stretched arm. The present load is
-    `released`. The moved joint of furniture has the value `joint`.
+    A pose (n, 6) for each candidate, `ignored` obstacles, and the surroundings at that stage if they differ. `closed`: the
+    fingers are closed around something. `near`: the hand holds a handle, so its margin is small. `slack` and `fold`: radians
+    that every joint keeps from its limits in addition, and from the stretched arm. `released`: the hand has released its load.
+    `joint`: the value of the moved joint of furniture.
     """
 
     poses: Array

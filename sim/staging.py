@@ -20,10 +20,10 @@ from confab.sim.robot import load_robot
 from confab.sim.urdf import Array
 
 SETTLING = 120
-"""Simulation steps in which bodies and beads come to rest before the first primitive."""
+"""Number of simulation steps in which bodies and beads come to rest before the first primitive."""
 
 DRAWS = 20
-"""Maximum number of draws of an object's deviation until the object overlaps no other."""
+"""Maximum number of draws of an object's deviation until the object doesn't overlap another one."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
 """An invisibly small triangle, the visual shape of beads: `confab.sim.picture` draws them, since PyBullet would be slow."""
@@ -34,7 +34,7 @@ class Perturbation:
     """Ranges of random deviations from the nominal world, drawn uniformly for each body.
 
     Mechanisms are shifted by `position` and turned by `turn`, and their joints' friction and damping are multiplied by
-    `resistance`. A mobile base stops up to `stop` metres and radians off its goal.
+    `resistance`. A mobile base misses its goal by at most `stop` metres and radians.
     """
 
     position: float = 0.010
@@ -117,7 +117,7 @@ def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) ->
     Raises
     ------
     ValueError
-        It is inside something else that is already there; the message names both and the millimetres.
+        The object overlaps something that is already there; the message names both and the millimetres.
     """
     for _ in range(DRAWS if perturb is not None else 1):
         shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)
@@ -135,7 +135,7 @@ def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) ->
 
 
 def _deepest(engine: Engine, body: int) -> tuple[float, str]:
-    """Return how deep a body is in something else, and the name of that."""
+    """Return the deepest overlap of a body, and the name of the body that it overlaps."""
     found = [(0.0, "")]
     for other in engine.names:
         for link in range(-1, pybullet.getNumJoints(other, physicsClientId=engine.client)):

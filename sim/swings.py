@@ -1,7 +1,7 @@
 """Bodies that block the motion of a link, at their present places and at all other places.
 
-A body that the link would touch between `shut` and `opened` blocks it for every hand and in both directions. So one blocked motion
-refutes all similar ones.
+A body that the link would touch between `shut` and `opened` blocks the link for every hand and in both directions. So one
+blocked motion refutes all similar motions.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def gap(world: Engine, link: str, values: Sequence[float], body: str, pose: tupl
 
 
 def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
-    """Raise `SkillError` if a body blocks a link at one of some values of its joint."""
+    """Raise `SkillError` if a body blocks a link at any of the given values of its joint."""
     for name in world.bodies:
         if not world.knows(name):
             continue
@@ -58,7 +58,7 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
 
 
 def refuted(world: Engine, symbols: Iterable[Symbol], link: str) -> tuple[Refutation, ...]:
-    """Return the refutations of moving a link, by any hand, while a body is at a place where it blocks the link."""
+    """Return the refutations of moving a link by any hand while a body stands at a place at which it blocks the link."""
     found = [fact for symbol in symbols for fact in _in_the_way(world, symbol, link)]
     return tuple(
         Refutation(

@@ -1,8 +1,8 @@
-"""Several hands at once: skills run concurrently in one world, each as if it were alone.
+"""Several hands at once: skills run concurrently in one world; each skill is written as if it were alone.
 
 A skill requests simulation steps from the world. Here every skill runs in its own thread and waits for each step; when all
-running skills wait, the world makes one step for all of them. Only one thread runs at any time, in a fixed order, so that equal
-calls give equal results.
+running skills wait, the world makes one step for all of them. Only one thread runs at any time, and threads run in a fixed
+order, so that equal calls give equal results.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""
 
 FLOWING = {"tilt", "stand_upright"}
-"""Skills that count spilled beads; they run one at a time, since each would count the other's."""
+"""Skills that count spilled beads. They run one at a time, since each would count the beads that another one spills."""
 
 LOOKING = 6
 """Simulation steps between checks for contact between the arms."""
@@ -45,7 +45,7 @@ class Performance:
 
 
 class _Job:
-    """A primitive that runs in a thread of its own."""
+    """A primitive that runs in a separate thread."""
 
     def __init__(self, world: PhysicsWorld, step: Step, position: int, worker: str) -> None:
         self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
@@ -161,7 +161,7 @@ def arms_touch(world: PhysicsWorld) -> bool:
 
 
 def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
-    """Return the bodies that a primitive may move: those that it names, and the loads of its hands."""
+    """Return the bodies that a primitive may move: the bodies that it names, and the loads of its hands."""
     named = {*step.arguments, *step.bindings.values()}
     held = {world.held(hand) for hand in named & world.hands.keys()}
     return {name for name in named | held if name is not None and name in world.bodies}
@@ -170,7 +170,7 @@ def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
 def _workplace(
     world: PhysicsWorld, step: Step
 ) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
-    """Return a function that returns a primitive's present place of work (2,): its last body or place, else its hand."""
+    """Return a function that returns the present place of work (2,) of a primitive: its last body or place, or its hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 

@@ -1,4 +1,4 @@
-"""Touch: fingers that open and close, and corrections of the hand by the forces that they feel."""
+"""Touch: opening and closing of the fingers, and corrections of the hand by the forces on the fingers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ CLOSING = 360
 """Maximum number of steps of a grasp."""
 
 GROPING = 120
-"""Number of steps after which a hand that touches a handle with one finger only grasps again."""
+"""Number of steps after which a hand grasps again if only one finger touches the handle."""
 
 YIELDS, ASIDE_BY = 6, 0.002
-"""Maximum number of times a hand gives way to contact, and the metres by which it does each time."""
+"""Maximum number of times that a hand yields to contact, and the metres by which it yields each time."""
 
 ROOM = 0.01
-"""Metres between an open finger and the object below which the hand slows down in proportion."""
+"""Distance in metres between an open finger and the object below which the hand slows down in proportion."""
 
 SLOWEST = 0.1
 """Minimum share of its speed to which the hand slows down."""
@@ -129,9 +129,9 @@ FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
 def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     """Move the open fingers around an object; on contact with one finger, shift the hand to that finger's side and continue.
 
-    On contact with the palm, the object is far enough inside the hand, which draws back a little and stops. So does a hand in
-    contact with a link on its way around a handle: there is room beside a handle, so the contact is ahead, for example with the
-    door.
+    On contact with the palm, the object is far enough inside the hand, so the hand draws back a little and stops. The hand also
+    stops on contact with a link on its way around a handle: there is room beside a handle, so the contact is ahead, for example
+    with the door.
     """
     hand = run.attempt.hand
     still = name in run.world.links

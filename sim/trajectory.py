@@ -25,7 +25,7 @@ from confab.sim.urdf import Array
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 EXACT = 3e-4
-"""Maximum deviation in radians of the exported path, linear between its points, from the commanded one."""
+"""Maximum deviation in radians of the exported path, which is linear between its points, from the commanded path."""
 
 GOAL_TOLERANCE, TIME_TOLERANCE = 0.01, 0.5
 """Tolerance of each joint at the end of a path in radians, and of its duration in seconds."""
@@ -39,7 +39,9 @@ AFTER = 1.0
 
 @dataclass
 class Tape:
-    """The commands of one hand: postures by the simulation step after them, gripper commands and grasps by the step before.
+    """The commands of one hand.
+
+    Postures are indexed by the simulation step after them, gripper commands and grasps by the step before them.
 
     A grasp has the name of the held object, and its rotation and base in the hand's frame.
     """
@@ -70,7 +72,7 @@ class Recorder:
                 tape.grasps.append((world.steps - 1, held, *hand.grasp))
 
     def _new(self, tape: Tape, hand: Manipulator) -> bool:
-        """Return whether the hand has another grasp than the one recorded last."""
+        """Return whether the grasp of the hand differs from the last recorded grasp."""
         return not tape.grasps or hand.grasp is None or tape.grasps[-1][3] is not hand.grasp[1]
 
 
@@ -143,7 +145,7 @@ def _hand(embodiment: Embodiment, name: str, tape: Tape, begin: int, end: int) -
 
 
 def _corners(q: Array) -> list[int]:
-    """Return the samples of a path between which it is straight up to `EXACT`, the first and the last included."""
+    """Return the corners of a path, including its first and last sample; between corners the path is straight up to `EXACT`."""
     kept, stack = {0, len(q) - 1}, [(0, len(q) - 1)]
     while stack:
         i, j = stack.pop()
@@ -211,7 +213,7 @@ def replay(
     perturb: Perturbation | None = None,
     beads: bool = True,
 ) -> Replay:
-    """Execute exported trajectories in a new world by joint servos alone; parameters as of `PhysicsWorld`."""
+    """Execute exported trajectories in a new world by joint servos alone; parameters are those of `PhysicsWorld`."""
     with PhysicsWorld(embodiment, initial, seed, perturb, beads) as world:
         paths = {name: _path(primitives, name) for name in world.hands}
         fingers = {name: sorted(_gripper(primitives, name)) for name in world.hands}

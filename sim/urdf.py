@@ -20,9 +20,9 @@ from confab.sim.meshes import bounds, covered_mesh
 
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
-"""Maximum depth of a chain of links, and maximum number of spheres that cover one shape; more is refused as a mistake."""
+"""Maximum depth of a chain of links, and maximum number of spheres that cover one shape; larger models are refused as mistakes."""
 FARTHEST = 1e6
-"""Maximum absolute value of a number in metres; squares of far larger ones overflow."""
+"""Maximum absolute value of a number in metres; squares of far larger numbers overflow."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -62,7 +62,10 @@ class Primitive:
 
 @dataclass(frozen=True)
 class UrdfModel:
-    """A robot or mechanism at the zero posture: joints by name; by link its frame, the spheres that cover it, and its solids."""
+    """A robot or mechanism at the zero posture: the joints by name.
+
+    And for each link its frame, the spheres that cover it, and its solids.
+    """
 
     joints: Mapping[str, Joint]
     frames: Mapping[str, tuple[Array, Array]]
@@ -72,7 +75,7 @@ class UrdfModel:
 
     @cached_property
     def chains(self) -> Mapping[str, tuple[Joint, ...]]:
-        """The joints from the base to each link that has spheres, fixed ones included."""
+        """The joints, including fixed ones, from the base to each link that has spheres."""
         return {link: self.chain(link) for link in self.spheres}
 
     def chain(self, link: str) -> tuple[Joint, ...]:
@@ -114,7 +117,7 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
 def read_model(
     text: str, path: str, position: tuple[float, float, float], yaw: float, covered: bool = True
 ) -> UrdfModel:
-    """Read a robot or mechanism from the text of a URDF file at `path`; raises as `read_urdf` does.
+    """Read a robot or mechanism from the text of a URDF file at `path`; errors are those of `read_urdf`.
 
     With `covered`, its links are covered by spheres, which motion planning needs for an arm.
     """
@@ -225,7 +228,10 @@ def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Sphere
 
 
 def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[Primitive]:
-    """Yield the link's collision shapes as boxes and cylinders; a sphere is the cylinder around it, a mesh the box."""
+    """Yield the collision shapes of a link as boxes and cylinders.
+
+    A sphere is replaced by the cylinder around it, a mesh by the box around it.
+    """
     for collision in link.iter("collision"):
         local, shift = _origin(collision)
         geometry = collision.find("geometry")

@@ -91,7 +91,7 @@ class Verdict:
         return head + (f" ({numbers})" if numbers else "")
 
     def _what(self) -> str:
-        """Return the objects, and the message if it says more than the code; without the objects if it names them all."""
+        """Return the objects and the message, without a message that repeats the code, or objects that the message names."""
         if self.message in CODES.values():
             return ", ".join(self.objects) or self.message
         unnamed = not all(name in self.message for name in self.objects)

@@ -16,7 +16,7 @@ from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
-"""Maximum number of looks with noisy perception before a difference from the expected state counts."""
+"""Number of looks with noisy perception before a difference from the expected state counts."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class StepReport:
 class Rollout:
     """One execution of a plan.
 
-    `poured` has the share of a serving that arrived for each pour. `state` has the facts perceived last, `believed` those of them
-    about hidden objects. `cpu_seconds` excludes filming (`clock.rendering`).
+    `poured` has the share of a serving that arrived for each pour. `state` has the last perceived facts, `believed` the facts
+    among them about hidden objects. `cpu_seconds` excludes filming (`clock.rendering`).
     """
 
     seed: int
@@ -154,9 +154,9 @@ def verify(
 
 
 def compare(world: PhysicsWorld, expected: State, verdict: Verdict) -> Verdict:
-    """Return the verdict if the perceived facts are as expected, else a failure that names the first different fact.
+    """Return the verdict if the perceived facts equal the expected ones, otherwise a failure that names the first different fact.
 
-    With noisy perception a difference is looked at again, and the mean of all looks counts.
+    With noisy perception, a difference is looked at again, and the mean of all looks counts.
     """
     for looks in range(1, LOOKS + 1):
         found = _compared(world, expected, verdict)

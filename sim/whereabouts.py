@@ -1,7 +1,7 @@
-"""Where hands are: where their own motions have brought them, in three dimensions.
+"""The positions of hands: their own motions determine them, in three dimensions.
 
-A motion ends at a thing or a place, or with the hand raised. That holds until the hand's next motion, or until the thing has moved
-away from where it was then. A hand that was stopped on its way is at no named place.
+A motion ends at a thing or a place, or with the hand raised. The hand stays at this position until its next motion, or until
+the thing has moved away. A hand that was stopped on its way is at no named place.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEVEL = 0.01
 """Metres between the heights of a place and of an object that stands on it."""
 
 MOVED = 0.03
-"""Metres by which a hand has to be moved to be lost when it is stopped."""
+"""Minimum distance in metres that a stopped hand has moved to count as lost."""
 
 
 def point_of(world: Engine, name: str) -> Array:
@@ -42,7 +42,7 @@ def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]
 
 
 def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
-    """Store where a motion has brought a hand; motions of links and at the hand itself leave it where it was."""
+    """Store the position to which a motion has brought a hand; motions of links, and at the hand itself, don't change it."""
     if motion in RAISED:
         world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
     elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):
@@ -65,7 +65,7 @@ def stopping(world: Engine, hand: str) -> Iterator[None]:
 
 
 def floor_below(world: Engine, hand: str, point: Array) -> float:
-    """Return the height of the support that a hand's load has left, or of the place below a point if that height is unknown."""
+    """Return the height of the support that the load of a hand has left; if unknown, the height of the place below a point."""
     at = world.hands[hand].at
     if at.floor is not None and not at.lost:
         return at.floor

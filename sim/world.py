@@ -22,7 +22,7 @@ from confab.sim.verdict import REFUTED, SkillError, Verdict
 
 
 class PrimitiveStep(Protocol):
-    """A primitive of a plan, as `confab.planner.plan.Step` is one."""
+    """A primitive of a plan, such as a `confab.planner.plan.Step`."""
 
     @property
     def path(self) -> tuple[int, ...]:
@@ -59,7 +59,7 @@ class PhysicsWorld(Engine):
     perturb : Perturbation, optional
         Vary poses, friction, masses and fill.
     beads : bool
-        False leaves the beverage out: faster, but contents are counted from `initial` instead of simulated.
+        Whether the beverage is simulated; without it the world is faster, and contents are counted from `initial`.
     noise : float
         Standard deviation in metres of perceived positions.
     watch : callable, optional
@@ -121,7 +121,7 @@ class PhysicsWorld(Engine):
         return state
 
     def believed(self, state: State) -> tuple[Fact, ...]:
-        """Return the facts of a perceived state that rest on belief, since their object is hidden."""
+        """Return the facts of a perceived state that are believed and not perceived, because their object is hidden."""
         hidden = {name for name in self.known if not self.perceives(name)}
         return tuple(Fact(symbol, value) for symbol, value in state.items() if symbol.arguments[0] in hidden)
 

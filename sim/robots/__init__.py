@@ -1,1 +1,1 @@
-"""Robots that others control: their interfaces are data, and one adapter makes a world of each (docs/connecting.md)."""
+"""External robots: their interfaces are data, and one adapter makes each interface a world (docs/connecting.md)."""

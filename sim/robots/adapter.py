@@ -1,9 +1,9 @@
 """The world of an external robot: an interface describes the calls and readings, a transport performs them.
 
-Rule 1: only facts shown by the world model are believed. Facts that the scene doesn't know are ignored.
-Rule 2: an action that exceeds its time limit, or is stopped, is cancelled; its late result is ignored.
-Rule 3: a robot that doesn't confirm a cancellation is busy and gets no further calls until the action has ended.
-Rule 4: an action whose wait an exception ends, such as Ctrl-C, is cancelled by `stop` itself.
+Rule 1: only facts shown by the world model are believed. Facts that the scene doesn't know are ignored. Rule 2: an action that
+exceeds its time limit, or is stopped, is cancelled; its late result is ignored. Rule 3: a robot that doesn't confirm a
+cancellation is busy and gets no further calls until the action has ended. Rule 4: if an exception such as Ctrl-C ends the wait
+for an action, `stop` itself cancels the action.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
 from confab.sim.robots.transport import Model, RobotError, Transport
 
 GRACE = 5.0
-"""Seconds that a robot is given to end a cancelled action."""
+"""Maximum time in seconds in which a robot has to end a cancelled action."""
 
 SENT = 2.0
-"""Seconds that are allowed for sending a cancellation after an exception."""
+"""Maximum time in seconds for sending a cancellation after an exception."""
 
 NOT_STOPPED = "not stopped"
-"""The code of a primitive whose action goes on though it was stopped."""
+"""The code of a primitive whose action continues although it was stopped."""
 
 LOOKS = 3
 """Number of requests for the world model before the robot counts as out of reach."""
@@ -46,7 +46,7 @@ class InterfaceWorld:
     interface : Interface
     transport : Transport
     problem : Problem
-        Its symbols are perceived; its individuals are the ones that are known.
+        The symbols that are perceived, and the known individuals.
     """
 
     def __init__(self, interface: Interface, transport: Transport, problem: Problem) -> None:
@@ -72,7 +72,7 @@ class InterfaceWorld:
         Raises
         ------
         RobotError
-            The world model can't be had, or isn't one.
+            The world model isn't available, or is invalid.
         """
         model = self._model()
         return {symbol: value for reading in self.interface.readings for symbol, value in self._read(reading, model)}
@@ -143,7 +143,10 @@ class InterfaceWorld:
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
-        """Stop the running action: the call that waits for it cancels it, or this one if an exception has ended that wait."""
+        """Stop the running action. The call that waits for the action cancels it.
+
+        If an exception has ended that wait, this call does.
+        """
         with self.changed:
             self.stopping = self.running is not None
             abandoned = self.stopping and not self.waiting
@@ -152,7 +155,7 @@ class InterfaceWorld:
             self._begin_cancelling().join(SENT)
 
     def _begin(self, work: Callable[[], T], results: list[T | Exception]) -> None:
-        """Do some work in a thread of its own, and note its result or its exception."""
+        """Run a function in a separate thread, and record its result or its exception."""
         token = object()
 
         def run() -> None:
@@ -181,7 +184,7 @@ class InterfaceWorld:
             return over()
 
     def _idle(self) -> bool:
-        """Return whether no action runs any more, after the time that a robot is given to end one."""
+        """Return whether the running action has ended within the time that a robot has for that."""
         with self.changed:
             return self.changed.wait_for(lambda: self.running is None, GRACE)
 
@@ -200,7 +203,7 @@ class InterfaceWorld:
         return Report(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
 
     def _begin_cancelling(self) -> Thread:
-        """Request the robot to end its action, in a thread of its own, which is returned; an error of it is ignored."""
+        """Request the robot to end its action, in a separate thread; return the thread. An error of the request is ignored."""
 
         def run() -> None:
             with suppress(Exception):
@@ -229,7 +232,7 @@ class InterfaceWorld:
 
 
 def _amount(shown: Any, step: str | None) -> str | None:
-    """Return a number as amounts are written, rounded down to a multiple of `step`; None if it is no finite number."""
+    """Return the text of a number as an amount, rounded down to a multiple of `step`; None if the number isn't finite."""
     if isinstance(shown, bool) or not isinstance(shown, int | float) or not math.isfinite(shown):
         return None
     exact = Fraction(str(shown))

@@ -26,7 +26,7 @@ ANSWERS_WITHIN = 5.0
 """Seconds within which a server has to answer a question about its world, or a cancellation."""
 
 ACTION_WITHIN = 3600.0
-"""Seconds after which the connection of an action is given up; the action's own time limit ends it long before."""
+"""Seconds after which the connection of an action is closed; the action's own time limit ends it long before."""
 
 MOST_BYTES = 20_000_000
 """Maximum size of an answer."""
@@ -43,7 +43,7 @@ class HttpRobot:
     Raises
     ------
     RobotError
-        It is no such URL.
+        The text is no such URL.
     """
 
     def __init__(self, where: str) -> None:

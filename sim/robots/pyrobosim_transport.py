@@ -18,7 +18,7 @@ AS_FAST_AS_POSSIBLE = -1.0
 """Factor of pyrobosim between simulated and real time."""
 
 DETOUR = 1.5
-"""Ratio of the longest path that a sampling planner finds to the shortest along the axes."""
+"""Ratio of the longest path that a sampling planner finds to the shortest path along the axes."""
 
 USES = ("navigate", "pick", "place", "open", "close", "detect")
 """The kinds of battery usage that a world file states."""
@@ -65,12 +65,12 @@ class Pyrobosim:
                 options.rng = np.random.default_rng([seed, number, *kind.encode()])
 
     def _quiet(self) -> None:
-        """Let pyrobosim log errors only: verdicts report failures."""
+        """Restrict pyrobosim's log to errors, since verdicts report failures."""
         for owner in (self.world, *self.world.robots):
             owner.logger.setLevel(logging.ERROR)
 
     def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
-        """Let a robot, the argument `robot` or the only one, execute an action."""
+        """Execute an action by the robot that the argument `robot` names, or by the only robot."""
         from pyrobosim.planning.actions import TaskAction
 
         robot = self._robot(arguments.get("robot", ""))
@@ -89,7 +89,7 @@ class Pyrobosim:
         return result.status.name, result.message or ""
 
     def _note_search(self, robot: Any) -> None:
-        """Note that the robot has looked for things where it is, if it knows all that are there."""
+        """Record that the robot has searched its location, if it knows all objects there."""
         there = {thing.name for thing in getattr(robot.location, "children", ())}
         if there <= {thing.name for thing in robot.get_known_objects()}:
             self.searched.add(robot.location.name)
@@ -150,7 +150,7 @@ class Pyrobosim:
         return found
 
     def _room_of(self, robot: Any) -> str | None:
-        """Return the room of a robot; in a hallway, the one at the nearer end."""
+        """Return the room of a robot; in a hallway, the room at the nearer end."""
         here = robot.location
         if hasattr(here, "room_start"):
             place = robot.get_pose()
@@ -161,7 +161,10 @@ class Pyrobosim:
         return None if here is None else str(here.name)
 
     def scene_model(self) -> Model:
-        """Return the model with shapes, and with the ways between rooms: the longest between any two of their places, in metres."""
+        """Return the model with shapes, and with the distance in metres between any two rooms.
+
+        The longest path between their places.
+        """
         shapes = self._shapes()
         shaped = {name: {**fields, "shape": shapes.get(name, [])} for name, fields in self.model().items()}
         return {**shaped, **dict(self._ways())}

@@ -1,4 +1,4 @@
-"""The connection to a robot that others control: its actions, and its world model."""
+"""The connection to an external robot: its actions, and its world model."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol, TypeAlias
 
 Model: TypeAlias = "Mapping[str, Mapping[str, Any]]"
-"""A robot's world model: by entity, by field, a text, number, truth value, list of texts, or None."""
+"""A robot's world model: the fields of each entity, with a text, number, truth value, list of texts, or None."""
 
 
 class RobotError(Exception):
@@ -14,7 +14,7 @@ class RobotError(Exception):
 
 
 class Transport(Protocol):
-    """The connection to a robot. `call` and `cancel` are called from different threads, all else is not."""
+    """The connection to a robot. `call` and `cancel` may run in different threads; all other functions run in one thread."""
 
     def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
         """Execute an action and return its status and a message when it has ended; raise `RobotError` if there is no answer."""

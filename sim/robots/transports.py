@@ -22,4 +22,4 @@ def http(where: str, seed: int) -> Transport:
 
 
 TRANSPORTS: Mapping[str, Callable[[str, int], Transport]] = {"http": http, "pyrobosim": pyrobosim}
-"""By name, as e:transport states it: the function from an address and a seed to a connection."""
+"""The transports by the name in `e:transport`: each is a function of an address and a seed that returns a connection."""
