@@ -32,7 +32,7 @@ Facts: TypeAlias = "str | Iterable[str] | Mapping[str, str]"
 
 
 class Stated(list[str]):
-    """Facts as texts; also the value of each by the words before it, ``facts["cup1 LOCATION"]``."""
+    """Facts as texts. The value of a fact is found by the words before it: ``facts["cup1 LOCATION"]``."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...

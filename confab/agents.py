@@ -1,8 +1,8 @@
 """An MCP server: plan, query, validate, why, why not, verify and replan as tools of a language model's agent, on stdio.
 
-Each call is answered in a process of its own, which ends with the call: when its time is over, when the client cancels it, when the
-server ends. An answer is text of at most `SHOWN` bytes; the whole of a longer one is a resource that its last line names. Files are
-read in one folder; only a scene's reach facts are written, beside it.
+Each call is answered in a separate process, which ends with the call: when its time is over, when the client cancels it, or
+when the server ends. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the
+complete text. Files are read in one folder; only a scene's reach facts are written, beside it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
 SHOWN, KEPT = 4_000, 50
-"""Maximum bytes of an answer, and maximum number of long answers that are kept completely."""
+"""Maximum number of bytes of an answer, and maximum number of long answers that are kept completely."""
 MORE, MEGABYTES, MOST_SECONDS = 10.0, 6_000, 600.0
-"""Seconds that a process may exceed its limit, its maximum memory, and the largest limit."""
+"""Seconds by which a process may exceed its time limit, its maximum memory in megabytes, and the greatest time limit in seconds."""
 
 SceneName = Annotated[
     str, Field(description="A shipped scene (tool scenes), or a file in the folder, e.g. kitchen.ttl")

@@ -1,4 +1,4 @@
-"""The answers of the tools for agents (`confab.agents`) as text; each is computed in a process of its own, within one folder."""
+"""The answers of the tools for agents (`confab.agents`) as text, each computed in a separate process, within one folder."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def inside(folder: Path, name: str) -> Path:
     Raises
     ------
     KnowledgeError
-        There is none, or it lies elsewhere, as an address, an absolute path, ``..`` or a link may.
+        There is no such file, or the name (an address, an absolute path, ``..`` or a link) leads out of the folder.
     """
     path = (folder / name).resolve()
     if "://" in name or not path.is_relative_to(folder.resolve()):
@@ -38,7 +38,7 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def scene_of(folder: Path, name: str) -> Scene:
-    """Return a shipped scene, or a scene in a folder all of whose files lie in that folder.
+    """Return a shipped scene, or a scene whose files all lie in a folder.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def validate(folder: Path, name: str) -> str:
 
 
 def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float) -> str:
-    """Return why a step is in the plan, or each step; if there is no plan, why."""
+    """Return why a step, or each step, is in the plan; without a plan, why there is none."""
     with within(seconds):
         result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
         return (

@@ -48,7 +48,7 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
     Raises
     ------
     KnowledgeError
-        The name is no word, or one of the files exists already.
+        The name is no word, or one of the files already exists.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 
 
 def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
-    """Return the terms of a domain that a memory names and a scene doesn't know, each with the most similar known name.
+    """Return the terms of a domain that occur in a memory and not in a scene, each with the most similar name in the scene.
 
     Individuals of other scenes, which the paper's links may name, are left out.
     """
@@ -243,9 +243,9 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
 
 
 def migrate(memory: Path, renames: Sequence[str]) -> int:
-    """Rename terms in a memory file, each given as ``OLD=NEW``; return how many triples changed.
+    """Rename terms in a memory file, each given as ``OLD=NEW``; return the number of changed triples.
 
-    OLD and NEW are IRIs or their last parts; a NEW without namespace stays in that of OLD.
+    OLD and NEW are IRIs or their last parts; a NEW without a namespace gets the namespace of OLD.
 
     Raises
     ------

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """The verdict of the checker on a certificate: `refused` says why it isn't a proof.
+    """The verdict of the checker on a certificate. `refused` is the reason that it isn't a proof.
 
     None if it proves that there is no plan.
     """

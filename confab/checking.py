@@ -16,10 +16,10 @@ from confab.reasoner.reading.surroundings import Surroundings
 
 
 def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:
-    """Return the faults of a plan in the whole scene, after it was made in a part of the scene; empty if the plan is valid.
+    """Return the faults in the whole scene of a plan that was made in a part of the scene; empty if the plan is valid.
 
-    The plan is executed among its own individuals, and the checker reports on which other individuals each condition and effect
-    depends. The graph is queried for these until none is missing. Task recognition plays no part in this.
+    The plan is executed with the individuals of the part, and the checker reports the other individuals on which each condition
+    and effect depends. The graph is queried for these until none is missing. Task recognition plays no part in this.
 
     Parameters
     ----------

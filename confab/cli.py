@@ -1,8 +1,8 @@
-"""The command line: a table of commands and their functions, which are in `confab/commands/`, by purpose.
+"""The command line: a table of commands and their functions, which are in `confab/commands/`, grouped by purpose.
 
 Results go to stdout, progress and errors to stderr (`confab.terminal`). Exit 0: yes; 1: the answer is no; 2: misuse or
-unreadable input; 3: gave up at a limit; 4: a fault of ours. A command's module is imported when it is asked for, and heavy
-imports wait inside the commands that need them.
+unreadable input; 3: gave up at a limit; 4: a fault of ours. The module of a command is imported when the command is called;
+heavy imports are inside the commands that need them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ COMMANDS = {
     "import": ("authoring", "import_"),
     "export": ("authoring", "export"),
 }
-"""For each command its module in `confab/commands/` and its function."""
+"""The module in `confab/commands/` and the function of each command."""
 SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 
 
@@ -123,8 +123,8 @@ def app() -> None:
 
 
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
-    """Run the command line: everything ends as an exit code and at most one line on stderr.
+    """Run the command line; it always ends with an exit code and at most one line on stderr.
 
-    `ending` ends the process if a step continues long after its deadline; within another program, the process isn't ended.
+    `ending` ends the process if a step continues long after its deadline; inside another program, the process isn't ended.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

@@ -1,4 +1,4 @@
-"""Robots that others control, connected to a scene."""
+"""External robots, connected to a scene."""
 
 from __future__ import annotations
 

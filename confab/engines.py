@@ -1,8 +1,8 @@
 """Planning a level with an external planner through unified-planning: export, plan, read back, order.
 
-The result is one of our plans: each step stands behind the steps on which it depends, and below a behaviour of a higher level
-wherever a run of steps has exactly the effect of that behaviour. Every plan of an engine must be accepted by
-`confab.planner.validation`.
+The result is a plan like those of Confab's own search. Each step directly follows the steps on which it depends. A run of steps
+with exactly the effect of a behaviour of a higher level becomes the refinement of that behaviour. Every plan of an engine must
+be accepted by `confab.planner.validation`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ READING = 0.93
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines without support for numbers."""
 WITH_DEFINITIONS = {"up_fast_downward"}
-"""Packages of engines that take derived predicates; unified-planning itself reads none."""
+"""Packages of engines that support derived predicates; unified-planning itself doesn't read them."""
 KNOWN = {
     "aries": "up-aries",
     "enhsp": "up-enhsp",
@@ -54,9 +54,9 @@ KNOWN = {
     "symk": "up-symk",
     "tamer": "up-tamer",
 }
-"""Packages that bring an engine, by its name in unified-planning."""
+"""Packages that provide an engine, by the engine's name in unified-planning."""
 Answer = tuple[str, str, list[str]]
-"""The engine's name, its status in unified-planning's words, and the steps of its plan as ``action object …``."""
+"""The engine's name, its status in the terms of unified-planning, and the steps of its plan as ``action object …``."""
 
 
 def plan_by_engine(
@@ -71,7 +71,7 @@ def plan_by_engine(
         Its name in unified-planning, e.g. ``fast-downward``; if left out, any installed engine that supports the problem.
     level : int, optional
     seconds : float, optional
-        Time limit of the whole call; `ENGINE_SECONDS` if left out. A plan that the engine has written by then counts.
+        Time limit of the whole call; `ENGINE_SECONDS` if left out. A plan that the engine writes within the limit counts.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return unified-planning's answer to a level that it reads itself, in the process of `confab.reasoner.workers.call`."""
+    """Return unified-planning's answer for a level that it reads itself; runs in the process of `confab.reasoner.workers.call`."""
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException

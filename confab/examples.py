@@ -1,4 +1,4 @@
-"""Examples of every command for its help; they run in an empty folder, each after the ones above it."""
+"""Examples for the help of every command; they run in an empty folder, one after another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Execution at the front desk: interventions as people write them, episodes as JSON."""
+"""Execution for users: interventions in the notation of the command line, and episodes as JSON."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ FORMS = (
 
 
 def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
-    """Return interventions from texts; each may also be a file with one per line (``#`` begins a comment).
+    """Return interventions from texts. A text may also name a file with one intervention per line (``#`` begins a comment).
 
     Raises
     ------
@@ -283,7 +283,7 @@ def episode_json(episode: Episode) -> EpisodeJson:
 
 
 def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
-    """Return from when on a symbol had a value."""
+    """Return a value of a symbol with the time from which on the symbol had it."""
     return {
         "seconds": round(seconds, 4),
         "situation": symbol.situation,
@@ -349,14 +349,17 @@ class Execution:
         return text + (f"; didn't take place: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
-        """Return the partial order of the executed primitives: an edge from each to those that depend on it."""
+        """Return the partial order of the executed primitives, with an edge from each primitive to those that depend on it."""
         from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
-        """Write the episode, completely or not at all, and return the path: JSON if the name ends so, otherwise Turtle (PROV-O)."""
+        """Write the episode atomically and return the path.
+
+        A file that ends in ``.json`` gets JSON, any other file Turtle (PROV-O).
+        """
         from confab.reasoner.memory.episodes import save_episode
 
         if Path(path).suffix == ".json":
@@ -421,7 +424,7 @@ def carry_out(
     time_limit: float | None = None,
     **options: Unpack[Options],
 ) -> Execution:
-    """Execute a task with the arguments of a caller: see `confab.scene.Scene.execute`."""
+    """Execute a task with the arguments of `confab.scene.Scene.execute`."""
     from confab.live import spectator
 
     scene.settle()
@@ -445,9 +448,9 @@ def carry_out(
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
-    """Return the problem of a result, with the whole scene if the plan was made in a part of it, else the scene's own problem.
+    """Return the problem of the whole scene, with the goals of a result.
 
-    A plan that is made while acting may need an individual that the first plan didn't.
+    A plan that is made during execution may need an individual that the first plan didn't need.
     """
     whole = getattr(plan, "in_whole_scene", None)
     return with_goals(scene.reading.problem, goals) if whole is None else whole().problem
@@ -588,7 +591,7 @@ def _with_both_hands(
     observer: Callable[[Event], None] | None,
     caution: Caution | None,
 ) -> Episode:
-    """Execute a plan with all hands at once as far as possible, and the rest in a closed loop."""
+    """Execute a plan with all hands at once as far as possible, and the remaining steps in a closed loop."""
     from confab.planner.acting.episode import ExecutedPrimitive, Failure
     from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together

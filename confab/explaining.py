@@ -133,7 +133,7 @@ def explain(
     number : int
         The step to be explained.
     against : behaviour and arguments, optional
-        The alternative; if left out, the other advice of the rules there.
+        The alternative; if left out, the next advice of the rules in the same situation.
     labels : Labels, optional
         The labels for the text.
 
@@ -189,7 +189,7 @@ def explain(
 
 
 def behind(memory: Memory, name: str) -> str:
-    """Return how often a rule was chosen, passed over, and failed, and in which episodes."""
+    """Return in words the counts of a rule (chosen, passed over, failed) and the episodes that they come from."""
     tally = memory.experience.totals().get(name, {}).get(ITSELF, Tally())
     those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
     lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))
@@ -198,7 +198,7 @@ def behind(memory: Memory, name: str) -> str:
 
 
 def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:
-    """Return the most cogent way."""
+    """Return the most cogent instance of a rule."""
 
     def key(c: RuleInstance) -> float:
         facts, individual = reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles)

@@ -26,7 +26,7 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Whether definitions may exist; tested first, since most scenes needn't be read for a query."""
+"""Query for definitions. It is asked first, since a scene without definitions needn't be read to answer a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:

@@ -46,11 +46,11 @@ class BrokenJson(TypedDict):
 
 
 LeftJson = TypedDict("LeftJson", {"level": int, "from": list[int], "to": list[int], "breaks": list[BrokenJson]})
-"""A level that was left, from one path to another, and the conditions that the plan violates there."""
+"""A level that the plan leaves between two paths, and the conditions of the level that it violates there."""
 
 
 class CacheJson(TypedDict):
-    """How often a refinement was found in the cache, and how often it wasn't."""
+    """Numbers of refinements that were found in the cache, and that weren't."""
 
     hits: int
     misses: int
@@ -92,7 +92,10 @@ class _Outcome(TypedDict):
 
 
 class OutcomeJson(_Outcome, total=False):
-    """The result of planning; of a plan it has steps and length, of an unsolvable task a reason and maybe a certificate."""
+    """The result of planning: the steps and the length of a plan.
+
+    For an unsolvable task a reason, and a certificate if there is one.
+    """
 
     length: dict[str, int]
     steps: list[StepJson]
@@ -172,7 +175,7 @@ class DiscoveryJson(TypedDict):
 
 
 class SeenJson(TypedDict):
-    """From when on a symbol had a value; None if it could no longer be observed."""
+    """A value of a symbol, with the time from which on the symbol had it; None if it could no longer be observed."""
 
     seconds: float
     situation: str

@@ -1,4 +1,4 @@
-"""The name that does what a wrong name asks for, found by its words among the public names and their descriptions.
+"""The right name for a wrong name, found by the words of the wrong name among the public names and their descriptions.
 
 A wrong name is split into words; words of one meaning are equal. The candidates are the names of the object itself, then those of
 the objects that it leads to (``result.outcome.search``), then all others (``scene.with_fact``).
@@ -36,7 +36,7 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "execution": {"episode": "episode"},
     "problem": {"domain": "domain"},
 }
-"""The attribute, or the call, that leads from a thing to another one."""
+"""The attribute, or the call, that leads from an object to another one."""
 MEANINGS = """
 load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
 scenes examples datasets catalog list available builtin samples
@@ -96,7 +96,7 @@ board widget edit editor interactive gui ui
 show print pretty display
 __version__ version
 """
-"""Words with one meaning, a line each."""
+"""Groups of words with the same meaning, one group per line."""
 FILLERS = frozenset(
     {
         "get",
@@ -120,23 +120,23 @@ FILLERS = frozenset(
     }
 )
 OF_ANY = frozenset({"plan", "planning", "search"})
-"""Words that say little beside others: the length of a plan is its length."""
+"""Words that are ignored beside other words: a plan's length is its length."""
 ENOUGH, FAR = 0.5, 0.1
-"""Least score of a name that is told; by how much a name counts less for each step that leads to it."""
+"""Minimum score of a suggested name; reduction of the score for each step that leads to the name."""
 MOST, NEAR = 3, 0.3
-"""Maximum number of names that are told, and by how much the others may count less than the first."""
+"""Maximum number of suggested names, and maximum difference of their scores from the best score."""
 
 
 @cache
 def meanings() -> Mapping[str, frozenset[int]]:
-    """Return the lines of `MEANINGS` that a word is in."""
+    """Return the lines of `MEANINGS` that contain a word, by word."""
     lines = [line.split() for line in MEANINGS.strip().splitlines()]
     words = {word for line in lines for word in line}
     return {word: frozenset(i for i, line in enumerate(lines) if word in line) for word in words}
 
 
 def alike(one: str, other: str) -> float:
-    """Return how much two words mean the same, from 0 to 1."""
+    """Return the similarity of the meanings of two words, from 0 to 1."""
     if one.rstrip("s") == other.rstrip("s"):
         return 1.0
     if meanings().get(one, frozenset()) & meanings().get(other, frozenset()):
@@ -147,7 +147,7 @@ def alike(one: str, other: str) -> float:
 
 @cache
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the words of a name that say something: of ``getPlanLength`` these are ``plan`` and ``length``."""
+    """Return the significant words of a name: ``plan`` and ``length`` of ``getPlanLength``."""
     words = tuple(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().strip("_").split("_"))
     return tuple(word for word in words if word not in FILLERS) or words
 
@@ -168,7 +168,7 @@ def described(kind: str) -> Mapping[str, str]:
 
 
 def places(kind: str) -> Iterator[tuple[str, str, int]]:
-    """Yield each class that can be looked at, with what stands before its names, and the number of steps there."""
+    """Yield each reachable class, with the expression before its names, and the number of steps to it."""
     waiting, seen = [(kind, "confab." if kind == "confab" else "", 0)], {kind}
     while waiting:
         here, before, far = waiting.pop(0)
@@ -183,7 +183,7 @@ def places(kind: str) -> Iterator[tuple[str, str, int]]:
 
 
 def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
-    """Return how well a name does what some words ask for, from 0 to 1."""
+    """Return the score of a name, with its description, for some wanted words, from 0 to 1."""
     has, said = words_of(name), set(re.findall(r"[a-z]+", doc.lower()))
     met = [max(alike(word, one) for one in has) for word in wanted]
     told = [
@@ -195,7 +195,7 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 
 
 def guessed(kind: str, name: str) -> str:
-    """Return the names that may do what a wrong name of a thing asks for, the best first, or an empty text.
+    """Return the names that may be meant by a wrong name, the best first; an empty text if there are none.
 
     >>> guessed("result", "planning_time"), guessed("plan", "xyzzy")
     ('seconds, timed, or outcome.seconds', '')
@@ -213,7 +213,7 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return which of some names a wrong one means, or an empty text.
+    """Return the known name that a wrong name means; an empty text if there is none.
 
     >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
     ('time_limit', '')

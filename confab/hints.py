@@ -1,4 +1,4 @@
-"""Hints for wrong names: names of other libraries, and the ones with the same function here."""
+"""Hints for wrong names: names from other libraries, and the names of the same functions in Confab."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs that are kept: each in a folder with a record (``run.json``); a folder of runs is listed, compared and shown on the page."""
+"""Stored runs: each is a folder with a record (``run.json``). A folder of runs can be listed, compared and shown on the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from confab.page.schema import PageData
 
 RECORD = "run.json"
-"""The file in a run's folder by which it is known."""
+"""The file that marks the folder of a run."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Run:
     page: PageData
 
     def figures(self) -> dict[str, str]:
-        """Return the outcome of the run and its figures, by name, as text."""
+        """Return the outcome of the run and its figures as texts, by name."""
         sign = {True: "✓ ", False: "✗ ", None: ""}[self.page.get("good")]
         figures = {"verdict": sign + self.page["status"]}
         figures |= {tile["name"]: tile["text"] for tile in self.page["tiles"]}
@@ -50,7 +50,7 @@ class Run:
 
 
 def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str) -> Path:
-    """Write the record of a run into its folder, and return its path; the film isn't in it."""
+    """Write the record of a run, without the film, into its folder, and return its path."""
     shown = {key: value for key, value in page.items() if key != "film"}
     when = datetime.now().astimezone().isoformat(timespec="seconds")
     data = {"run": folder.resolve().name, "when": when, "how": dict(how), "memory": memory, "page": shown}
@@ -59,7 +59,7 @@ def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str)
 
 
 def new_folder(runs: Path) -> Path:
-    """Make the next folder for a run, 001 or one more than the last, and return its path."""
+    """Create the folder of the next run (001, or the last number plus one), and return its path."""
     runs.mkdir(parents=True, exist_ok=True)
     last = max((int(one.name) for one in runs.iterdir() if one.name.isdecimal() and one.name.isascii()), default=0)
     while True:
@@ -132,7 +132,7 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
 
 
 def _by_name(those: Sequence[Run], wanted: Sequence[str]) -> dict[str, Run]:
-    """Return the runs by name, or raise a KnowledgeError if one that is wanted isn't there."""
+    """Return the runs by name; raise `KnowledgeError` if a wanted run is missing."""
     by_name = {run.name: run for run in those}
     for name in wanted:
         if name not in by_name:
@@ -157,7 +157,7 @@ def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
 
 
 def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) -> str:
-    """Return the page on which runs are shown and compared: at first those that are named, else the last.
+    """Return the page that shows and compares runs. It begins with the runs in `names`, or with the last one.
 
     Raises
     ------

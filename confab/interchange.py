@@ -1,4 +1,4 @@
-"""Plans as JSON, the format in which the command line writes and reads them (docs/command-line.md)."""
+"""Plans as JSON, the format that the command line writes and reads (docs/command-line.md)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def step_json(step: Step) -> StepJson:
 
 
 def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:
-    """Return the outcome of a planning call as JSON data; `seconds` are those before the search."""
+    """Return the outcome of a planning call as JSON data; `seconds` has the times before the search."""
     data: OutcomeJson = {
         "scene": scene,
         "status": outcome.status.value,
@@ -75,7 +75,7 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
 
 
 def read_plan(path: Path, problem: Problem) -> Plan:
-    """Read a plan from a JSON file: what `confab plan --json` prints, or any object with such ``steps``.
+    """Read a plan from a JSON file: the output of `confab plan --json`, or any object with such ``steps``.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
 
 
 def read_certificate(path: Path) -> Certificate:
-    """Read a certificate from a JSON file: what `confab plan --json` prints of an unsolvable task, or the certificate alone.
+    """Read a certificate from a JSON file: the output of `confab plan --json` for an unsolvable task, or the certificate alone.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, 
 
 
 def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
-    """Return a step with all below it from JSON data, which is at a position in the tree of the plan in a file.
+    """Return a step with its sub-steps from JSON data at a position in the tree of a plan.
 
     Raises
     ------

@@ -51,7 +51,7 @@ class Known:
     knowledge: KnowledgeGraph
 
     def __post_init__(self) -> None:
-        """Refuse a name or path, which `confab.load` takes."""
+        """Refuse a name or a path, which belong to `confab.load`."""
         if not isinstance(self.knowledge, KnowledgeGraph):
             raise TypeError(
                 f"a scene is made of a knowledge graph; got {self.knowledge!r}: use confab.load({self.knowledge!r})"
@@ -64,7 +64,7 @@ class Known:
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying: the present knowledge; values read from it are read again."""
+        """Return the state for pickling and copying: the knowledge graph. Values are read from it again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
@@ -90,7 +90,7 @@ class Known:
 
     @cached_property
     def names(self) -> Names:
-        """Short names and their IRIs; if the scene can't be read, of all terms in its files."""
+        """Short names and their IRIs; if the scene can't be read, the names of all terms in its files."""
         try:
             if "reading" in self.__dict__:
                 return self.reading.names
@@ -162,7 +162,7 @@ class Known:
         return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items()))
 
     def with_fact(self: S, *facts: Facts) -> S:
-        """Return a scene with some facts replaced, each a text, or given by its words; this scene stays as it is.
+        """Return a scene with some facts replaced, each given as a text or by its words; this scene is unchanged.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class Known:
         return self._restated(with_facts, facts)
 
     def with_goal(self: S, *goals: Facts) -> S:
-        """Return a scene with some goals replaced; this scene stays as it is.
+        """Return a scene with some goals replaced; this scene is unchanged.
 
         Raises
         ------
@@ -209,7 +209,7 @@ class Known:
 
     @cached_property
     def graph(self) -> rdflib.Graph:
-        """The scene's triples as an rdflib graph; changes to it take effect in `query` and `plan` at once."""
+        """The scene's triples as an rdflib graph; changes of the graph take effect in `query` and `plan` at once."""
         from confab.reasoner.graph.rdflib_graph import rdflib_graph
 
         self.settle()
@@ -266,15 +266,15 @@ class Known:
 
         The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
 
-        Prefixes are those of the scene's file, then those of its imports. ``:name`` is the core's if the scene's own namespace
-        has no such name. The query is answered in a process of its own: see `confab.reasoner.graph.query_process`.
+        Prefixes are those of the scene's file, then those of its imports. ``:name`` denotes a term of the core if the scene's
+        own namespace has no such name. The query is answered in a separate process: see `confab.reasoner.graph.query_process`.
 
         Raises
         ------
         KnowledgeError
             The query isn't SPARQL; the message has line and column. Or it queries another endpoint without permission.
         LimitError
-            It takes more time, rows or memory than the limits allow.
+            The query takes more time, rows or memory than the limits allow.
 
         Examples
         --------
@@ -344,7 +344,7 @@ class Known:
         Raises
         ------
         KnowledgeError, LimitError
-            As `query`; the query gives no triples but rows.
+            As for `query`; also if the query returns rows and not triples.
         """
         sparql = sparql_of(sparql)
         if path is not None:

@@ -26,7 +26,7 @@ NAMED = re.compile(
     rf"|(?P<of>\w+) of (?P<about>{WORD}(?:, {WORD})*): "
     rf"|(?P<words>{WORD}(?: {WORD})*)"
 )
-"""A symbol with a value, a symbol before a colon, or words, among which facts may be."""
+"""A symbol with a value, a symbol before a colon, or words that may contain facts."""
 AT_ONCE = 400
 """Maximum number of labels in one query."""
 
@@ -76,7 +76,7 @@ class Labels:
         return NAMED.sub(self._replaced, text)
 
     def _replaced(self, found: re.Match[str]) -> str:
-        """Return what stands for a symbol with its value, for a symbol before a colon, or for words."""
+        """Return the replacement of a symbol with its value, of a symbol before a colon, or of words."""
         situations = self.domain.situations
         *arguments, situation = (found["symbol"] or f"{found['about']}, {found['of']}").split(", ")
         if found["words"] is None:
@@ -100,13 +100,13 @@ class Labels:
         return " ".join(said)
 
     def placed(self, name: str) -> str:
-        """Return the label of an individual as a noun: "the place in the box" where the label is "in the box"."""
+        """Return the label of an individual as a noun: "the place in the box" if the label is "in the box"."""
         label = self.name(name)
         first, *more = label.split(" ")
         return f"the place {label}" if first in PLACING and more and more[-1] not in WAYS | {"of"} else label
 
     def about(self, symbol: Symbol) -> str:
-        """Return the beginning of a sentence that a value of a symbol ends: "cup 1 is at"."""
+        """Return the beginning of a sentence about a symbol, without the value: "cup 1 is at"."""
         names = [self.name(name) for name in symbol.arguments]
         verb = self.verbs.get(symbol.situation)
         if verb is None or not names:
@@ -213,7 +213,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of some IRIs; English ones before those of no language, these before others."""
+    """Return the labels of some IRIs; English labels are preferred, then labels without a language."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

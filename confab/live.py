@@ -49,7 +49,7 @@ class View:
         return notes
 
     def __repr__(self) -> str:
-        """Return where things stand, in one line."""
+        """Return the state of the episode in one line."""
         return "; ".join((self.headline(), *self.log[-1:]))
 
     def headline(self) -> str:
@@ -89,7 +89,7 @@ class View:
 
 @contextmanager
 def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
-    """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither.
+    """Show an episode during its execution, in a terminal or a notebook; show nothing if the output goes to neither.
 
     `other` is another observer.
     """

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of links; plans that would add more aren't learned for the paper's mode, which plans small scenes only."""
+"""Maximum number of links. A plan that would exceed it isn't learned for the paper's mode, which plans small scenes only."""
 SHOWN = 3
 """Maximum number of preferences of a method that are listed."""
 
@@ -70,7 +70,8 @@ class Memory:
     experience : Experience
         Rules, orders of goals and methods, with counts of choices, rejections and failures.
     trusted : set of replica
-        Whose experience may lead: by default the replica that learns here. With any other, planning is strict.
+        Replicas whose experience may lead; by default the replica of this memory. With experience of others, planning is
+        strict.
     labels : function, optional
         Labels of the scene's terms, looked up when a text needs them.
     """
@@ -111,7 +112,7 @@ class Memory:
         scene : Scene, optional
             Its short names are used for the memory's terms.
         trust : bool
-            Whether the experience of every replica may lead, not only of the one that learns into this file.
+            Whether the experience of every replica may lead, and not only that of the replica that writes this file.
         lines : Lines, optional
             The file's, if it was read already (`confab.reasoner.memory.links_file.memory_lines`).
 
@@ -145,7 +146,7 @@ class Memory:
         ----------
         scene : Scene
         plan : Plan, Result, Execution or file
-            Of an execution all is learned, as by `live`.
+            The lesson of an execution is the same as that of `live`.
         failed : path of a step, optional
             The step that failed; the steps before it succeeded, the steps after it weren't tried.
 
@@ -171,7 +172,7 @@ class Memory:
         self.links = links
 
     def teach(self, scene: Known, plan: AnyPlan) -> None:
-        """Learn how a scene is solved, with its goals in several orders: see `confab.planner.experience.lessons`.
+        """Learn from solutions of a scene with its goals in several orders: see `confab.planner.experience.lessons`.
 
         Parameters
         ----------
@@ -195,7 +196,7 @@ class Memory:
         self.links = links
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
-        """Return the paper's links with a plan learned, or unchanged if there would be too many."""
+        """Return the paper's links after learning a plan; they are unchanged if there would be too many."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 
@@ -208,7 +209,7 @@ class Memory:
             self.trusted.update(other.experience.episodes)
 
     def trust(self, replicas: Iterable[str]) -> None:
-        """Let the experience of other replicas lead like its own.
+        """Let the experience of other replicas lead, like that of this memory.
 
         Raises
         ------
@@ -227,7 +228,7 @@ class Memory:
         Parameters
         ----------
         problem : Problem
-            In which the episode's task was planned.
+            The problem of the episode's task.
         episode : Episode
         """
         from confab.planner.experience.lessons import live
@@ -240,9 +241,9 @@ class Memory:
                 live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
 
     def save(self, target: str | Path) -> Path:
-        """Write the memory as Turtle atomically, and return the path; to an endpoint, only this replica's own counters.
+        """Write the memory as Turtle atomically, and return the path. An endpoint gets only the counters of this replica.
 
-        A file is read back before it replaces anything.
+        A file is read back before it replaces the old one.
 
         Raises
         ------
@@ -398,7 +399,7 @@ def _labels(scene: Known) -> Callable[[], Labels]:
 
 
 def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
-    """Return the recent preferences for individuals in words, the clearest first."""
+    """Return the recent preferences for individuals in words, the strongest first."""
     clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
@@ -415,7 +416,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def endpoint(source: str | Path) -> str | None:
-    """Return the URL of a SPARQL endpoint, even one that a path has cut short; None for a file.
+    """Return the URL of a SPARQL endpoint, also if a path has removed one of its slashes; None for a file.
 
     Examples
     --------

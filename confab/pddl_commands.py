@@ -38,7 +38,7 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
     Raises
     ------
     KnowledgeError
-        The PDDL can't be used, or the scene can't be written: one line, with file, line and column where there are any.
+        The PDDL can't be used, or the scene can't be written; the message is one line, with file, line and column if known.
     """
     try:
         pddl = parse_files(domain, problem)
@@ -100,12 +100,10 @@ def read_pddl_plan(
 ) -> Plan:
     """Read a plan of another planner for an exported level, as one of our plans.
 
-    A planner without hierarchy interleaves independent steps arbitrarily: one hand waits at a place that the other needs.
-    `regroup` puts each step behind the latest step on which it depends; `shorten` also leaves out steps that the goal doesn't
-    need.
-
-    The values of a behaviour's variables (the object that is grasped) follow from the state before it, and a robot needs them.
-    Behind an inapplicable step they are left open, and validation reports that.
+    A planner without hierarchy interleaves independent steps arbitrarily, so that one hand may wait at a place that the other
+    needs. `regroup` moves each step directly after the latest step on which it depends; `shorten` also removes steps that the
+    goal doesn't need. The values of a behaviour's variables (the object that is grasped) follow from the state before it. After
+    an inapplicable step they are left open, which validation reports.
 
     Raises
     ------

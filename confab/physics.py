@@ -83,7 +83,7 @@ class Report:
 
     @property
     def shown(self) -> Rollout:
-        """The first rollout that isn't good, else the first."""
+        """The first rollout that isn't good; if all are good, the first."""
         return next((r for r in self.rollouts if not r.ok or self.missed(r)), self.rollouts[0])
 
     @property
@@ -94,7 +94,7 @@ class Report:
         return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
-        """Return the facts of the goal for which another value was seen in the end; symbols without a perceiver are skipped."""
+        """Return the goals for which another value was seen in the end; symbols without a perceiver are skipped."""
         wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
         return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
@@ -119,11 +119,11 @@ class Report:
         return [str(Fact(symbol, rollout.state[symbol])) for symbol in sorted(self.goal) if symbol in rollout.state]
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return the verdict on each step, by the step's path, in the first rollout that isn't good, else in the first."""
+        """Return the verdict on each step, by its path, in the rollout `shown`."""
         return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in self.shown.steps}
 
     def table(self) -> Table:
-        """Return a table of the first rollout that isn't good, else of the first: primitives with verdicts and measurements."""
+        """Return a table of the rollout `shown`: primitives with verdicts and measurements."""
         rows = (
             (
                 str(report.step),

@@ -74,7 +74,7 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
 
 
 def words_as_they_are() -> AbstractContextManager[None]:
-    """Return a context in which figures show ``$`` as a character; otherwise matplotlib parses it as a formula."""
+    """Return a context in which figures show ``$`` as a character; by default matplotlib parses it as the mark of a formula."""
     from matplotlib import rc_context
 
     return rc_context({"text.parse_math": False})
@@ -90,7 +90,7 @@ def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
 
 
 def card(scene: Known, name: str) -> Figure:
-    """Return a diagram of a behaviour between its preconditions and its effects, in the words of their labels."""
+    """Return a diagram of a behaviour between its preconditions and its effects, labelled by their sentences."""
     from matplotlib.figure import Figure
 
     behavior = behavior_named(scene.reading, name)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from confab.reasoner.memory.links import Links
 
 NO_ENGINE = "none"
-"""The name of an engine that means: no engine."""
+"""The value of the option `engine` that excludes all engines."""
 OPTIMAL_SECONDS = 10.0
 """Default time limit of the search for an optimal plan."""
 
@@ -81,12 +81,12 @@ class PlanOptions:
 
     @property
     def by_engine(self) -> bool:
-        """Whether an engine that the caller names plans."""
+        """Whether the caller has named an engine."""
         return self.engine not in (None, NO_ENGINE)
 
     @property
     def asks_for_least(self) -> bool:
-        """Whether another option than the mode asks for the optimal search."""
+        """Whether another option than `mode` requires the optimal search."""
         return self.optimal or self.minimise in ("cost", "steps")
 
     @property
@@ -101,7 +101,7 @@ class PlanOptions:
 
 
 def leaves_levels(levels: str) -> bool:
-    """Return whether levels may be left, as ``--levels`` says it."""
+    """Return whether levels may be left, given the value of ``--levels``."""
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     return levels == "free"

@@ -59,7 +59,10 @@ if TYPE_CHECKING:
 OURS = 0.6
 """Share of a time limit for our own search if an installed engine is tried afterwards."""
 OURS_WORK = 10_000_000
-"""The same without a time limit, in work (states times operators), and as much for the last resort: about twenty seconds."""
+"""The same limit without a time limit, as work (states times operators); the last resort gets the same work.
+
+Together this takes about twenty seconds.
+"""
 
 
 def plan(
@@ -241,7 +244,7 @@ def _solved_below(problem: Problem, deadline: Deadline) -> bool:
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the plan of an installed engine, or why it found none; None if no engine is installed."""
+    """Return the plan of an installed engine, or the reason that it found none; None if no engine is installed."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
@@ -262,7 +265,7 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
 
 
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
-"""How to name a step of a plan; see `Result.why`."""
+"""The notations of a step of a plan; see `Result.why`."""
 
 
 @right_names("a result", "confab.hints", "RESULT")
@@ -320,7 +323,7 @@ class Result:
         Raises
         ------
         KnowledgeError
-            These aren't the IDs of the steps of the first level, each once; or the plan can't be done in that order.
+            The numbers aren't the IDs of all steps of the first level, each once; or the plan can't be executed in that order.
 
         Examples
         --------
@@ -472,7 +475,9 @@ class Result:
         return float(cost_of(self.problem, self.plan))
 
     def dearer(self) -> str:
-        """Return the known bound on a cheaper plan, and how to search for it; an empty text if there is none.
+        """Return the known bound on cheaper plans, and the option that searches for one.
+
+        An empty text if no cheaper plan is possible.
 
         Examples
         --------
@@ -507,7 +512,7 @@ class Result:
         return data
 
     def save(self, path: str | Path) -> Path:
-        """Write the result as JSON and return where."""
+        """Write the result as JSON and return the path."""
         from confab.reasoner.files import write_whole
 
         write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
@@ -531,7 +536,7 @@ class Result:
         return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps), *more])
 
     def report(self, path: str | Path) -> Path:
-        """Write the plan, with its reasons, as one HTML page, and return where."""
+        """Write the plan, with its reasons, as one HTML page, and return the path."""
         from confab.page.data import page_data
         from confab.page.frozen import write_page
 

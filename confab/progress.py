@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 PATIENCE = 1.0
-"""Seconds before a bar appears; shorter work needs none."""
+"""Seconds before a bar appears; shorter work shows none."""
 
 Advance: TypeAlias = Callable[[str, int], None]
 """Receives the present activity and the amount of work done."""
@@ -71,7 +71,7 @@ def progress_bar() -> Progress:
 
 
 def tell(what: str) -> None:
-    """Write the present activity to stderr in a line, where no bar can be shown."""
+    """Write the present activity to stderr in a line, if no bar can be shown."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
 

@@ -63,8 +63,9 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
 def with_reach(scene: S) -> S:
     """Return the scene with reach facts that fit its geometry.
 
-    They are computed if the scene has none, or those of another geometry, and then written into ``SCENE.reach.ttl`` beside the
-    scene's file, so that planning needs no physics; where that can't be written they live as long as the returned scene.
+    They are computed if the scene has none, or has those of another geometry. They are then written into ``SCENE.reach.ttl``
+    beside the scene's file, so that later planning needs no physics; if the file can't be written, only the returned scene has
+    them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Refutations: behaviours that physics found impossible in a situation are known to the next plan and to later calls."""
+"""Refutations: the next plan, and later calls, avoid behaviours that physics found impossible in a situation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:
-    """Return a scene in which some behaviours are refuted; this scene stays as it is."""
+    """Return a scene in which some behaviours are refuted; this scene is unchanged."""
     return type(scene)(with_refuted(scene.knowledge, scene.reading, refutations), dict(scene.seconds))
 
 

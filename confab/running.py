@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8
-"""Number of primitives between two lines on how far the plan is, where there is no progress bar."""
+"""Number of primitives between two lines about the progress of execution, if there is no progress bar."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Job:
 
     @property
     def command(self) -> str:
-        """The command that does the same, apart from where the results go."""
+        """The command that does the same, without the options for output."""
         given = {"--mode": self.mode, "--seed": str(self.seed), "--noise": f"{self.noise:g}"}
         first = {"--mode": DEFAULT_MODE, "--seed": "0", "--noise": "0"}
         options = [part for name, value in given.items() if value != first[name] for part in (name, value)]
@@ -130,7 +130,7 @@ def run(job: Job) -> int:
 
 
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
-    """Return the first plan that physics doesn't refute, with the refutations found and the verdict of physics.
+    """Return the first plan that physics doesn't refute, the refutations, and the verdict of physics.
 
     Refutations by motion planning apply to the next plan, and are saved if there is one.
     """
@@ -163,7 +163,10 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
 
 
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
-    """Write report and record; for a plan the plan, for a rollout verdicts and observed facts too; return the paths."""
+    """Write the report and the record; also the plan if there is one, and the verdicts and observed facts of a rollout.
+
+    Return the paths.
+    """
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 

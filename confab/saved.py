@@ -43,13 +43,13 @@ def read_episode(scene: Known, path: Path) -> Execution:
     scene : Scene
         The scene in which it happened.
     path : Path
-        Output of ``confab execute --json``, or a file written by `Execution.save` whose name ends in ``.json``. The situation
-        before a failure and the static facts that a step relied on aren't in it.
+        Output of ``confab execute --json``, or a file written by `Execution.save` whose name ends in ``.json``. The file
+        doesn't contain the situation before a failure, and the static facts on which a step relied.
 
     Raises
     ------
     KnowledgeError
-        The file contains no episode, one of another scene, or mentions terms that the scene doesn't have.
+        The file contains no episode, or an episode of another scene, or it mentions terms that the scene doesn't have.
     """
     from confab.execution import Execution
 
@@ -100,7 +100,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
     Raises
     ------
     KnowledgeError
-        The file contains no verdicts, or those of another plan.
+        The file contains no verdicts, or the verdicts on another plan.
     """
     from confab.physics import Report
     from confab.sim.verdict import Verdict
@@ -143,7 +143,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON object in a file; missing parts or parts of another form raise a `KnowledgeError`."""
+    """Yield the JSON object in a file; raise `KnowledgeError` if a part is missing or has another form."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -164,7 +164,7 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
 def _interventions(
     problem: Problem, data: Data
 ) -> tuple[tuple[tuple[Intervention, float], ...], tuple[Intervention, ...], Problem]:
-    """Return the interventions that took place, those that didn't, and the problem with all added individuals."""
+    """Return the interventions that took place, the interventions that didn't, and the problem with all added individuals."""
     from confab.execution import parse_intervention
 
     for one in data.get("discovered", []):
@@ -214,7 +214,7 @@ def _failure(one: Data, done: Mapping[tuple[int, ...], Step]) -> Failure:
 
 
 def _observed(initial: State, course: Sequence[Seen]) -> dict[Symbol, str]:
-    """Return the situation after all that was seen."""
+    """Return the situation after all observed changes."""
     state = dict(initial)
     for seen in course:
         if seen.value is None:

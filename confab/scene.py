@@ -128,9 +128,9 @@ class Scene(Known):
     ) -> Execution:
         """Execute the task in a closed loop: see `confab.execution.execute`.
 
-        It begins with `plan`: a plan, a result, or the name of a file that ``confab plan --json`` wrote. New plans are made with
-        `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal; `observer` is a
-        display of your own. After `time_limit` seconds the episode gives up.
+        It begins with `plan`: a plan, a result, or the name of a file that ``confab plan --json`` wrote. New plans are made
+        with `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal;
+        `observer` is a custom observer of events. After `time_limit` seconds the episode gives up.
 
         Examples
         --------
@@ -146,12 +146,12 @@ class Scene(Known):
 
     @contextmanager
     def serve(self, port: int = 0, limits: QueryLimits | None = None) -> Iterator[str]:
-        """Serve this scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block, whose URL is given.
+        """Serve this scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block; yield its URL.
 
         Raises
         ------
         KnowledgeError
-            The port is taken, or the scene is at an endpoint already.
+            The port is in use, or the scene is already at an endpoint.
 
         Examples
         --------
@@ -217,14 +217,14 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            unified-planning isn't installed, or reads no such problem: it knows no derived predicates.
+            unified-planning isn't installed, or can't read the problem: it doesn't support derived predicates.
         """
         from confab.engines import unified
 
         return unified(*self.to_pddl(level))
 
     def export(self, folder: str | Path, level: int | None = None) -> tuple[Path, Path]:
-        """Write one level, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder, and return where.
+        """Write one level, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder, and return the paths.
 
         Raises
         ------
@@ -241,7 +241,7 @@ class Scene(Known):
         Raises
         ------
         confab.reasoner.limits.OutOfTimeError
-            The time limit for both passes before the reason is found.
+            The time limit for both is over before the reason is found.
         """
         limit = options.get("time_limit")
         if not isinstance(limit, Deadline):
@@ -271,16 +271,16 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene
     Parameters
     ----------
     source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
-        Of several files, the scene is the first that no other imports. A scene is returned as it is.
-        A graph is copied; what it imports are shipped ontologies.
+        Of several files, the scene is the first that no other imports. A scene is returned unchanged. A graph is copied, and
+        may import shipped ontologies.
     scene : str, optional
         IRI of the scene in an endpoint that holds several.
 
     Raises
     ------
     KnowledgeError
-        No such scene; broken syntax; an endpoint that is down, or slow, or none. A file whose imports can't be found, or that
-        declares no ontology, can be queried; planning in it reports the missing parts.
+        There is no such scene, its syntax is invalid, or the endpoint is down, slow, or no endpoint. A file whose imports can't
+        be found, or that declares no ontology, can be queried; planning in it reports the missing parts.
 
     Examples
     --------
@@ -322,7 +322,7 @@ def _read(source: object) -> KnowledgeGraph:
 
 
 def load_text(content: bytes) -> Scene:
-    """Load a scene from its text: RDF/XML, JSON-LD or Turtle, by its first signs; it imports shipped ontologies.
+    """Load a scene from its text: RDF/XML, JSON-LD or Turtle, recognised by its first characters. It may import shipped ontologies.
 
     Raises
     ------
@@ -352,7 +352,7 @@ def load_text(content: bytes) -> Scene:
 
 
 def _local(address: str | PathLike[str]) -> str | Path:
-    """Return the path of an address ``file:///…``; anything else unchanged."""
+    """Return the path of an address ``file:///…``; return any other text unchanged."""
     if not isinstance(address, str) or not address.startswith("file:"):
         return address if isinstance(address, str) else Path(address)
     from urllib.parse import urlsplit

@@ -7,9 +7,10 @@
                 newer); POST of changed controls, answered with the resulting plan
 ==============  ==========================================================================================================
 
-uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.query_process`), in lanes. The
-first lane is for short queries; a query that exceeds the time of a lane starts again in the next one, with lower priority, so that
-short queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are refused.
+uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), in lanes. The first
+lane is for short queries; a query that exceeds the time of a lane starts again in the next one, with lower priority, so that
+short queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are
+refused.
 """
 
 from __future__ import annotations
@@ -62,15 +63,15 @@ transport_log.setLevel(logging.CRITICAL + 1)
 T = TypeVar("T")
 PORT = 7879
 LANES, AT_ONCE = (0.05, 0.5, 5.0, None), 2
-"""Seconds that a query may run in each lane, and how many queries run at once in each."""
+"""Maximum seconds of a query in each lane, and maximum number of concurrent queries in each lane."""
 LARGEST, SLOWEST = 1_000_000, 20.0
-"""Bytes of a request's body; seconds in which a request must arrive, and an answer be taken."""
+"""Maximum number of bytes of a request's body; maximum seconds in which a request must arrive, and an answer must be received."""
 MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
 """Open connections."""
 LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
-"""A request's target that names a host itself."""
+"""The target of a request if it contains a host."""
 SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
@@ -79,7 +80,7 @@ SOLUTIONS = {
     "text/csv": "sparql-csv",
     "text/tab-separated-values": "tsv",
 }
-"""Media types of the answer to a SELECT, and the first four of an ASK; the first one is the default."""
+"""Media types of the answer to a SELECT query; the first four are also those of an ASK query. The first one is the default."""
 TRIPLES = {
     "text/turtle": ox.RdfFormat.TURTLE,
     "application/n-triples": ox.RdfFormat.N_TRIPLES,
@@ -104,7 +105,7 @@ class Worker:
         self.process.start()
 
     async def call(self, function: Callable[..., T], *arguments: object) -> T:
-        """Return what a function returns in a thread; if the caller is cancelled, end the query of the process first."""
+        """Return the result of a function that runs in a thread; if the caller is cancelled, first end the query of the process."""
         future = asyncio.get_running_loop().run_in_executor(self.service.threads, function, *arguments)
         try:
             return await asyncio.shield(future)
@@ -130,7 +131,7 @@ class Service:
             self.lanes[number // AT_ONCE].put_nowait(worker)
 
     async def run(self, work: Callable[[QueryWorker], T]) -> T:
-        """Return the result of some work with a process, in the first lane that allows the time that it takes.
+        """Return the result of a query, in the first lane whose limit suffices.
 
         Raises
         ------
@@ -173,7 +174,7 @@ class Service:
             worker.process.close()
 
     def page_json(self, after: int) -> bytes | None:
-        """Return what the page shows, or None if it is of no later version: an execution that has begun, else the scene."""
+        """Return the data of the page: a running execution, otherwise the scene; None if there is no newer version."""
         if not self.following.begun:
             return json.dumps(self.sheet.scene_data).encode()
         return None if self.following.version <= after else json.dumps(self.following.data()).encode()
@@ -189,7 +190,7 @@ class Service:
 
 
 class Guard:
-    """Middleware that answers requests of this machine alone, and of no page of another site."""
+    """Middleware that refuses requests of other machines, and of pages of other sites."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -303,7 +304,7 @@ class Endpoint:
 
 
 async def refused(request: Request, error: Exception) -> Response:
-    """Answer a request that is refused with a status and one line."""
+    """Answer a refused request with a status and one line."""
     assert isinstance(error, HTTPException)
     where = f"nothing is at {request.scope['path'][:80]!r}; the endpoint is at /sparql"
     return PlainTextResponse(
@@ -312,7 +313,7 @@ async def refused(request: Request, error: Exception) -> Response:
 
 
 async def fault(request: Request, error: Exception) -> Response:
-    """Answer a request that met a fault of the program."""
+    """Answer a request that caused a fault of the program."""
     if not isinstance(error, ClientDisconnect):
         log.error("confab: a request couldn't be answered", exc_info=error)
     return PlainTextResponse("a fault of Confab, not yours; see its log\n", 500)
@@ -375,7 +376,7 @@ def utf8(content: bytes) -> str:
 
 
 def preferred(accept: str, offered: Sequence[str]) -> str:
-    """Return the media type that an ``Accept`` header prefers; among equals, the first that is offered.
+    """Return the media type that an ``Accept`` header prefers; among equally preferred types, the first offered one.
 
     >>> preferred("text/csv;q=0.5, application/*", ["application/json", "text/csv"]), preferred("*/*", ["a/b", "c/d"])
     ('application/json', 'a/b')
@@ -395,9 +396,9 @@ def preferred(accept: str, offered: Sequence[str]) -> str:
 
 
 class Connection(H11Protocol):
-    """A connection on which each request must arrive, and each answer be taken, within `SLOWEST` seconds.
+    """A connection on which each request must arrive, and each answer must be received, within `SLOWEST` seconds.
 
-    If too many are open, the one that has been waited for longest is dropped.
+    If too many connections are open, the one that has been idle for the longest time is dropped.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -432,7 +433,7 @@ class Connection(H11Protocol):
 
 
 class Server(uvicorn.Server):
-    """A server in a thread of its own, which drops its clients when it ends."""
+    """A server in a separate thread, which drops its clients when it ends."""
 
     def __init__(self, service: Service, listening: socket.socket) -> None:
         self.service, self.listening = service, listening
@@ -443,7 +444,7 @@ class Server(uvicorn.Server):
         self.thread = threading.Thread(target=asyncio.run, args=[self.run_quietly()], name="confab-serve", daemon=True)
 
     async def run_quietly(self) -> None:
-        """Serve until `should_exit`; clients that break off are no news."""
+        """Serve until `should_exit`; disconnections of clients aren't logged."""
         asyncio.get_running_loop().set_exception_handler(lambda _, context: transport_log.debug("%s", context))
         await self.serve([self.listening])
 
@@ -457,7 +458,7 @@ class Server(uvicorn.Server):
 
 @contextmanager
 def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -> Iterator[Server]:
-    """Serve a scene until the end of the block; port 0 is any free one.
+    """Serve a scene until the end of the block; port 0 selects a free port.
 
     Raises
     ------

@@ -30,7 +30,7 @@ def page() -> Console:
 
 
 def show(what: Any) -> None:
-    """Print an object of rich to stdout completely: lines wrap in a terminal only."""
+    """Print an object of rich to stdout completely; lines are wrapped in a terminal only."""
     page().print(what, markup=False, highlight=False)
 
 

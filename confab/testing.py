@@ -1,6 +1,6 @@
 """Conformance test of a world in which the executive shall act: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
 
-Each check reports its finding with numbers. The primitives of a plan are really executed: keep people away from the robot.
+Each check reports its finding with numbers. The robot really executes the primitives of a plan: keep people away from it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from confab.planner.validation import successor
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LOOKS = 5
-"""Number of observations of which the latency is measured."""
+"""Number of observations whose latency is measured."""
 
 SOON = 1.0
 """Seconds within which an observation, and `stop`, should return."""
@@ -75,9 +75,9 @@ def check_world(
     Parameters
     ----------
     world : World
-        In the initial situation of the problem, or near it.
+        It must be in the initial situation of the problem, or near it.
     problem : Problem
-        A scene's: its primitives are executed, and its symbols are known.
+        The problem of a scene: its primitives are executed, and its symbols are known.
     steps : sequence of Step, optional
         Primitives to execute, in order; by default those of a plan for the problem's goal from the observed state.
     stopped_within : float
@@ -225,7 +225,7 @@ def _noting(answers: list[Verdict | Exception], work: Callable[[], Verdict]) -> 
 
 
 def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: list[Check]) -> None:
-    """Check verdicts against observations, primitive by primitive; what fails is tried again."""
+    """Compare the verdict on each primitive with the observation after it; a failed primitive is tried again."""
     done, failed, lies, understated, nameless, times = 0, 0, list[str](), list[str](), list[str](), list[float]()
     seen, wanted, ended = set[Symbol](), dict[Symbol, None](), ""
     for step in steps:

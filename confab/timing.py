@@ -55,7 +55,7 @@ def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan
 
 
 def scheduled(problem: Problem, outcome: Outcome, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Return an outcome with its plan in time; without a schedule that keeps the task's times the plan is given up."""
+    """Return an outcome with its plan in time; if no schedule keeps the times of the task, the outcome is "gave up"."""
     from confab.planner.timed.call import in_time
 
     if outcome.plan is None:
@@ -67,12 +67,12 @@ def scheduled(problem: Problem, outcome: Outcome, deadline: Deadline) -> tuple[O
 
 
 def needs_others_meanwhile(problem: Problem) -> bool:
-    """Return whether some behaviour is of use to others only while it lasts."""
+    """Return whether other behaviours need a value that a behaviour gives only for its duration."""
     return bool(only_during(problem))
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether overlapping steps may do more than any sequence: a condition or effect belongs to a begin or an end."""
+    """Return whether overlapping steps may reach more than any sequence: some condition or effect is at a begin or an end."""
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()

@@ -92,7 +92,7 @@ def write_trajectories(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def _yaml(value: Any, indent: int = 0) -> Iterator[str]:
-    """Yield mappings and sequences of mappings as YAML blocks, everything else in YAML's flow style, which JSON is."""
+    """Yield mappings and sequences of mappings as YAML blocks, and all other values in YAML's flow style, as in JSON."""
     space = "  " * indent
     if isinstance(value, Mapping) and _nested(value):
         for key, inner in value.items():
@@ -114,7 +114,7 @@ def _yaml(value: Any, indent: int = 0) -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """Return a value in one line. Numbers have no exponents: YAML 1.1 takes 1e-05 for a text."""
+    """Return a value in one line. Numbers have no exponents, since YAML 1.1 reads 1e-05 as a text."""
     if isinstance(value, float):
         return f"{value:.9f}".rstrip("0") + "0" * value.is_integer()
     if isinstance(value, Mapping):
@@ -123,7 +123,7 @@ def _flow(value: Any) -> str:
 
 
 def _nested(value: Any) -> bool:
-    """Return whether a value has mappings or sequences of mappings below it that deserve lines of their own."""
+    """Return whether a value contains mappings, or sequences of mappings, that get separate lines."""
     if isinstance(value, Mapping):
         return any(isinstance(inner, Mapping | list) for inner in value.values())
     return isinstance(value, list) and any(isinstance(inner, Mapping) for inner in value)

@@ -22,7 +22,7 @@ from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact, Problem
 
 RETRIES = 5
-"""Number of failures after which an exported tree fails; until then it is ticked from the beginning."""
+"""Number of failures after which an exported tree fails; before that it is ticked again from the beginning."""
 
 RESERVED = {
     "ID",
@@ -52,11 +52,11 @@ RESERVED |= {
 
 @dataclass(frozen=True)
 class Element:
-    """A node as both engines have it.
+    """A node in a form that both engines have.
 
-    `kind` is Fallback, Sequence (both tick their first children again in each tick), Once (a sequence that resumes where it was),
-    Parallel, SubTree, Check, Set, Again, Condition or Action. `name` is that of a subtree, a mark or a leaf; `key` tells leaves
-    apart.
+    `kind` is Fallback, Sequence (both tick their first children again in each tick), Once (a sequence that resumes where it
+    was), Parallel, SubTree, Check, Set, Again, Condition or Action. `name` is the name of a subtree, a mark or a leaf; `key`
+    identifies a leaf.
     """
 
     kind: str
@@ -68,7 +68,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Tree:
-    """The behaviour tree of a plan: subtrees by name, the whole one first; the conditions or action of each leaf, by key."""
+    """The behaviour tree of a plan: subtrees by name, the whole tree first; the conditions or the action of each leaf, by key."""
 
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
@@ -83,7 +83,7 @@ class Tree:
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
-    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`), as engines have it."""
+    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`) in the form of the engines."""
     lowering = _Lowering(problem)
     lowering.lowered(tree_of(problem, plan))
     return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
@@ -141,7 +141,7 @@ class _Lowering:
                 return Element("SubTree", own)
 
     def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
-        """Return a leaf with a key of its own."""
+        """Return a leaf with a unique key."""
         key = f"{kind[0].lower()}{len(self.leaves)}"
         self.leaves[key] = what
         return Element(kind, name, ports=ports, key=key)
@@ -165,7 +165,7 @@ def _mark(path: tuple[int, ...]) -> str:
 
 
 def _identifier(name: str) -> str:
-    """Return a name as engines allow it: letters, digits and underscores, no digit first, and none of their own names."""
+    """Return a name that the engines allow: letters, digits and underscores, not beginning with a digit, and no reserved name."""
     found = re.sub(r"\W+", "_", name).strip("_")
     found = f"_{found}" if found[:1].isdigit() else found
     return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
@@ -343,7 +343,7 @@ def filled(
 
 
 def ticked(root: Any, most: int = 10_000) -> bool:
-    """Tick the root of a tree until it succeeds or fails, or that many times; return whether it succeeded."""
+    """Tick the root of a tree until it succeeds or fails, at most `most` times; return whether it succeeded."""
     from py_trees.common import Status
 
     for _ in range(most):

@@ -1,4 +1,4 @@
-"""Watching edited files: report whenever one of them, or an import, has changed."""
+"""Watching edited files: report every change of a file or of an import."""
 
 from __future__ import annotations
 

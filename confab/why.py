@@ -1,4 +1,4 @@
-"""Why a step is in a plan, and why another one isn't, in sentences: `Result.why`, `Result.why_not` and `Scene.explain`."""
+"""Reasons in sentences: why a step is in a plan, and why an alternative isn't (`Result.why`, `Result.why_not`, `Scene.explain`)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Path: TypeAlias = "tuple[int, ...]"
 Steps: TypeAlias = "Mapping[Path, Step]"
 BY = re.compile(r"\s+(?:by|with)\s+(\S+)\s*$")
 SHOWN = 3
-"""Maximum number of needs of a step that are listed; the rest is counted."""
+"""Maximum number of needs of a step that are listed; the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -240,8 +240,8 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
     ----------
     plan : Plan
     asked : Step, int, str or path
-        Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3, counted from 0; the position in the tree,
-        ``0.1.2``; or words: of the step as it is printed, or of its label.
+        The number of a step of the first level, counted from 0; ``L3#12``, the step 12 of level 3, counted from 0; the position
+        in the tree, ``0.1.2``; or the words of the printed step or of its label.
     labels : Labels
 
     Raises
@@ -392,14 +392,14 @@ def why_not(
         The problem and its plan.
     labels : Labels
     ask, replan : callable
-        Plan in a problem that is given; plan in the scene for other goals.
+        `ask` plans in a given problem; `replan` plans in the scene for other goals.
     instead : Step, optional
-        In whose place the behaviour would be done.
+        The step that the behaviour would replace.
 
     Raises
     ------
     KnowledgeError
-        It mentions terms that the scene doesn't have.
+        The text mentions terms that the scene doesn't have.
     """
     first, _, rest = asked.strip().partition(" ")
     behavior = problem.domain.behaviors.get(first)

@@ -20,7 +20,7 @@ from confab.scene import load
 from confab.sim.robots.transport import Model, RobotError
 
 MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
-"""Namespaces of a world model in the scene query of an interface: of its fields, and of the entities that their texts name."""
+"""Namespaces in the scene query of an interface: of the fields of a world model, and of the entities that their texts name."""
 
 DCTERMS = "http://purl.org/dc/terms/"
 WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
@@ -43,7 +43,7 @@ def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
     Raises
     ------
     KnowledgeError
-        No such interface, or one without scene query; the robot can't be reached; its model makes no scene.
+        There is no such interface, or it has no scene query; the robot can't be reached; or its model yields no scene.
     """
     name, where = (
         (WORLD_FILES[Path(on).suffix], on) if Path(on).suffix in WORLD_FILES and Path(on).is_file() else parts_of(on)
@@ -160,7 +160,7 @@ def _literal(shown: Any) -> ox.Literal | None:
 
 
 def _turtle(iri: str, imported: Sequence[str], found: list[ox.Triple], title: str) -> str:
-    """Return a scene's triples as Turtle, with a head and labels, all individuals different."""
+    """Return the triples of a scene as Turtle, with a header and labels; all individuals are stated to be different."""
     individuals = sorted({str(triple.subject.value) for triple in found if isinstance(triple.subject, ox.NamedNode)})
     things = [one for one in individuals if "." not in one.rpartition("#")[2]]
     labelled = {

@@ -91,10 +91,7 @@ class Run:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 
     def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the names of what a phase may touch.
-
-        Objects, the parts of a link at a feature, and the fixtures and carriers of a place.
-        """
+        """Return the things that a phase may touch: objects, parts of a link at a feature, fixtures and carriers of a place."""
         found: list[str] = []
         for word in phase.touches:
             if word == "supports":

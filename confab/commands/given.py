@@ -31,7 +31,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
 
 
 def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
-    """Report in one line if `confab validate` would find errors in a user's scene, if there is time for it."""
+    """Report in one line that `confab validate` finds errors in a user's scene, if there are any and time is left."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return
@@ -95,7 +95,7 @@ def json_file(path: Path) -> Path:
 
 
 def plan_in(path: Path, scene: Scene) -> Plan:
-    """Return the plan in a file: our JSON, or else a list of actions as PDDL planners write it for our export."""
+    """Return the plan in a file: Confab's JSON, or the list of actions that a PDDL planner writes for an exported level."""
     if path.suffix.lower() in (".json", ""):
         from confab.interchange import read_plan
 

@@ -16,7 +16,7 @@ from confab.reasoner.files import STDOUT
 from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
 
 TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
-"""Kinds of content that can go to standard output; the empty one is a query's."""
+"""Kinds of content that can go to standard output; the empty kind is the result of a query."""
 
 STDIN = Path("/dev/stdin")
 
@@ -44,7 +44,7 @@ class Output(click.Path):
     kind : str
         The kind of the output file, as in `confab.reasoner.kinds`; empty if only the command knows.
     may_be : str
-        The parameter whose files it may replace.
+        The parameter whose files may be replaced.
     """
 
     def __init__(self, kind: str = "", may_be: str = "") -> None:
@@ -95,7 +95,7 @@ def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
 
 
 def _same_file(path: Path, given: object, parameter: click.Parameter) -> bool:
-    """Return whether the value of a parameter leads to a file, through any links."""
+    """Return whether the value of a parameter denotes a given file, possibly through links."""
     if not isinstance(given, str | Path):
         return False
     try:

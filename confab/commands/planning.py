@@ -444,7 +444,7 @@ def _explained(
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
-    """Return why memory prefers one step of a plan to another, and draw it."""
+    """Return why memory prefers one step of a plan to another, and draw the reasons."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
     from confab.why import find_step

@@ -1,4 +1,4 @@
-"""The page as a file: of a plan, an execution or a verification that was saved, and of runs that were kept."""
+"""The page as a file: of a saved plan, execution or verification, and of stored runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that the page shows of a scene, a plan, a run or an execution, as one JSON object (docs/page.md)."""
+"""The data that the page shows of a scene, a plan, a run or an execution, as one JSON object (docs/page.md)."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def page_data(
 
 
 def page_labels(scene: Known, problem: Problem) -> Labels:
-    """Return the displayed names of all that a problem names, and of furniture and robots."""
+    """Return the displayed names of all terms of a problem, and of furniture and robots."""
     from confab.labels import labels_of
 
     body = embodiment_of(scene)
@@ -137,7 +137,7 @@ def timeline_data(
     notes : mapping of path to str
         A note on each step.
     reasons : bool
-        Whether the plan is one that the checker accepts, so that each step has a purpose.
+        Whether the checker accepts the plan, so that each step has a purpose.
     """
     rows, hidden = rows_of(timeline, labels)
     data: PageData = {

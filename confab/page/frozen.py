@@ -13,7 +13,7 @@ from confab.page.schema import PageData
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
-    """Return the page as HTML text: with its data in it, or, if they are None, one that asks the server it came from."""
+    """Return the page as HTML text, with its data; if these are None, the page requests them from its server."""
     content = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return Template(asset("page.html")).substitute(
         title=escape(title), style=asset("page.css"), data=content, script=script()

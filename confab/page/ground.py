@@ -1,4 +1,4 @@
-"""The map: areas, places and the robots' positions, seen from where the film is taken; or places that static relations connect."""
+"""The map: areas, places and the positions of robots, seen from the film's camera; or places that static relations connect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_SPOTS = 400
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 """A coordinate in well-known text."""
 STRETCH = 1.7
-"""Horizontal stretch of a layout of connected places, since pages and names are wide."""
+"""Horizontal stretch of a layout of connected places; pages and names are wider than high."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Ground:
 
 
 def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()) -> Ground | None:
-    """Return the background of the map: by coordinates, else by connections, else in order; None if there are no places.
+    """Return the background of the map: by coordinates, otherwise by connections, otherwise in order; None if there are no places.
 
-    With more than `MOST_SPOTS` places it has none, and its note says so.
+    With more than `MOST_SPOTS` places the map shows none, and its note says so.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _too_many(number: int) -> Ground:
 
 
 def _furnished(embodiment: Embodiment) -> Ground:
-    """Return furniture and places as the film shows them: the camera stands opposite the robots (`sim.picture.view_of`)."""
+    """Return furniture and places as in the film, whose camera stands opposite the robots (`sim.picture.view_of`)."""
     if len(embodiment.places) > MOST_SPOTS:
         return _too_many(len(embodiment.places))
     from confab.sim.linkage import with_open_mechanisms
@@ -106,7 +106,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
 
 
 def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
-    """Return stated polygons and points, or None if there are none; an individual with a polygon alone stands in its middle."""
+    """Return stated polygons and points, or None if there are none; an individual with only a polygon is placed in its middle."""
     spots: dict[str, Point] = {}
     areas: list[Area] = []
     for name, text in shapes:
@@ -127,7 +127,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return values of a situation type that static relations connect, laid out so that connected ones are near."""
+    """Return values of a situation type that static relations connect, in a layout with connected values near each other."""
     import networkx
 
     values = _values(problem)
@@ -147,7 +147,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return the places of objects in rows, by name, where they have neither coordinates nor connections."""
+    """Return the places of objects in rows, by name; used if places have neither coordinates nor connections."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial
@@ -167,7 +167,7 @@ def _in_order(problem: Problem) -> Ground | None:
 
 
 def natural(name: str) -> list[tuple[int, str]]:
-    """Return the key by which names sort as people count: ``cup2`` before ``cup10``.
+    """Return the key of the natural order of names: ``cup2`` before ``cup10``.
 
     >>> sorted(["cup10", "cup2"], key=natural)
     ['cup2', 'cup10']

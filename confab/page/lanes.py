@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 MOST_FIXED = 5000
-"""Maximum number of rows for static facts that aren't goals; the page states the number of the others."""
+"""Maximum number of rows for static facts that aren't goals; the page states the number of further facts."""
 LAST = 0.04
 """Share of the axis that follows the last primitive, for its effects."""
 
 
 def axis_end(timeline: Timeline) -> float:
-    """Return the end of the axis; it is after the last primitive if that has an effect."""
+    """Return the end of the axis; it is later than the end of the last primitive if that has an effect."""
     late = any(period.begin >= timeline.end for periods in timeline.phases.values() for period in periods[1:])
     return round((timeline.end or 1.0) * (1 + LAST if late else 1), 4)
 

@@ -1,4 +1,4 @@
-"""A running execution on the page: the executed steps by the world's clock, and the planned rest."""
+"""A running execution on the page: the executed steps by the world's clock, and the remaining planned steps."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Following:
 
     @cached_property
     def labels(self) -> Labels:
-        """Displayed names of all that the problem names."""
+        """Displayed names of all terms of the problem."""
         return page_labels(self.scene, self.problem)
 
     @property
@@ -118,5 +118,5 @@ class Following:
 
 
 def _still_open(row: Row) -> Row:
-    """Return a row without the remark that its goal isn't met, as long as it may still be."""
+    """Return a row without the remark that its goal isn't met, since the execution isn't over."""
     return {key: value for key, value in row.items() if key != "met" or value}  # type: ignore[return-value]

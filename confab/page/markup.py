@@ -52,7 +52,7 @@ def number(value: float) -> str:
 
 
 UNITS = {"m": ("mm", 1000.0), "rad": ("°", 180 / pi), "n": ("N", 1.0), "s": ("s", 1.0)}
-"""Units of measurements by the ends of their names: the one that is shown, and by what the value is multiplied."""
+"""The displayed unit and the factor of a measurement, by the end of its name."""
 MEASURED = re.compile(r" \(\w+ [-\d.e+]+(, \w+ [-\d.e+]+)*\)$")
 
 

@@ -31,7 +31,7 @@ SHOWN: dict[tuple[str, str], Callable[[Any], str]] = {
     ("confab.planner.plan", "Step"): _of_step,
     ("confab.sim.verdict", "Verdict"): pieces.verdict,
 }
-"""By module and class: the function that returns the HTML of a value."""
+"""The function that returns the HTML of a value, by the module and the name of its class."""
 
 
 def register() -> None:

@@ -1,4 +1,4 @@
-"""The map of the page: areas, places and what stands there in time."""
+"""The map of the page: areas, places, and the objects at places in time."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
 def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
     """Return the objects on the map, each with its places.
 
-    The place of an object is the value of a symbol that begins on the map and whose situation type has no rest value, since a
-    hand's position is no place of an object. Of several such symbols, the one that is longest on the map counts.
+    The place of an object is the value of a symbol whose first value is on the map and whose situation type has no rest value.
+    (A hand's position is no place of an object.) Of several such symbols, the one with the longest time on the map counts.
     """
     situations = timeline.problem.domain.situations
     found: dict[str, tuple[float, Thing]] = {}

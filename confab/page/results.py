@@ -1,4 +1,4 @@
-"""How a run ended, for the page: its verdict, figures, failure, film and goals, and the command that repeats it."""
+"""The result of a run for the page: its verdict, figures, failure, film and goals, and the command that repeats it."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Executed(Protocol):
 
 
 def status_of(outcome: Outcome | None, report: Report | None, execution: Executed | None) -> tuple[bool | None, str]:
-    """Return whether it ended well, and how, in words."""
+    """Return whether the run succeeded, and its result in words."""
     if execution is not None:
         return execution.reached, execution.episode.status.value
     if report is not None:
@@ -174,7 +174,7 @@ def film_of(report: Report | None) -> Film | None:
 
 
 def _jpeg(still: Path) -> bytes:
-    """Return a picture as JPEG, a tenth of its size."""
+    """Return a picture as JPEG, which has a tenth of its size in bytes."""
     from PIL import Image
 
     made = BytesIO()
@@ -197,7 +197,7 @@ def mark_of(text: str, labels: Labels) -> str:
 
 
 def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData]:
-    """Return the goals with their initial values, and their final ones if anything was planned."""
+    """Return the goals with their initial values, and with their final values if there is a plan."""
     found: list[GoalData] = []
     for symbol, value in sorted(timeline.problem.goal.items()):
         goal: GoalData = {
@@ -225,7 +225,7 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on the levels that were given up, and on the conditions that the plan violates therefore."""
+    """Return notes on the levels that were given up, and on the conditions that the plan violates as a result."""
     if outcome is None:
         return []
     broken = [broken.text for left in outcome.left for broken in left.broken]

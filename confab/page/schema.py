@@ -11,7 +11,8 @@ FORMAT = 1
 class Interval(TypedDict, total=False):
     """A part of a row: from `begin` to `end`, a step or a value, and the meaning of its colour (`tone`).
 
-    `step` is the ID of the step that it shows. `slack` is the time until which its end may be delayed without delaying the last.
+    `step` is the ID of the step that it shows. `slack` is the time until which its end may be delayed without delaying the end
+    of the plan.
     """
 
     begin: float
@@ -24,7 +25,7 @@ class Interval(TypedDict, total=False):
 
 
 class Row(TypedDict, total=False):
-    """A lane: its `group` is levels, actors, changes, wanted or fixed; `met` says whether its goal holds in the end."""
+    """A lane. Its `group` is levels, actors, changes, wanted or fixed; `met` states whether its goal holds in the end."""
 
     group: str
     label: str
@@ -33,7 +34,7 @@ class Row(TypedDict, total=False):
 
 
 class StepData(TypedDict, total=False):
-    """A step of the plan; `id` is its path, joined by dots, so that its parent's is a prefix."""
+    """A step of the plan; `id` is its path, joined by dots, so that the ID of its parent is a prefix."""
 
     id: str
     number: str
@@ -49,7 +50,7 @@ class StepData(TypedDict, total=False):
 
 
 class Thing(TypedDict):
-    """An object on the map: from when on at which place (empty: at none), in words, and the tone of that."""
+    """An object on the map: the times at which it reaches a place (empty: no place), in words, with the tone of each place."""
 
     id: str
     label: str
@@ -94,7 +95,10 @@ class Alarm(TypedDict, total=False):
 
 
 class Film(TypedDict, total=False):
-    """A film of the run; `speed` is the ratio of the page's time to the film's, `poster` what is shown until it is played."""
+    """A film of the run.
+
+    `speed` is the ratio of the page's time to the film's, `poster` the picture that is shown before the film is played.
+    """
 
     source: str
     kind: str
@@ -127,7 +131,7 @@ class Mark(TypedDict):
 
 
 class Learned(TypedDict):
-    """What memory holds after the run."""
+    """The content of memory after the run."""
 
     text: str
     rules: list[tuple[str, list[str]]]
@@ -147,7 +151,7 @@ class TurnableRow(TypedDict):
 
 
 class Turnable(TypedDict):
-    """All that can be turned; `values` has each list of values by its name, each value with its words."""
+    """All symbols whose values the user can change; `values` has each list of values by its name, and each value with its words."""
 
     rows: list[TurnableRow]
     values: dict[str, list[tuple[str, str]]]

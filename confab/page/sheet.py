@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of rows that can be changed; the page states the number of the others, which `with_fact` changes."""
+"""Maximum number of rows that can be changed; the page states the number of further symbols, which `with_fact` changes."""
 SECONDS = 10.0
 """Limit of planning for the page."""
 
 
 class TurnedIntervention(TypedDict):
-    """An intervention as chosen on the page: after which step, world or goal, which symbol, which value."""
+    """An intervention chosen on the page: the step after which it happens, world or goal, the symbol, and the value."""
 
     after: str | int
     what: str
@@ -71,7 +71,7 @@ class Sheet:
 
     @cached_property
     def labels(self) -> Labels:
-        """Displayed names of all that the problem names."""
+        """Displayed names of all terms of the problem."""
         return labels_of(self.scene.knowledge, self.scene.names, self.problem)
 
     @cached_property
@@ -82,7 +82,7 @@ class Sheet:
         return {" ".join((*s.arguments[:1], s.situation, *s.arguments[1:])): s for s in those}
 
     def turnable(self) -> Turnable:
-        """Return the rows that can be turned, and their lists of values."""
+        """Return the rows that the user can change, and their lists of values."""
         rows: list[TurnableRow] = []
         lists: dict[str, list[str]] = {}
         for key, symbol in list(self.symbols.items())[:MOST_SYMBOLS]:
@@ -108,7 +108,7 @@ class Sheet:
         return [*values, *dict.fromkeys(v for v in there if v is not None and v not in values)]
 
     def turned(self, by: Turned) -> Problem:
-        """Return the problem with other facts and goals, each by its symbol; a goal that is None isn't wanted.
+        """Return the problem with changed facts and goals, each by its symbol; a goal that is None is dropped.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a value that a symbol can have; amounts are checked where they are compared."""
+        """Return a valid value of a symbol; amounts are checked when they are compared."""
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)
@@ -149,7 +149,7 @@ class Sheet:
         return Result(self.scene, problem, solve(Request(problem, DEFAULT_MODE, Limits(seconds=SECONDS))), {})
 
     def act(self, by: Turned, result: Result) -> Execution | None:
-        """Return the execution of the plan with the interventions that were chosen, or None if there are none."""
+        """Return the execution of the plan with the chosen interventions; None if there are none."""
         from confab.execution import execute
 
         if not by.get("interventions") or not result.solved:
@@ -159,7 +159,7 @@ class Sheet:
 
     @staticmethod
     def intervention(turned: TurnedIntervention) -> str:
-        """Return an intervention as the command line takes it.
+        """Return an intervention in the notation of the command line.
 
         Examples
         --------
@@ -177,7 +177,7 @@ class Sheet:
         return data
 
     def answer(self, by: Turned) -> PageData:
-        """Return the data of the page after a control was changed; `problem` says why planning wasn't possible."""
+        """Return the data of the page after a change of a control; `problem` is the reason that planning failed."""
         try:
             result = self.plan(by)
             execution = self.act(by, result)
@@ -208,7 +208,7 @@ def _called(method: str, facts: Sequence[str]) -> str:
 
 
 def ready_queries(graph: KnowledgeGraph) -> list[ReadyQuery]:
-    """Return the queries that ship with Confab and ask the scene itself, by name; those about other domains are left out."""
+    """Return the shipped queries about the scene itself, by name; queries about other domains are left out."""
     from confab.reasoner.graph.query_process import unknown_prefixes
 
     found: list[ReadyQuery] = []

@@ -27,8 +27,9 @@ MOST_HANDS = 8
 class Bar:
     """A step in time.
 
-    `ok` is None if it was not checked, `note` is a remark on its result, `planned` says that it isn't begun yet. Of a schedule
-    it has `actors`, and in `slack` the time by which its end may be later without an effect on the makespan.
+    `ok` is None if it was not checked, `note` is a remark on its result, `planned` is True if it hasn't begun yet. In a
+    schedule, `actors` are its actors, and `slack` is the time by which its end may be delayed without an effect on the
+    makespan.
     """
 
     step: Step
@@ -75,7 +76,7 @@ class Timeline:
 
     @property
     def by_path(self) -> dict[tuple[int, ...], Bar]:
-        """The bar of each begun step of the plan's tree; that of a refined step spans its primitives."""
+        """The bar of each begun step of the plan's tree; the bar of a refined step spans its primitives."""
         found: dict[tuple[int, ...], Bar] = {}
         for bar in self.bars:  # repeated attempts make one bar with the last result
             first = found.get(bar.step.path, bar)
@@ -131,7 +132,7 @@ def of_plan(problem: Problem, plan: Plan) -> Timeline:
 
 
 def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
-    """Return the timeline of a plan in time; effects count from the ends of primitives, or from their beginnings if so stated."""
+    """Return the timeline of a plan in time; effects begin at the ends of primitives, or at their beginnings if so stated."""
     bars = tuple(
         Bar(slot.step, float(slot.begin), float(slot.end), actors=slot.actors, slack=float(slot.slack))
         for slot in timed.slots

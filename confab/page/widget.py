@@ -1,4 +1,4 @@
-"""The page in a notebook, with anywidget: the same script, data and style; Python plans and answers queries."""
+"""The page in a notebook, by anywidget, with the same script, data and style; Python plans and answers queries."""
 
 from __future__ import annotations
 
