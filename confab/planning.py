@@ -204,13 +204,12 @@ def _plan(
         return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
         doable = without(problem, [behavior for behavior, _ in faulty])
-        leaves = options.leave_levels and mode != "paper"
-        possible = leaves or _solved_below(doable, deadline)
         behavior, why = faulty[0]
-        if not possible:
+        leaves = options.leave_levels and mode != "paper"
+        if not leaves and _none_at_all(doable, deadline):
             raise KnowledgeError(why, seen.names.iri(behavior.name))
         outcome = search(doable)
-        if leaves and outcome.status is not Status.SOLVED:
+        if leaves and outcome.status is Status.UNSOLVABLE:
             raise KnowledgeError(why, seen.names.iri(behavior.name))
         if outcome.status is Status.GAVE_UP and outcome.reason:
             outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
@@ -237,10 +236,10 @@ def _plan(
     return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed)
 
 
-def _solved_below(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether half of the time left suffices to solve a task by a plan that may leave levels."""
+def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
+    """Return whether half of the time left suffices to prove that no plan solves a task, even if it leaves levels."""
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
-    return solve(Request(problem, limits=limits)).status is Status.SOLVED
+    return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:

@@ -17,6 +17,7 @@ from itertools import combinations
 from confab.planner.checked_conditions import Bindings
 from confab.planner.plan import Broken, Left, Plan, Step
 from confab.planner.validation import BehaviorReader, Cell, Facts, stretches
+from confab.reasoner.language import is_variable, mentions
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
     AmountEffect,
@@ -108,7 +109,8 @@ class _Watch:
                     continue
                 if self.could(level, behavior, effect, terms, change):
                     return
-                found, asked = self.nearest(level, behavior, effect, terms, change.symbol)
+                most = None if best is None else len(best.conditions) - 1
+                found, asked = self.nearest(level, behavior, effect, terms, change.symbol, most)
                 arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
                 if best is None or len(asked) < len(best.conditions):
                     text = f"{change}: {' '.join((behavior.name, *arguments))} requires that {' and '.join(map(said, asked))}"
@@ -166,13 +168,18 @@ class _Watch:
         return Facts(self.problem, values if seen is None else {**values, symbol: seen})
 
     def nearest(
-        self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, symbol: Symbol
+        self,
+        level: int,
+        behavior: Behavior,
+        effect: ValueEffect | AmountEffect,
+        terms: Bindings,
+        symbol: Symbol,
+        most: int | None = None,
     ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return the fewest failing conditions of a behaviour, with individuals."""
+        """Return the fewest failing conditions of a behaviour, with individuals; more than `most` needn't be the fewest."""
         conditions = (*behavior.preconditions, *effect.when)
-        return failing_conditions(
-            self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level])
-        )
+        views = self.mixed(level, symbol), self.views[level]
+        return failing_conditions(self.rules, conditions, terms, behavior.kinds, views, most)
 
 
 def failing_conditions(
@@ -181,10 +188,12 @@ def failing_conditions(
     terms: Bindings,
     kinds: Mapping[str, str],
     views: Sequence[Facts],
+    most: int | None = None,
 ) -> tuple[Bindings, tuple[Condition, ...]]:
     """Return the fewest conditions without which the others hold in one of some states, with individuals.
 
-    Also return the bindings with which the others hold. More than `MOST_LACKING` conditions are tested one by one.
+    Also return the bindings with which the others hold. If more than `most` conditions fail (`MOST_LACKING` by default), those
+    that fail by themselves in every state are returned.
     """
 
     def gives(number: int) -> bool:
@@ -192,16 +201,40 @@ def failing_conditions(
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 
+    def fewest(part: Sequence[int], facts: Facts, limit: int) -> tuple[int, ...] | None:
+        """Return the fewest of some conditions without which the rest of them hold, if they aren't more than a limit."""
+        for without in (c for size in range(min(len(part), limit) + 1) for c in combinations(part, size)):
+            if rules.satisfied([conditions[i] for i in part if i not in without], terms, kinds, facts) is not None:
+                return without
+        return None
+
+    limit = MOST_LACKING if most is None else min(most, MOST_LACKING)
     order = sorted(range(len(conditions)), key=gives)
-    for size in range(1, min(len(conditions), MOST_LACKING) + 1):
-        for without in combinations(order, size):
-            rest = [c for i, c in enumerate(conditions) if i not in without]
-            for facts in views:
-                found = rules.satisfied(rest, terms, kinds, facts)
-                if found is not None:
-                    return found, tuple(substituted(conditions[i], found) for i in sorted(without))
+    found: list[tuple[tuple[int, ...], Facts]] = []
+    for facts in views:
+        without: tuple[int, ...] | None = ()
+        for part in _independent(conditions, order, terms):
+            more = None if without is None else fewest(part, facts, limit - len(without))
+            without = None if without is None or more is None else (*without, *more)
+        if without is not None:
+            found.append((tuple(sorted(without, key=order.index)), facts))
+    if found:
+        without, facts = min(found, key=lambda one: (len(one[0]), [order.index(i) for i in one[0]]))
+        bindings = rules.satisfied([c for i, c in enumerate(conditions) if i not in without], terms, kinds, facts)
+        assert bindings is not None
+        return bindings, tuple(substituted(conditions[i], bindings) for i in sorted(without))
     alone = [c for c in conditions if all(rules.satisfied([c], terms, kinds, facts) is None for facts in views)]
     return terms, tuple(substituted(condition, terms) for condition in alone)
+
+
+def _independent(conditions: Sequence[Condition], order: Sequence[int], terms: Bindings) -> list[list[int]]:
+    """Return the numbers of conditions in groups without common variables; each group is ordered as given."""
+    groups: list[tuple[set[str], set[int]]] = []
+    for number in order:
+        free = {term for term in mentions(conditions[number]) if is_variable(term) and term not in terms}
+        joined, apart = [g for g in groups if g[0] & free], [g for g in groups if not g[0] & free]
+        groups = [*apart, (free.union(*(g[0] for g in joined)), {number}.union(*(g[1] for g in joined)))]
+    return [sorted(numbers, key=order.index) for _, numbers in groups]
 
 
 def _seen(problem: Problem, level: int) -> dict[Symbol, str]:

@@ -196,7 +196,8 @@ class Judge:
         if guarded is not None and guarded.plan is not None and self.sampled(LESSONS, "lesson", "lead", "learn"):
             self.with_a_lesson(read, guarded.plan)
         refused = {mode for mode, status in self.found.status.items() if status == "refused" and mode in modes}
-        if refused and len(refused) < sum(mode in self.found.status for mode in modes):
+        answered = {mode for mode in modes if self.found.status.get(mode) in ("solved", "unsolvable")}
+        if refused and answered:  # giving up contradicts neither
             self.complain("refused by some modes only", "/".join(sorted(refused)), self.found.remarks[-1].text)
         if refused:
             return

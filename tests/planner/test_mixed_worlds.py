@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import pytest
 
-from confab.planner.plan import Plan, Step
+from confab.planner.plan import Plan, Status, Step
+from confab.planner.validation import BehaviorReader
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
 from confab.reasoner.reading.problem import read
 from confab.scene import load
 from tests.planner.naive import complete, results
@@ -161,3 +164,30 @@ def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_le
     assert not its.complaints
     assert its.status["guarded"] == "solved"
     assert any("L1_1 of level 1 can never be refined" in one.text for one in its.remarks if one.mode == "strict levels")
+
+
+@pytest.mark.parametrize("limit", [0.3, 1.0])
+def test_a_search_that_ends_too_early_is_no_error_of_the_domain(limit: float, tmp_path: Path) -> None:
+    """Only a task without any plan makes a behaviour an error; a call that ran out of time gives up."""
+    (tmp_path / "world.ttl").write_text(scene(mixed(360_014_986)))
+    try:
+        outcome = load(str(tmp_path / "world.ttl")).plan(leave_levels=False, time_limit=limit).outcome
+    except LimitError:
+        return
+    assert outcome.status is Status.GAVE_UP
+
+
+def test_failing_conditions_without_common_variables_are_found_one_by_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step with a hundred effects of eighteen conditions each; combinations of conditions would take 77,000 tests."""
+    calls, satisfied = [0], BehaviorReader.satisfied
+
+    def counted(*arguments: Any) -> Any:
+        calls[0] += 1
+        return satisfied(*arguments)
+
+    monkeypatch.setattr(BehaviorReader, "satisfied", counted)
+    (tmp_path / "world.ttl").write_text(scene(mixed(360_013_634)))
+    assert load(str(tmp_path / "world.ttl")).plan().outcome.left
+    assert calls[0] < 10_000
