@@ -292,9 +292,9 @@ class NodeReader:
     error : type of ValueError
     nodes : mapping of IRI to node
     inside : list of str
-        The nodes that are being read, each inside the one before it.
+        The nodes being read, from the outermost to the innermost.
     count : list of int
-        The number of conditions read inside the first of them.
+        The number of conditions read inside the outermost node.
     """
 
     error: ClassVar[type[ValueError]] = ValueError
@@ -315,7 +315,7 @@ class NodeReader:
         return self.nodes.get(iri, {}).get(CORE + name, ())
 
     def one(self, iri: str, name: str) -> str:
-        """Return the one value of a property; a node has to have exactly one."""
+        """Return the only value of a property; the node must have exactly one value."""
         found = self.values(iri, name)
         if len(found) != 1:
             raise self.error(f"<{iri}>: wanted one :{name}, found {len(found)}; state it once")

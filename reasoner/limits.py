@@ -1,4 +1,4 @@
-"""The deadline of a call. It is set once around the call and read in every loop, so that no function passes it on.
+"""The deadline of a call. The caller sets the deadline once; loops read it from a context variable, not from a parameter.
 
 `within` sets it. Loops call `check`, or read `left`. Blocks nest, and the earliest deadline applies, so that a part of a call can
 receive a share of its time.
@@ -15,7 +15,7 @@ from time import perf_counter
 
 
 class LimitError(Exception):
-    """A limit was reached; the message names it, the work in progress, and how to raise it."""
+    """A limit was reached; the message names the limit, the work in progress, and how to raise the limit."""
 
 
 class OutOfTimeError(LimitError):
@@ -24,7 +24,7 @@ class OutOfTimeError(LimitError):
 
 @dataclass(frozen=True)
 class Deadline:
-    """The end of a call on the clock of `time.perf_counter`; `seconds` is the time that it was given.
+    """The end of a call on the clock of `time.perf_counter`; `seconds` is the time limit of the call.
 
     >>> Deadline().left
     >>> Deadline.after(60.0).left > 50.0

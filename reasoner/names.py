@@ -175,7 +175,7 @@ class WrongNameError(AttributeError):
         The object without the name, e.g. ``a scene``.
     name : str
     there : object
-        Its public names are those that `dir` lists.
+        The object; `dir` lists its public names.
     hints : callable
         Returns the mapping of a right name to the words that mean it.
     """

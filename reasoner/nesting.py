@@ -1,6 +1,6 @@
 """The depth of nesting of documents.
 
-It is checked before parsing, since the time, memory or stack of some parsers grows much faster than the depth.
+The depth is checked before parsing, since the time, memory or stack of some parsers grows much faster than the depth.
 """
 
 from __future__ import annotations

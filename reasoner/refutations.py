@@ -26,13 +26,13 @@ class Refutation:
 
     @property
     def individuals(self) -> frozenset[str]:
-        """The individuals in it."""
+        """The individuals in the arguments and facts of the refutation."""
         return frozenset(
             {*self.arguments, *(part for fact in self.facts for part in (*fact.symbol.arguments, fact.value))}
         )
 
     def covers(self, other: Refutation) -> bool:
-        """Return whether this refutation implies another one."""
+        """Return True if this refutation applies in every case in which `other` applies."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
         return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
 

@@ -54,11 +54,11 @@ FROM = re.compile(
     r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
     re.DOTALL | re.IGNORECASE,
 )
-"""A text, in which clauses don't count, or a clause that names a graph of the query's dataset."""
+"""Matches a text, whose content isn't read as a clause, or a clause that names a graph of the query's dataset."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
-"""The graphs whose union is the default graph, and those that ``GRAPH`` sees; None for all."""
+"""The graphs whose union is the default graph, and the graphs that ``GRAPH`` can match; None means all graphs."""
 Answer: TypeAlias = "tuple[str, list[str], Any]"
 """An answer: ``rows``, ``triples`` or ``truth``; the columns; the content."""
 
