@@ -1,4 +1,4 @@
-"""Arguments in several forms: a plan, a memory or facts, an object that has them, or the name of a file."""
+"""Conversion of arguments with several forms, such as a plan, an object with a plan, or the name of a plan file."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Stated(list[str]):
     def __getitem__(self, index: slice) -> list[str]: ...
 
     def __getitem__(self, index: SupportsIndex | str | slice) -> str | list[str]:
-        """Return the fact of a position, some facts, or the value of a symbol."""
+        """Return the fact at an index, the facts of a slice, or the value of a symbol."""
         if not isinstance(index, str):
             return super().__getitem__(index)
         values = dict(fact.rsplit(" ", 1) for fact in self)
@@ -55,7 +55,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
     Raises
     ------
     KnowledgeError
-        There is none in it.
+        The argument contains no plan.
     """
     if isinstance(given, Plan):
         return given
@@ -93,12 +93,12 @@ def possible() -> Iterator[None]:
 
 
 def several(given: Facts) -> list[str]:
-    """Return facts as a list of texts, given one or several, the words of one, or a mapping of symbols to values.
+    """Return facts as a list of texts, from one text, several texts, the words of a fact, or a mapping of symbols to values.
 
     Raises
     ------
     KnowledgeError
-        It isn't text, or contains an invalid value.
+        The argument isn't text, or contains an invalid value.
 
     Examples
     --------

@@ -64,7 +64,7 @@ class Kept:
         Raises
         ------
         KeyError
-            It isn't kept, or never was.
+            The answer was discarded, or never stored.
         """
         return self._texts[number]
 

@@ -19,7 +19,7 @@ ROWS, ROLLOUTS = 1_000, 20
 
 
 def inside(folder: Path, name: str) -> Path:
-    """Return the file of a name in a folder.
+    """Return the path of a named file in a folder.
 
     Raises
     ------

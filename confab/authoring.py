@@ -42,7 +42,7 @@ ROLES = [CORE + name for name in ARGUMENTS]
 def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False) -> list[Path]:
     """Write a commented skeleton that validates: a domain, a scene, a catalog. Return the files.
 
-    The folder is called like the domain if none is given. With `bodies`, also a table, shapes and skills, so that physics can
+    By default the folder has the domain's name. With `bodies`, also a table, shapes and skills, so that physics can
     carry the scene's plan out. The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
 
     Raises
@@ -117,7 +117,7 @@ def generate(
     Raises
     ------
     KnowledgeError
-        No such family, no table of it for these numbers, or the path doesn't end in ``.ttl``.
+        There is no such family, the family has no table for these numbers, or the path doesn't end in ``.ttl``.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def generate(
 
 
 def turtle_path(given: str | Path) -> Path:
-    """Return the path of a scene to write, if its suffix is that of a readable format."""
+    """Return the path for a new scene file; the suffix must be that of a readable format."""
     path = Path(given)
     if path.suffix.lower() != ".ttl" and path != STDOUT:
         raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")

@@ -28,7 +28,7 @@ def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[
         The scene in which the plan was made.
     plan : Plan
     goals : sequence of str
-        Goals that replaced some of the task's.
+        Goals that replace goals of the task.
     """
     given = dict(parse_fact(slice_.problem, goal) for goal in goals)
     with overtime():

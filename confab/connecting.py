@@ -25,13 +25,13 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     Parameters
     ----------
     scene : Scene
-        Its graph has the interface.
+        The scene whose graph describes the interface.
     problem : Problem
-        Its symbols are perceived.
+        The problem whose symbols are perceived.
     on : str
         ``INTERFACE:ADDRESS``.
     seed : int
-        Of a simulated robot.
+        Seed of a simulated robot.
 
     Raises
     ------

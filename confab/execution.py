@@ -123,7 +123,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
 
 
 def _position(text: str) -> int:
-    """Return a position in a path; raise ValueError if it is none."""
+    """Return a text as a position in a path; raise ValueError if the text is no position."""
     if not text.isdigit():
         raise ValueError(text)
     return int(text)
@@ -283,7 +283,7 @@ def episode_json(episode: Episode) -> EpisodeJson:
 
 
 def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
-    """Return a value of a symbol with the time from which on the symbol had it."""
+    """Return a symbol's value and the time since which the symbol has had this value."""
     return {
         "seconds": round(seconds, 4),
         "situation": symbol.situation,
@@ -462,7 +462,7 @@ def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
     Raises
     ------
     KnowledgeError
-        No such mode.
+        There is no such mode.
     """
     from confab.planner.solve import MODES
 
@@ -497,7 +497,7 @@ def execute(
     ----------
     scene : Scene
     problem : Problem
-        The scene's, or one with other goals.
+        The scene's problem, or the same problem with other goals.
     plan : Plan, optional
         The first plan.
     interventions : iterable of str or Intervention
@@ -505,9 +505,9 @@ def execute(
     world : {'symbolic', 'pybullet'}, World, or str
         A text like ``pyrobosim:world.yaml`` names an interface of the scene and where its robot is found.
     planner : callable, optional
-        Plans from scratch; the fast planner if left out.
+        Function that plans from scratch; by default the fast planner.
     seed : int
-        Of everything random in physics.
+        Seed of all random numbers in physics.
     observer : callable, optional
         Called with every event.
     prepare : callable, optional
@@ -628,6 +628,6 @@ def _with_both_hands(
 
 
 def _only(steps: Iterable[Step], paths: set[tuple[int, ...]]) -> tuple[Step, ...]:
-    """Return the steps with only the primitives of some paths below them."""
+    """Return the steps, reduced to the primitives at the given paths and the steps above them."""
     kept = [replace(step, steps=_only(step.steps, paths)) if step.steps else step for step in steps]
     return tuple(step for step in kept if step.steps or step.path in paths)

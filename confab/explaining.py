@@ -140,7 +140,7 @@ def explain(
     Raises
     ------
     KnowledgeError
-        No such step; a step that can't be done; an alternative that isn't applicable there.
+        The step doesn't exist or isn't applicable, or the alternative isn't applicable in the same state.
     """
     if not 0 <= number < len(steps):
         raise KnowledgeError(f"no step {number}: the plan has {len(steps)} on this level, counted from 0")

@@ -50,7 +50,7 @@ LeftJson = TypedDict("LeftJson", {"level": int, "from": list[int], "to": list[in
 
 
 class CacheJson(TypedDict):
-    """Numbers of refinements that were found in the cache, and that weren't."""
+    """Numbers of hits and misses in the cache of refinements."""
 
     hits: int
     misses: int
@@ -94,7 +94,7 @@ class _Outcome(TypedDict):
 class OutcomeJson(_Outcome, total=False):
     """The result of planning: the steps and the length of a plan.
 
-    For an unsolvable task a reason, and a certificate if there is one.
+    The result for an unsolvable task has a reason and, if available, a certificate.
     """
 
     length: dict[str, int]
@@ -107,7 +107,7 @@ class OutcomeJson(_Outcome, total=False):
 
 
 class ResultJson(OutcomeJson, total=False):
-    """The result of planning in a scene: with the number of its queries, and with the schedule where one was asked for."""
+    """The result of planning in a scene, with the number of queries and, if requested, the schedule."""
 
     queries: int
     schedule: ScheduleJson

@@ -66,7 +66,7 @@ def new_folder(runs: Path) -> Path:
         last += 1
         folder = runs / f"{last:03}"
         try:
-            folder.mkdir()  # fails where another process has taken it meanwhile
+            folder.mkdir()  # fails if another process has created the folder meanwhile
         except FileExistsError:
             continue
         return folder

@@ -1,4 +1,4 @@
-"""Plan in, physical verdict out: the PyBullet world, robot, skills, perception and verification.
+"""Physical verification of plans: the PyBullet world, robot, skills and perception.
 
 ====================================================== ==============================================================
 `confab.sim.verify.verify(embodiment, initial, …)`     executes a plan's primitives in a new world; returns a `Rollout`

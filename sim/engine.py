@@ -174,7 +174,7 @@ class Engine:
     def check_course(self, hand: Manipulator) -> None:
         """Raise `SkillError` if the skill's time limit has passed, or if a joint lags too far behind its command.
 
-        In the second case the error names the bodies that the arm touches; if there are none, the hand.
+        In the second case the error names the bodies that the arm touches; if the arm touches none, the error names the hand.
         """
         if self.steps > hand.deadline:
             raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)

@@ -168,7 +168,7 @@ def poses_at(points: Array, yaw: Array, roll: Array | float, swivel: Array) -> A
 
 
 def turned_near(start: Array, goal: Array) -> Array:
-    """Return the goal pose with its yaw, modulo a turn, nearest to the start's."""
+    """Return the goal pose with the equivalent yaw (modulo a full turn) nearest to the start's yaw."""
     near = goal.copy()
     near[3] = start[3] + np.angle(np.exp(1j * (goal[3] - start[3])))
     return near
