@@ -9,13 +9,13 @@ Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; here over function
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count, product
 from typing import TypeAlias
 
-from confab.reasoner.amounts import Amount, Calculation, Expression, put_in, terms_of
+from confab.reasoner.amounts import Amount, Calculation, Expression, put_in, situations_in, terms_of
 from confab.reasoner.language import groups, is_variable, mentions, situations_of, walk
 from confab.reasoner.symbols import (
     FALSE,
@@ -40,6 +40,9 @@ from confab.reasoner.symbols import (
 Formula: TypeAlias = "Condition | bool"
 Conjunction: TypeAlias = "tuple[Condition, ...] | None"
 """Conditions that all hold; None for a contradiction."""
+Scaled: TypeAlias = "Callable[[Expression], Expression]"
+Term: TypeAlias = "tuple[Amount, str, Scaled]"
+OPPOSITE: Mapping[str, str] = {"increase": "decrease", "decrease": "increase"}
 MOST_CASES = 24
 """Maximum number of combinations of effects that may change one expression."""
 
@@ -288,6 +291,48 @@ class Afterwards:
         return either([both([*fires, self.equal(given, value)]), both([negation(fires), before])])
 
     # ---------------------------------------------------------------------------------------------------------- amounts
+
+    def linear(
+        self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
+    ) -> list[Term] | None:
+        """Return the changing amounts of an expression, if it is linear in them and effects only add to or subtract from them.
+
+        Parameters
+        ----------
+        expression : Expression
+        operation : str
+            A key of `OPPOSITE`: what an increase of the expression does to the whole.
+        scaled : callable
+            The change of the whole, for a change of the expression.
+
+        Returns
+        -------
+        list of (Amount, str, callable) or None
+            Each amount, with what its increase does to the whole, and by how much; None if the expression isn't linear.
+        """
+        found: list[list[Term] | None]
+        match expression:
+            case Amount(situation, _):
+                operations = {effect.operation for effect in self.amounts if effect.situation == situation}
+                if operations:
+                    return [(expression, operation, scaled)] if operations <= OPPOSITE.keys() else None
+                return []
+            case Calculation("+" | "-" as sign, left, right):
+                second = operation if sign == "+" else OPPOSITE[operation]
+                found = [self.linear(left, operation, scaled), self.linear(right, second, scaled)]
+            case Calculation(sign, left, right) if not self.moved(right):
+                found = [self.linear(left, operation, lambda by: scaled(Calculation(sign, by, right)))]
+            case Calculation("*", left, right) if not self.moved(left):
+                found = [self.linear(right, operation, lambda by: scaled(Calculation("*", left, by)))]
+            case Calculation():
+                return None
+            case _:
+                return []
+        return None if None in found else [term for terms in found if terms for term in terms]
+
+    def moved(self, expression: Expression) -> bool:
+        """Return whether an effect changes an amount in an expression."""
+        return any(effect.situation in situations_in(expression) for effect in self.amounts)
 
     def cases(self, expression: Expression) -> list[tuple[tuple[Condition, ...], Expression]]:
         """Return the values of an expression after the behaviour, each with the conditions under which it results."""

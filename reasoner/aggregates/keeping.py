@@ -6,6 +6,9 @@ tuple is a *candidate* of an effect and a symbol that the aggregate names: it ag
 the value before or after the effect. A candidate's number is added if the conditions hold afterwards and not before
 (`confab.reasoner.afterwards`), and subtracted if they hold before and not afterwards. A tuple of several candidates is counted
 for the first one only.
+
+A number that is linear in the amounts that change, by additions and subtractions only, is treated separately: each change of
+such an amount is added to the total for every tuple that satisfies the conditions afterwards. These changes are independent.
 """
 
 from __future__ import annotations
@@ -14,7 +17,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from confab.reasoner.afterwards import Afterwards, Conjunction, Formula, TooManyCasesError, both, negation
+from confab.reasoner.afterwards import (
+    OPPOSITE,
+    Afterwards,
+    Conjunction,
+    Formula,
+    Term,
+    TooManyCasesError,
+    both,
+    negation,
+)
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
 from confab.reasoner.language import DomainError, is_variable, mentions, walk
@@ -81,12 +93,14 @@ class _Candidate:
 
     `effect` has its variables renamed apart; `named` are the arguments of the symbol in the aggregate, `value` the
     value (None for an amount); `before` says whether a tuple is consistent with the value before or after the effect.
+    `term` is the term of a linear number that the effect changes; the tuple then neither starts nor stops contributing.
     """
 
     effect: Effect
     named: tuple[str, ...]
     value: str | None
     before: bool
+    term: Term | None = None
 
 
 class _Keeping:
@@ -111,6 +125,7 @@ class _Keeping:
         self.amount = put_in(aggregate.amount, self.terms)
         self.arguments = tuple(self.terms[p.name] for p in aggregate.parameters)
         self.aggregate, self.names = aggregate, {*self.terms.values()}
+        self.linear = self.after.linear(self.amount)
         self.candidates = list(self._candidates())
 
     def behavior(self) -> Behavior:
@@ -155,7 +170,11 @@ class _Keeping:
             elif isinstance(condition, Comparison):
                 yield from self._of_amounts(condition.left)
                 yield from self._of_amounts(condition.right)
-        yield from self._of_amounts(self.amount)
+        if self.linear is None:
+            yield from self._of_amounts(self.amount)
+        for term in self.linear or ():
+            for change in (e for e in self.after.amounts if e.situation == term[0].situation):
+                yield replace(self._candidate(change, term[0].arguments, None, False), term=term)
 
     def _of_amounts(self, expression: Expression) -> Iterator[_Candidate]:
         for part in inside(expression):
@@ -218,8 +237,11 @@ class _Keeping:
                 guard.append(self._put(tuple_, candidate.value, effect.value))
         for whole, each, more in self._completed(tuple_, effect.each):
             check("deriving amounts")
-            others = [negation(self.agrees(other, whole)) for other in self.candidates[:number]]
-            yield from self._differences(whole, each, [*guard, *more, *others])
+            if candidate.term is not None:
+                yield from self._changes(effect, candidate.term, whole, each, [*guard, *more])
+            else:
+                others = [negation(self.agrees(one, whole)) for one in self.candidates[:number] if one.term is None]
+                yield from self._differences(whole, each, [*guard, *more, *others])
 
     def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
         """Substitute a term for a variable of the aggregate; return the conditions that this implies."""
@@ -258,22 +280,48 @@ class _Keeping:
         for row in product(*(self.after.classes.get(self.after.kinds[name], ()) for name in left)):
             yield {**found, **dict(zip(left, row, strict=True))}, each, more
 
+    def _changes(
+        self, effect: Effect, term: Term, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
+    ) -> Iterator[AmountEffect]:
+        """Yield the effect on the total of a change of one amount, for the tuples that contribute afterwards."""
+        assert isinstance(effect, AmountEffect)
+        amount, operation, scaled = term
+        arguments = tuple(tuple_.get(argument, argument) for argument in amount.arguments)
+        always, _, after = self._contributing(tuple_)
+        fires = self.after.fires(effect, arguments)
+        if effect.operation == "decrease":
+            operation = OPPOSITE[operation]
+        by = put_in(scaled(effect.amount), tuple_)
+        yield from self._effects(tuple_, each, [(operation, by, [*guard, *_parts(fires), *always, *_parts(after)])])
+
     def _differences(
         self, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
     ) -> Iterator[AmountEffect]:
         """Yield the effects for the tuples that a guard admits: added, no longer added, or added with another number."""
-        conditions = [substituted(condition, tuple_) for condition in self.conditions]
-        changing = [condition for condition in conditions if self.after.changed(condition)]
-        always = [*guard, *(self.after.before(c) for c in conditions if not self.after.changed(c))]
-        always += [substituted(condition, tuple_) for condition in self.defined]
-        before, after = both(map(self.after.before, changing)), both(map(self.after.condition, changing))
-        amount, arguments = put_in(self.amount, tuple_), tuple(tuple_[name] for name in self.arguments)
-        cases = self.after.cases(amount)
+        always, before, after = self._contributing(tuple_)
+        always = [*guard, *always]
+        amount = put_in(self.amount, tuple_)
+        cases = [((), amount)] if self.linear is not None else self.after.cases(amount)
         found = [("decrease", amount, [*always, *_parts(before), negation(after)])]
         for when, changed in cases:
             found.append(("increase", changed, [*always, *when, *_parts(after), negation(before)]))
             if changed != amount:
                 found.append((*_difference(changed, amount), [*always, *when, *_parts(before), *_parts(after)]))
+        yield from self._effects(tuple_, each, found)
+
+    def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
+        """Return when a tuple contributes: the conditions that don't change, and the others before and after the behaviour."""
+        conditions = [substituted(condition, tuple_) for condition in self.conditions]
+        changing = [condition for condition in conditions if self.after.changed(condition)]
+        always = [self.after.before(c) for c in conditions if not self.after.changed(c)]
+        always += [substituted(condition, tuple_) for condition in self.defined]
+        return always, both(map(self.after.before, changing)), both(map(self.after.condition, changing))
+
+    def _effects(
+        self, tuple_: Mapping[str, str], each: Parameter | None, found: Iterable[tuple[str, Expression, list[Formula]]]
+    ) -> Iterator[AmountEffect]:
+        """Yield the effects on the total of a tuple, without effects whose conditions contradict each other."""
+        arguments = tuple(tuple_[name] for name in self.arguments)
         for operation, by, formulas in found:
             asked = both(formulas)
             if asked is not None:

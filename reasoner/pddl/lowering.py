@@ -245,7 +245,10 @@ class Lowering:
                 case _:
                     pass
         for condition in behavior.asked:
-            self.need(condition, terms, scope)
+            if absent := self.kept.absent(condition):
+                scope.needs += self.absences(*absent, terms)
+            else:
+                self.need(condition, terms, scope)
         cost = self.cost(behavior, terms, scope)
         changes = [*self.value_changes(behavior, terms, scope), *self.amount_changes(behavior, terms, scope)]
         needs = both([*scope.needs, *self.within_bounds(scope)])
@@ -274,19 +277,19 @@ class Lowering:
         initial = {value for symbol, value in self.problem.initial.items() if symbol.situation == situation}
         return self.problem.members(self.words.situations[situation].range) | initial
 
+    def absences(self, kind: str, situation: str, value: str, terms: Terms) -> Iterator[Formula]:
+        """Yield a precondition "no individual of a class has this value" as atoms of the separate predicates."""
+        its = self.words.terms((value,), terms)[0]
+        if (kind, situation) in self.kept.free:
+            yield self.kept.none_has(kind, situation, its)
+            return
+        for one in map(self.words.object, sorted(self.problem.members(kind))):
+            if self.words.exists(situation, (one,)) == ALWAYS:
+                yield self.kept.lacks(situation, (one,), its)
+
     def need(self, condition: Condition, terms: Terms, scope: Scope) -> None:
         """Add a precondition."""
         words = self.words
-        if absent := self.kept.absent(condition):
-            kind, situation, said = absent
-            value = words.terms((said,), terms)[0]
-            if (kind, situation) in self.kept.free:
-                scope.needs.append(self.kept.none_has(kind, situation, value))
-            else:
-                members = map(words.object, sorted(self.problem.members(kind)))
-                there = [one for one in members if words.exists(situation, (one,)) == ALWAYS]
-                scope.needs.extend(self.kept.lacks(situation, (one,), value) for one in there)
-            return
         match condition:
             case ValueCondition(situation, arguments, said, True):
                 its = words.terms(arguments, terms)

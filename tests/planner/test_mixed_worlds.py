@@ -191,3 +191,14 @@ def test_failing_conditions_without_common_variables_are_found_one_by_one(
     (tmp_path / "world.ttl").write_text(scene(mixed(360_013_634)))
     assert load(str(tmp_path / "world.ttl")).plan().outcome.left
     assert calls[0] < 10_000
+
+
+def test_a_total_of_totals_is_kept_by_the_change_of_each(tmp_path: Path) -> None:
+    """A sum of sums that many effects change at once is not refused: its changes are added up one by one."""
+    its = Judge(mixed(371_000_305), tmp_path, every=True).judged()
+    assert not its.complaints
+    assert its.status["paper"] == "solved"
+
+
+def test_absence_inside_a_condition_on_a_maximum_is_exported_with_its_meaning(tmp_path: Path) -> None:
+    assert not Judge(mixed(371_027_808), tmp_path, every=True).judged().complaints

@@ -1,0 +1,134 @@
+"""Constant folding: conditions and effects without parts that always hold or never hold.
+
+Regression (`confab.reasoner.afterwards`) substitutes individuals and numbers for terms, and repeats conditions inside others.
+Then ``a1 = a2``, ``1 < 2``, "an individual of a class that has some", or a condition beside its own negation is decided in
+every state.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from confab.reasoner.afterwards import Conjunction, Formula, either, negation, opposite
+from confab.reasoner.amounts import COMPARING, Calculation, Expression
+from confab.reasoner.language import groups, is_variable
+from confab.reasoner.symbols import (
+    AmountEffect,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    ValueCondition,
+    Witness,
+)
+
+
+@dataclass(frozen=True)
+class Folding:
+    """Decides conditions.
+
+    Parameters
+    ----------
+    classes : mapping of class to individuals
+    kinds : mapping of term to class
+        The class of each variable that no witness binds.
+    known : set of Condition
+        Conditions that hold.
+    """
+
+    classes: Mapping[str, Sequence[str]]
+    kinds: Mapping[str, str]
+    known: frozenset[Condition] = frozenset()
+
+    def effects(self, effects: Iterable[AmountEffect]) -> tuple[AmountEffect, ...]:
+        """Return increases and decreases without those that never happen; equal ones are added up."""
+        found = Counter[AmountEffect]()
+        for effect in effects:
+            when = self.conjunction(effect.when)
+            if when is not None:
+                found[replace(effect, when=when)] += 1
+        return tuple(replace(effect, amount=_times(many, effect.amount)) for effect, many in found.items())
+
+    def conjunction(self, conditions: Iterable[Condition]) -> Conjunction:
+        """Return conditions without those that follow from the others; None if they never hold together."""
+        known, found, more = self.known, list[Condition](), False
+        for part in sorted(_parts(conditions), key=lambda condition: bool(groups(condition))):
+            folded = replace(self, known=known).condition(part)
+            if folded is False:
+                return None
+            if folded is not True:
+                found.append(folded)
+                known |= {folded}
+                more = more or (bool(groups(part)) and any(not groups(one) for one in _parts((folded,))))
+        return self.conjunction(found) if more else tuple(found)
+
+    def condition(self, condition: Condition) -> Formula:
+        """Return a condition; true or false if it is decided."""
+        if condition in self.known:
+            return True
+        if opposite(condition) in self.known:
+            return False
+        match condition:
+            case ValueCondition(situation, arguments, value, negated) if not is_variable(value):
+                for other in self.known:
+                    match other:
+                        case ValueCondition(same, its, has, False) if (same, its) == (situation, arguments):
+                            if has != value and not is_variable(has):
+                                return negated
+                        case _:
+                            pass
+            case EqualityCondition(left, right, negated):
+                if left == right or self.members(left).isdisjoint(self.members(right)):
+                    return (left == right) is not negated
+            case ClassCondition(term, kind, negated):
+                own, others = self.members(term), {*self.classes.get(kind, ())}
+                if own <= others or own.isdisjoint(others):
+                    return (own <= others) is not negated
+            case Comparison(Fraction() as left, sign, Fraction() as right, negated):
+                return COMPARING[sign](left, right) is not negated
+            case Witness(variable, kind, inner, negated):
+                within = replace(self, kinds={**self.kinds, variable: kind}).conjunction(inner)
+                if not self.classes.get(kind) or not within:
+                    return (bool(self.classes.get(kind)) and within is not None) is not negated
+                return replace(condition, conditions=within)
+            case AnyOf(alternatives, negated):
+                found = either(self._alternatives(alternatives))
+                return negation(found) if negated else found
+            case _:
+                pass
+        return condition
+
+    def _alternatives(self, alternatives: Iterable[tuple[Condition, ...]]) -> Iterator[Conjunction]:
+        """Yield alternatives; an alternative that is a disjunction itself is replaced by its own alternatives."""
+        for group in map(self.conjunction, alternatives):
+            match group:
+                case (AnyOf(inner, False),):
+                    yield from inner
+                case _:
+                    yield group
+
+    def members(self, term: str) -> set[str]:
+        """Return the individuals that a term can denote."""
+        return {*self.classes.get(self.kinds[term], ())} if is_variable(term) else {term}
+
+
+def _parts(conditions: Iterable[Condition]) -> Iterator[Condition]:
+    """Yield the conditions of a conjunction, including those of conjunctions inside it."""
+    for condition in conditions:
+        match condition:
+            case AnyOf((group,), False):
+                yield from _parts(group)
+            case AnyOf(alternatives, True) if all(len(group) == 1 and groups(group[0]) for group in alternatives):
+                yield from _parts(opposite(group[0]) for group in alternatives)
+            case _:
+                yield condition
+
+
+def _times(many: int, amount: Expression) -> Expression:
+    if many == 1:
+        return amount
+    return many * amount if isinstance(amount, Fraction) else Calculation("*", Fraction(many), amount)
