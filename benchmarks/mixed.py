@@ -30,6 +30,8 @@ from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
+CONSTRAINED = 0.3
+"""Share of worlds with a condition on every state."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
@@ -46,7 +48,7 @@ def signature(one: Complaint) -> str:
 
 def judged(seed: int, folder: Path, every: bool = False) -> Judged:
     """Return the result of judging the world of a seed."""
-    return Judge(mixed(seed), folder, every).judged()
+    return Judge(mixed(seed, constrained=CONSTRAINED), folder, every).judged()
 
 
 def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
@@ -58,7 +60,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            world, meant = drawn(seed)
+            world, meant = drawn(seed, constrained=CONSTRAINED)
             its = Judge(world, Path(folder), meant=meant).judged()
             note(found, seed, world, its)
             for one in its.complaints:
@@ -227,7 +229,7 @@ def main(arguments: Sequence[str] = ()) -> int:
     if asked.seed is not None:
         with TemporaryDirectory() as folder:
             its = judged(asked.seed, Path(folder), every=True)
-        print(scene(mixed(asked.seed)))
+        print(scene(mixed(asked.seed, constrained=CONSTRAINED)))
         print(f"# least {its.least}, states {its.states}, {its.status}")
         for one in (*its.complaints, *its.remarks):
             print(f"# {one.kind} ({one.mode}): {one.text}")

@@ -148,7 +148,7 @@ def _symbol(problem: Problem, words: list[str], text: str) -> Symbol:
 
 
 def _known(problem: Problem, individual: str, text: str) -> str:
-    individuals = {symbol.arguments[0] for symbol in problem.initial}
+    individuals = {name for symbol in problem.initial for name in symbol.arguments[:1]}
     if individual not in individuals:
         raise KnowledgeError(f"'{text}': no object '{individual}'{nearest(individual, individuals)}")
     return individual

@@ -76,10 +76,7 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         how = "exclude each other" if many else "can't be reached"
         values = {(fact.symbol.situation, fact.value) for fact in goals}
         if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
-            ((situation, value),) = values
-            return Reason(
-                f"{what} {how}: {situation} {value} holds for one object at a time", tuple(dict.fromkeys(terms))
-            )
+            return Reason(f"{what} {how}: no reachable state has both", tuple(dict.fromkeys(terms)))
         which = "the only reachable combination" if one else f"none of the {certificate.cases} reachable combinations"
         has = "doesn't have" if one else "has"
         text = f"{what} {how}: {which} of values of {about} {has} {'all of them' if many else 'it'}"

@@ -129,6 +129,7 @@ class _Check:
         self.depth = depth  # the lowest level with steps in the plan
         self.rules = rules
         self.facts = Facts(problem, problem.initial, rules)
+        self.exceptions = {name: Fraction(self.facts.value(name, ()) or 0) for name in problem.domain.constraints}
         self.faults: list[Fault] = []
 
     def fault(self, path: tuple[int, ...], text: str) -> None:
@@ -202,15 +203,26 @@ class _Check:
         return True
 
     def within_bounds(self, step: Step) -> bool:
-        """Record the totals that a step leaves outside their bounds; return whether all are within bounds."""
+        """Record a total that a step leaves outside its bounds, or a constraint that it violates; return whether there is none.
+
+        An observed state may have exceptions to a constraint at first; then a step violates the constraint if it adds some.
+        """
+        constraints = self.problem.domain.constraints
         for name in self.rules.bounded:
             kind = self.problem.domain.situations[name]
             for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
                 got = self.facts.value(name, arguments)
-                if got is not None and kind.quantity is not None and not kind.quantity.allows(Fraction(got)):
-                    self.fault(
-                        step.path, f"{step}: it leaves {Symbol(name, arguments)} = {got}, which is out of its bounds"
-                    )
+                if got is None or kind.quantity is None:
+                    continue
+                if name in constraints:
+                    before, self.exceptions[name] = self.exceptions[name], Fraction(got)
+                    if Fraction(got) > before:
+                        one = constraints[name]
+                        self.fault(step.path, f"{step}: {one}, and is {'false' if one.always else 'true'} after it")
+                        return False
+                elif not kind.quantity.allows(Fraction(got)):
+                    wrong = f"it leaves {Symbol(name, arguments)} = {got}, which is out of its bounds"
+                    self.fault(step.path, f"{step}: {wrong}")
                     return False
         return True
 

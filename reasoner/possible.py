@@ -107,6 +107,14 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
         quantity = domain.situations[symbol.situation].quantity
         if quantity is not None and (limits := _limits(value, quantity)):
             name, remedy = symbol.situation, "state such an amount"
+            if name in domain.constraints:
+                yield Impossible(
+                    symbol,
+                    f"{domain.constraints[name]}, and it is {'false' if domain.constraints[name].always else 'true'} here",
+                    "constraints hold in every state, from the first one on",
+                    f"change the facts from which {domain.constraints[name].situation} follows, or its rule",
+                )
+                continue
             if name in domain.aggregates:
                 remedy = f"change the facts from which {name} is calculated, or the bound of {name}"
             yield Impossible(symbol, f"{symbol} is {value[:40]}; {limits}", "amounts keep to their bounds", remedy)

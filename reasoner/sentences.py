@@ -14,6 +14,7 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Constraint,
     EqualityCondition,
     Fact,
     RelationCondition,
@@ -61,6 +62,8 @@ def said(condition: Condition, words: Words = str) -> str:
             return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
         case Witness(variable, kind, conditions, negated):
             return _sought(variable, words(kind), conditions, negated, words)
+        case AnyOf(constraint=Constraint(situation, always)):
+            return f"{words(situation)} is {'always' if always else 'never'} true"
         case AnyOf(alternatives, True) if all(len(group) == 1 for group in alternatives):
             return " and ".join(said(replace(one, negated=not one.negated), words) for (one,) in alternatives)
         case AnyOf(alternatives, negated):

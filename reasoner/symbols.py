@@ -160,11 +160,26 @@ class Witness:
 
 
 @dataclass(frozen=True)
+class Constraint:
+    """A condition on every state: a situation type is true of no individuals, or of all individuals of its classes."""
+
+    situation: str
+    always: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.situation} must {'always' if self.always else 'never'} be true"
+
+
+@dataclass(frozen=True)
 class AnyOf:
-    """At least one alternative, which is a conjunction, holds; negated: none does. It binds no variables outside of itself."""
+    """At least one alternative, which is a conjunction, holds; negated: none does. It binds no variables outside of itself.
+
+    `constraint` is the constraint that a precondition maintains, for its sentence; it makes no difference to the meaning.
+    """
 
     alternatives: tuple[tuple[Condition, ...], ...]
     negated: bool = False
+    constraint: Constraint | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -455,7 +470,8 @@ class GroundBehavior:
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
-    `rules` has the defined situation types, each with its rules; `aggregates` the derived amounts.
+    `rules` has the defined situation types, each with its rules; `aggregates` the derived amounts. `constraints` has the situation
+    types that are never true, or always true, by the name of the derived count of exceptions, whose maximum is 0.
     """
 
     situations: Mapping[str, SituationType]
@@ -463,6 +479,7 @@ class Domain:
     first_ids: Mapping[int, int] = field(default_factory=dict)
     rules: Mapping[str, tuple[Rule, ...]] = field(default_factory=dict)
     aggregates: Mapping[str, Aggregate] = field(default_factory=dict)
+    constraints: Mapping[str, Constraint] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[int, ...]:
@@ -604,8 +621,9 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
             own = f"{variable}_inside" if variable in terms.values() else variable  # else it would capture that term
             inner = {**terms, variable: own}
             return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
-        case AnyOf(alternatives, negated):
-            return AnyOf(tuple(tuple(substituted(c, terms) for c in group) for group in alternatives), negated)
+        case AnyOf(alternatives, negated, constraint):
+            groups = tuple(tuple(substituted(c, terms) for c in group) for group in alternatives)
+            return AnyOf(groups, negated, constraint)
         case Comparison(one, sign, other, negated):
             return Comparison(put_in(one, terms), sign, put_in(other, terms), negated)
 

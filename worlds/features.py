@@ -147,6 +147,9 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
         lambda effect: any(not term.startswith("?") for term in effect.arguments)
     ),
     "bounds of amounts": _unbounded,
+    "conditions on every state": lambda world: replace(
+        world.problem, domain=replace(world.problem.domain, constraints={})
+    ),
     "increase": _without_effects(lambda e: isinstance(e, AmountEffect) and e.operation == "increase"),
     "decrease": _without_effects(lambda e: isinstance(e, AmountEffect) and e.operation == "decrease"),
     "assign": _without_effects(lambda e: isinstance(e, AmountEffect) and e.operation == "assign"),

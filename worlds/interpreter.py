@@ -327,7 +327,7 @@ class Interpreter:
         lines += [f" if not ({limit}): return None" for limit in limits.values()]
         price = repr(one.cost) if one.price is None else self.worth(one.price, terms)
         lines.append(" t = closed(t)")
-        lines += [f" if not ({limit}): return None" for limit in self.limits()]
+        lines += [f" if not ({limit}): return None" for limit in (*self.limits(), *self.prevented())]
         lines.append(f" return {price}, t")
         names: dict[str, Any] = {**NAMES, "closed": self.closed}
         exec("\n".join(lines), names)
@@ -356,6 +356,13 @@ class Interpreter:
             if one.kept and quantity is not None and (quantity.least, quantity.most) != (None, None):
                 for symbol in (s for s in self.slots if s.situation == name):
                     yield self.limit(symbol, f"t[{self.slots[symbol]}]")
+
+    def prevented(self) -> Iterator[str]:
+        """Yield that each symbol of a constrained situation type is false, or true."""
+        for one in self.problem.domain.constraints.values():
+            for symbol, slot in self.slots.items():
+                if symbol.situation == one.situation:
+                    yield f"t[{slot}] == {(TRUE if one.always else FALSE)!r}"
 
     def limit(self, symbol: Symbol, amount: str) -> str:
         """Return that an amount is within its bounds."""

@@ -29,6 +29,7 @@ from confab.reasoner.symbols import (
     Behavior,
     Comparison,
     Condition,
+    Constraint,
     Domain,
     Parameter,
     Problem,
@@ -80,17 +81,24 @@ class RandomWorld:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(seed: int, aggregated: float = AGGREGATED) -> RandomWorld:
-    """Return a random world; the same for the same seed and share of worlds with derived amounts."""
-    return drawn(seed, aggregated)[0]
+def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> RandomWorld:
+    """Return a random world; the same for the same seed and shares of worlds with derived amounts and with constraints."""
+    return drawn(seed, aggregated, constrained)[0]
 
 
-def drawn(seed: int, aggregated: float = AGGREGATED) -> tuple[RandomWorld, Interpreter]:
-    """Return the random world of a seed, and an interpreter of it; with `aggregated` 0 it has no derived amounts."""
+def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter]:
+    """Return the random world of a seed, and an interpreter of it.
+
+    Parameters
+    ----------
+    seed : int
+    aggregated, constrained : float
+        The shares of worlds with derived amounts, and with conditions on every state.
+    """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated).world()
+        world = _Draft(rng, seed, aggregated, constrained).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -230,9 +238,9 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 class _Draft(Vocabulary):
     """One draw of a world without its goal."""
 
-    def __init__(self, rng: Random, seed: int, aggregated: float) -> None:
+    def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float) -> None:
         super().__init__(rng)
-        self.seed, self.share = seed, aggregated
+        self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.levels = rng.choice((1, 1, 1, 2, 2, 3))
         self.owners: dict[str, tuple[str, ...]] = {}
         self.pairs: set[str] = set()
@@ -265,6 +273,7 @@ class _Draft(Vocabulary):
         problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
         if aggregates:
             problem = self.bounded(problem)
+        problem = self.constrained(problem)
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
         return RandomWorld(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
 
@@ -455,6 +464,31 @@ class _Draft(Vocabulary):
                 situations[name] = replace(situations[name], quantity=Quantity("", False, least, most))
         self.situations = situations
         return replace(problem, domain=replace(problem.domain, situations=situations))
+
+    def constrained(self, problem: Problem) -> Problem:
+        """Return the problem with a condition on every state that holds at first, in some worlds."""
+        own = Random(f"constraints {self.seed}")
+        if own.random() >= self.prevented:
+            return problem
+        meant = Interpreter(problem)
+        found = [
+            Constraint(name, always)
+            for name, kind in self.situations.items()
+            for always in (False, True)
+            if kind.boolean and name not in circular(self.rules)
+            if all(
+                value == (TRUE if always else FALSE)
+                for symbol, value in [
+                    *((s, meant.initial[i]) for s, i in meant.slots.items()),
+                    *meant.constants.items(),
+                ]
+                if symbol.situation == name
+            )
+        ]
+        derived = [one for one in found if one.situation in self.rules]
+        chosen = [own.choice(derived if derived and own.random() < 0.8 else found)] if found else []
+        constraints = {f"{one.situation}.exceptions": one for one in chosen}
+        return replace(problem, domain=replace(problem.domain, constraints=constraints))
 
     def along(self, name: str, base: str) -> None:
         """Draw a situation type defined by its property: a transitive superproperty, or a chain with a relation."""

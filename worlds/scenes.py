@@ -114,6 +114,8 @@ class _Scene:
         derived = {*self.problem.domain.rules, *self.problem.domain.aggregates}
         said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in derived else []
         said += [f"c:restValue {_iri(one.rest)}"] if one.rest is not None else []
+        constraint = self.problem.domain.constraints.get(f"{name}.exceptions")
+        said += [f"c:{'always' if constraint.always else 'never'} true"] if constraint is not None else []
         quantity = one.quantity
         if quantity is None and one.default not in (None, FALSE, one.rest):
             said.append(f"c:defaultValue {_iri(str(one.default))}")

@@ -75,6 +75,8 @@ def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
         for conditions in _smaller(aggregate.conditions):
             aggregates = {**domain.aggregates, name: replace(aggregate, conditions=conditions)}
             yield replace(world, problem=replace(problem, domain=replace(domain, aggregates=aggregates)))
+    if domain.constraints:
+        yield replace(world, problem=replace(problem, domain=replace(domain, constraints={})))
     for name in world.updates:
         yield replace(world, updates=world.updates - {name})
     for symbol, value in problem.initial.items():
@@ -164,6 +166,7 @@ def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
         {n: s for n, s in problem.domain.situations.items() if n != name}, problem.domain.behaviors,
         rules={n: r for n, r in problem.domain.rules.items() if n != name},
         aggregates={n: a for n, a in problem.domain.aggregates.items() if n != name},
+        constraints={n: c for n, c in problem.domain.constraints.items() if c.situation != name},
     )  # fmt: skip
     values = [v for v in problem.classes.get(name, ()) if v.startswith(name)]
     parents = {kind: tuple(p for p in above if p != name) for kind, above in world.parents.items()}

@@ -106,7 +106,7 @@ class SymbolicWorld:
 
     def why_unplaced(self, individual: str) -> str:
         """Return the text that an object lies, if the object still exists."""
-        return "lies" if any(symbol.arguments[0] == individual for symbol in self.state) else ""
+        return "lies" if any(individual in symbol.arguments[:1] for symbol in self.state) else ""
 
     def _add_spot(self, individual: str) -> None:
         """Put an object that stands at a place on a new spot beside it, with the same static facts as the place."""
@@ -146,11 +146,15 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
         _let_go(problem, state, after, intervention.individual)
     if intervention.change is InterventionKind.REMOVE:
         for symbol in state:
-            if symbol.arguments[0] == intervention.individual:
+            if intervention.individual in symbol.arguments[:1]:
                 del after[symbol]
         _let_go(problem, state, after, intervention.individual)
     for fact in intervention.facts:
-        if state.get(fact.symbol) != fact.value and _is_whereabouts(problem, fact.symbol.situation):
+        if (
+            fact.symbol.arguments
+            and state.get(fact.symbol) != fact.value
+            and _is_whereabouts(problem, fact.symbol.situation)
+        ):
             _let_go(problem, state, after, fact.symbol.arguments[0])
         after[fact.symbol] = fact.value
     return after
@@ -158,7 +162,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
     """Replace an individual as the value of other symbols: by its former place if possible, otherwise by their rest values."""
-    own = [value for symbol, value in state.items() if symbol.arguments[0] == individual]
+    own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:
             situation = problem.domain.situations[symbol.situation]

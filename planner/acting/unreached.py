@@ -21,14 +21,14 @@ def blocked(belief: Belief, fact: Fact, limits: Limits) -> Reason | None:
     if steps is None:
         return None
     things = belief.obstacles
-    where = {name: [v for s, v in belief.state.items() if s.arguments[0] == name] for name in things}
+    where = {name: [v for s, v in belief.state.items() if name in s.arguments[:1]] for name in things}
     told = "; ".join(f"{name} at {', '.join(where[name])} ({found.fixed})" for name, found in things.items())
     return Reason(f"{fact} is blocked by {told}", (*fact.symbol.arguments, fact.value, *things))
 
 
 def with_discoveries(belief: Belief, record: Record, fact: Fact, reason: Reason) -> Reason:
     """Return the reason why a goal is unreachable, with the discoveries about its objects."""
-    there = {v for s, v in belief.state.items() if s.arguments[0] in fact.symbol.arguments}
+    there = {v for s, v in belief.state.items() if {*s.arguments[:1]} & {*fact.symbol.arguments}}
     found = [one.text for one, _ in record.discovered if one.individual in there and one.text]
     return replace(reason, text="; ".join((*found, reason.text))) if found else reason
 

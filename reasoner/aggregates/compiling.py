@@ -9,9 +9,9 @@ from itertools import chain, islice
 from confab.reasoner.aggregates.extrema import extrema_replaced
 from confab.reasoner.aggregates.keeping import MOST_CONDITIONS, kept
 from confab.reasoner.folding import Folding
-from confab.reasoner.language import DomainError, walk
+from confab.reasoner.language import DomainError, mentions, walk
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Behavior, Condition, Domain, spread
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Domain, Effect, Witness, spread
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
@@ -27,9 +27,8 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
     behaviors = {}
     for name, behavior in domain.behaviors.items():
         check("deriving amounts")
-        behaviors[name] = _folded(
-            spread(kept(behavior, aggregates, domain.situations, classes), classes), domain, classes
-        )
+        keeping = _prevented(kept(behavior, aggregates, domain.situations, classes), domain, classes)
+        behaviors[name] = _folded(spread(keeping, classes), domain, classes)
         conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
         many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))
         if aggregates and many > MOST_CONDITIONS:
@@ -38,6 +37,34 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
                 "conditions; let fewer of its effects change them, or let no derived amount depend on another"
             )
     return replace(domain, behaviors=behaviors)
+
+
+def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
+    """Return a behaviour that isn't applicable where it would make an exception to a constraint.
+
+    No state before it has an exception, so it removes none. What would add one becomes a negated precondition. A behaviour with
+    times keeps its effects on the count of exceptions, since the schedule observes the bound of this count.
+    """
+    if behavior.timing is not None or not behavior.changes & domain.constraints.keys():
+        return behavior
+    counts = [effect for effect in behavior.amounts if effect.situation in domain.constraints]
+    amounts = tuple(effect for effect in behavior.amounts if effect.situation not in domain.constraints)
+    kinds = {**behavior.kinds, **{one.each.name: one.each.kind for one in counts if one.each is not None}}
+    bound = {p.name for p in behavior.parameters}.union(*map(mentions, behavior.preconditions))
+    folding, preconditions = Folding(classes, kinds, frozenset(behavior.preconditions)), list(behavior.preconditions)
+    for effect in counts:
+        inner = folding.conjunction(effect.when)
+        empty = effect.each is not None and not classes.get(effect.each.kind)
+        if inner is None or empty or effect.operation != "increase":
+            continue
+        for variable in sorted(set[str]().union(*map(mentions, inner)) - bound):
+            inner = (Witness(variable, kinds[variable], inner),)
+        preconditions.append(AnyOf((inner,), negated=True, constraint=domain.constraints[effect.situation]))
+    others: tuple[Effect, ...] = (*behavior.effects, *amounts)
+    used = set[str]().union(*(mentions(c) for one in others for c in one.when), bound)
+    unused = set[str]().union(*(mentions(c) for one in counts for c in one.when)) - used
+    variables = tuple(variable for variable in behavior.variables if variable.name not in unused)
+    return replace(behavior, variables=variables, preconditions=tuple(dict.fromkeys(preconditions)), amounts=amounts)
 
 
 def _folded(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:

@@ -9,6 +9,9 @@ for the first one only.
 
 A number that is linear in the amounts that change, by additions and subtractions only, is treated separately: each change of
 such an amount is added to the total for every tuple that satisfies the conditions afterwards. These changes are independent.
+
+Before a behaviour no tuple adds to a count whose maximum is 0, and one tuple afterwards is one too many. So nothing is
+subtracted from such a count, and a tuple of several candidates may be counted for each.
 """
 
 from __future__ import annotations
@@ -126,6 +129,8 @@ class _Keeping:
         self.arguments = tuple(self.terms[p.name] for p in aggregate.parameters)
         self.aggregate, self.names = aggregate, {*self.terms.values()}
         self.linear = self.after.linear(self.amount)
+        quantity = situations[aggregate.situation].quantity
+        self.forbidden = aggregate.function == "count" and quantity is not None and quantity.most == 0
         self.candidates = list(self._candidates())
 
     def behavior(self) -> Behavior:
@@ -240,7 +245,8 @@ class _Keeping:
             if candidate.term is not None:
                 yield from self._changes(effect, candidate.term, whole, each, [*guard, *more])
             else:
-                others = [negation(self.agrees(one, whole)) for one in self.candidates[:number] if one.term is None]
+                earlier = () if self.forbidden else self.candidates[:number]
+                others = [negation(self.agrees(one, whole)) for one in earlier if one.term is None]
                 yield from self._differences(whole, each, [*guard, *more, *others])
 
     def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
@@ -315,7 +321,8 @@ class _Keeping:
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]
         always += [substituted(condition, tuple_) for condition in self.defined]
-        return always, both(map(self.after.before, changing)), both(map(self.after.condition, changing))
+        before = None if self.forbidden else both(map(self.after.before, changing))
+        return always, before, both(map(self.after.condition, changing))
 
     def _effects(
         self, tuple_: Mapping[str, str], each: Parameter | None, found: Iterable[tuple[str, Expression, list[Formula]]]

@@ -43,10 +43,28 @@ def with_totals(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return a state with the sums and counts that follow from it."""
+    """Return a state with the sums and counts that follow from it.
+
+    The count of the exceptions to a constraint belongs to the state only if effects change it.
+    """
     found = dict(state)
-    for aggregate in (one for one in domain.aggregates.values() if one.kept):
+    changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}
+    left_out = domain.constraints.keys() - changed
+    for aggregate in (one for one in domain.aggregates.values() if one.kept and one.situation not in left_out):
         found |= totals(aggregate, classes, relations, found, domain.situations)
+    return found
+
+
+def exceptions(
+    domain: Domain,
+    classes: Mapping[str, Sequence[str]],
+    relations: Mapping[str, frozenset[tuple[str, ...]]],
+    state: Mapping[Symbol, str],
+) -> dict[Symbol, str]:
+    """Return the counts of the exceptions to constraints in a state."""
+    found: dict[Symbol, str] = {}
+    for name in domain.constraints:
+        found |= totals(domain.aggregates[name], classes, relations, state, domain.situations)
     return found
 
 

@@ -59,6 +59,7 @@ class Pddl:
     objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
     actions: dict[str, Action] = field(default_factory=dict)
     axioms: list[Axiom] = field(default_factory=list)
+    forbidden: list[str] = field(default_factory=list)  # the derived predicates that never hold
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
     timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # facts that begin or end to hold

@@ -60,6 +60,7 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Constraint,
     Domain,
     EqualityCondition,
     Parameter,
@@ -225,7 +226,9 @@ class _Import:
         if any(s.arguments == (WORLD,) for s in situations.values()):
             classes[WORLD] = (THE_WORLD,)
         scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
-        domain = Domain(situations, behaviors, rules=rules)
+        never = [Constraint(self.places[predicate].situation) for predicate in pddl.forbidden]
+        constraints = {f"{one.situation}.exceptions": one for one in never}
+        domain = Domain(situations, behaviors, rules=rules, constraints=constraints)
         return Problem(scene, domain, classes, relations, initial, goal, parents, times=times)
 
     def rules(self) -> dict[str, tuple[Rule, ...]]:

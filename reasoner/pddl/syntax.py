@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,7 +22,6 @@ from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, 
 from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, Word, form_of, is_number
 
 SECTIONS = {
-    ":constraints": "trajectory constraints",
     ":process": "processes",
     ":event": "events",
     ":task": "HDDL tasks",
@@ -96,7 +95,7 @@ class _Reader:
             yield section
 
     def domain(self, form: Form) -> None:
-        actions, axioms = [], []
+        actions, axioms, constraints = [], [], []
         for section in self.define(form, "domain"):
             rest = section.items[1:]
             if section.head == ":types":
@@ -111,6 +110,8 @@ class _Reader:
                 actions.append(section)
             elif section.head == ":derived":
                 axioms.append(section)
+            elif section.head == ":constraints":
+                constraints.append(section)
             elif section.head != ":requirements":  # unused declarations are harmless
                 raise self.fail(section, f"unknown section {section.head} in a domain")
         self.derived = {
@@ -120,6 +121,8 @@ class _Reader:
             self.action(action)
         for axiom in axioms:
             self.axiom(axiom)
+        for section in constraints:
+            self.constraints(section.items[1:])
 
     def problem(self, form: Form) -> None:
         sections = {}
@@ -131,13 +134,15 @@ class _Reader:
                 self.objects(section.items[1:])
             elif section.head == ":metric":
                 self.metric(section)
-            elif section.head not in (":requirements", ":domain", ":init", ":goal", ":length"):
+            elif section.head not in (":requirements", ":domain", ":init", ":goal", ":length", ":constraints"):
                 raise self.fail(section, f"unknown section {section.head} in a problem")
         for wanted in (":init", ":goal"):
             if wanted not in sections:
                 raise self.fail(form, f"the problem has no ({wanted} …)")
         for item in sections[":init"].items[1:]:
             self.fact(item)
+        if ":constraints" in sections:
+            self.constraints(sections[":constraints"].items[1:])
         goal = sections[":goal"]
         if len(goal.items) != 2 or not isinstance(goal.items[1], Form):
             raise self.fail(goal, "wanted one condition as the goal")
@@ -310,6 +315,34 @@ class _Reader:
         if form.items[2].items:
             self.condition(form.items[2], self.scope(parameters, {}))
         self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
+
+    def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
+        """Read conditions on every state: ``(always CONDITION)``, also below ``and`` and ``forall``.
+
+        Each becomes a derived predicate that holds where the condition doesn't, and that is forbidden.
+        """
+        for part in parts:
+            head = part.head if isinstance(part, Form) else ""
+            if isinstance(part, Form) and head == "and":
+                self.constraints(part.items[1:], each)
+            elif isinstance(part, Form) and head == "forall" and len(part.items) == 3:
+                self.constraints(part.items[2:], (*each, part))
+            elif isinstance(part, Form) and head == "always" and len(part.items) == 2:
+                condition = part.items[1]
+                for outer in reversed(each):
+                    condition = replace(outer, items=(*outer.items[:2], condition))
+                word = replace(self.word(part.items[0], "always"), text="not")
+                violated, name = replace(part, items=(word, condition)), f"violated-{len(self.pddl.forbidden) + 1}"
+                while name in self.pddl.predicates:
+                    name += "-"
+                self.condition(violated, {})
+                self.pddl.predicates[name] = ()
+                self.pddl.axioms.append(Axiom(name, (), violated))
+                self.pddl.forbidden.append(name)
+            else:
+                raise self.fail(
+                    part, f"'{head or '…'}' is not supported in (:constraints …); wanted (always CONDITION)"
+                )
 
     def stated(self, form: Form, where: str) -> None:
         """Raise an error if a predicate is derived."""

@@ -146,6 +146,9 @@ class _SceneWriter:
                 and not (key == "c:defaultValue" and value == one.rest)
             ):
                 pairs.append((key, self.iri(value)))
+        constraint = self.problem.domain.constraints.get(f"{one.name}.exceptions")
+        if constraint is not None:
+            pairs.append(("c:always" if constraint.always else "c:never", "true"))
         if not single:
             pairs.append(("c:parameter", [f":{one.name}.{i}" for i in range(1, len(one.arguments) + 1)]))
         if single and not one.boolean:

@@ -156,5 +156,6 @@ def initial_state(
 def check_values(state: State, domain: Domain, names: Names) -> None:
     """Raise `KnowledgeError` if a symbol has an undeclared value, or an amount outside its bounds."""
     for fault in values_at_fault(state, domain, names):
-        about = next(iter(fault.symbol.arguments), "")
+        constraint = domain.constraints.get(fault.symbol.situation)
+        about = next(iter(fault.symbol.arguments), "") if constraint is None else constraint.situation
         raise KnowledgeError(str(fault), names.iri(about) if about in names else "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import chain
 
 from confab.reasoner.aggregates.compiling import compiled
@@ -35,6 +36,7 @@ from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     Comparison,
+    Constraint,
     Domain,
     Parameter,
     Perceived,
@@ -45,6 +47,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
+NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 
 
@@ -107,13 +110,15 @@ def frame(
     parts = Parts(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
     classes, parents = classes_of(instances, supers, names)
     situations, properties = _situations(parts, schema, classes)
+    constraints = _constraints(parts, schema, situations)
+    situations += [SituationType(name, (), name, 1, quantity=NONE_ALLOWED) for name in constraints]
     if earlier is not None and earlier.names.agree(names):
         lifted = earlier.lifted
     else:
         in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
     rules = _rules(parts, schema, {s.name: s for s in situations})
-    aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules)
+    aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules, constraints)
     domain = Domain(
         situations={s.name: s for s in _on_their_levels(situations, rules, aggregates)},
         behaviors=lifted,
@@ -122,6 +127,7 @@ def frame(
         },
         rules=rules,
         aggregates=aggregates,
+        constraints=constraints,
     )
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
@@ -222,8 +228,9 @@ def _aggregates(
     schema: Schema,
     situations: Mapping[str, SituationType],
     rules: Mapping[str, Sequence[Rule]],
+    constraints: Mapping[str, Constraint],
 ) -> dict[str, Aggregate]:
-    """Return the derived amounts in order of dependency.
+    """Return the derived amounts, and the counts of the exceptions to constraints, in order of dependency.
 
     Raises
     ------
@@ -255,10 +262,49 @@ def _aggregates(
                 "let the behaviours require a comparison instead",
                 situation,
             )
+    for name, constraint in constraints.items():
+        try:
+            found[name] = unfolded(_exceptions(name, constraint, situations[constraint.situation]), rules)
+        except DomainError:
+            raise KnowledgeError(
+                f"{constraint}, but it is defined recursively; constrain a situation type whose definition isn't recursive",
+                parts.names.iri(constraint.situation),
+            ) from None
     try:
         return {one.situation: one for one in in_order(found)}
     except DomainError as error:
         raise KnowledgeError(str(error), parts.names.iri(str(error).split()[0])) from None
+
+
+def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationType]) -> dict[str, Constraint]:
+    """Return the constraints, by the names of the counts of their exceptions.
+
+    Raises
+    ------
+    KnowledgeError
+        A constrained situation type isn't boolean, or is both never and always true.
+    """
+    found, known = {}, {situation.name: situation for situation in situations}
+    for iri in sorted(schema.of_kind("SituationType"), key=parts.names.short):
+        name, said = parts.names.short(iri), [word for word in ("never", "always") if parts.flag(iri, word)]
+        if len(said) > 1:
+            raise KnowledgeError(f"<{iri}> is never and always true; keep one of them", iri)
+        if said and not known[name].boolean:
+            raise KnowledgeError(
+                f"<{iri}>: :{said[0]} constrains situation types that are true or false; {name} has other values. "
+                "Define a situation type by a rule about these values, and constrain that",
+                iri,
+            )
+        if said:
+            found[f"{name}.exceptions"] = Constraint(name, said == ["always"])
+    return found
+
+
+def _exceptions(name: str, constraint: Constraint, situation: SituationType) -> Aggregate:
+    """Return the count of the arguments of which a constrained situation type is true, or false if it must always be true."""
+    variables = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(situation.arguments))
+    true = ValueCondition(situation.name, tuple(one.name for one in variables), TRUE, constraint.always)
+    return Aggregate(name, "count", Fraction(1), (), variables, (true,))
 
 
 def _on_their_levels(

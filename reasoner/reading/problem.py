@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from confab.reasoner.aggregates.totals import with_totals
+from confab.reasoner.aggregates.totals import exceptions, with_totals
 from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import check
@@ -118,7 +118,7 @@ def reading_of(
     )
     initial = initial_state(known.domain, known.classes, stated, names)
     initial = with_totals(known.domain, known.classes, relations, initial)
-    check_values(initial, known.domain, names)
+    check_values(initial | exceptions(known.domain, known.classes, relations, initial), known.domain, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
     wanted = with_task(problem, known.parts, schema.of_kind("Task"))

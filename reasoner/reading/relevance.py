@@ -283,7 +283,7 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
         usable = [step for step in steps if step.source in reached and step.target in waiting]
         if not usable:
             lost = min(waiting)
-            found.classes.add(known.names.iri(scope.kinds[lost]))
+            found.classes.update(map(known.names.iri, scope.kinds[lost].split("|")))
             waiting.remove(lost)
             reached.add(lost)
             continue

@@ -23,7 +23,8 @@ from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
 FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, by name
 DATA = frozenset(
-    CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct")
+    CORE + name
+    for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct", "never", "always")
 )
 DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}

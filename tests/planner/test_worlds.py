@@ -21,6 +21,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "gallery-small": {1: 5},
     "carts-small": {1: 5, 2: 9},
     "packing-small": {1: 4},
+    "drums-small": {1: 3, 2: 11},
     "drawers-small": {1: 2, 2: 20},
     "house-small": {1: 2, 2: 19, 3: 39},
     "laboratory-small": {1: 5, 2: 17, 3: 36},
@@ -35,6 +36,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "gallery-large": {1: 19},
     "carts-large": {1: 17, 2: 34},
     "packing-large": {1: 18},
+    "drums-large": {1: 12, 2: 57},  # each move with two drives, a lift and a lowering, and a fifth more
     "drawers-large": {1: 9, 2: 130},
     "house-large": {1: 10, 2: 144, 3: 288},
     "laboratory-large": {1: 20, 2: 82, 3: 173},
