@@ -1,1 +1,1 @@
-"""PDDL both ways, and planning problems written as Turtle."""
+"""Import and export of PDDL, and planning problems written as Turtle."""

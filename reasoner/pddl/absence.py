@@ -1,4 +1,8 @@
-"""Predicates of an export for "no individual has this value": a predicate "free" for each value, or a contrary for each object."""
+"""Extra predicates of an exported domain that express "no individual of a class has this value" without quantifiers.
+
+A predicate ``no_CLASS_has_TYPE`` of the value is used if at most one individual can have the value. Otherwise, the predicate
+``not_TYPE`` of an individual and a value states that the individual doesn't have the value.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,10 @@ from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition
 
 
 class Kept:
-    """Predicates of an export for negative conditions.
+    """The extra predicates that an export declares for the negative preconditions of its behaviours.
 
-    `contrary` maps the situation types with contrary predicates to the values that have one. `free` maps a class and a situation
-    type to the values that conditions mention, if no two individuals of the class can have the same value.
+    `contrary` maps a situation type to the values that need a ``not_TYPE`` predicate. `free` maps a class and a situation type
+    to the values that need a ``no_CLASS_has_TYPE`` predicate.
     """
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
@@ -26,7 +30,10 @@ class Kept:
                     self.keep(behavior, *absent)
 
     def absent(self, condition: Condition) -> tuple[str, str, str] | None:
-        """Return class, situation type and value of "no individual of the class has this value"."""
+        """Return class, situation type and value of a condition "no individual of the class has this value".
+
+        Return None for a condition of any other form.
+        """
         match condition:
             case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
                 known = situation not in self.problem.domain.rules and not self.words.situations[situation].boolean
@@ -37,7 +44,7 @@ class Kept:
         return None
 
     def keep(self, behavior: Behavior, kind: str, situation: str, value: str) -> None:
-        """Record the predicates that a negative condition of a behaviour needs."""
+        """Record the extra predicate that a negative precondition of a behaviour needs."""
         if (kind, situation) not in self.free and self.exclusive(kind, situation):
             self.free[kind, situation] = self.asked(kind, situation)
         if (kind, situation) not in self.free:
@@ -48,7 +55,7 @@ class Kept:
         return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
 
     def asked(self, kind: str, situation: str) -> frozenset[str]:
-        """Return the values in conditions of the form "no individual of the class has the value"."""
+        """Return the values that occur in preconditions "no individual of the class has this value"."""
         found = frozenset[str]()
         for behavior in self.behaviors:
             for absent in map(self.absent, behavior.preconditions):
@@ -57,7 +64,7 @@ class Kept:
         return found
 
     def exclusive(self, kind: str, situation: str) -> bool:
-        """Return whether each of the mentioned values can be held by at most one individual of a class."""
+        """Return whether each value of `asked` can belong to at most one individual of a class at a time."""
         asked, its = self.asked(kind, situation), self.problem.members(kind)
         held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
         held = [value for value in held if value in asked]
@@ -77,18 +84,18 @@ class Kept:
         return True
 
     def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
-        """Return "a symbol doesn't have a value" as an atom of a separate predicate."""
+        """Return the atom of ``not_TYPE``: the symbol doesn't have the value."""
         words = self.words
         name = words.name("predicate", f"not {situation}", f"not_{situation}")
         return words.atom(name, (*words.about(situation, terms), value))
 
     def none_has(self, kind: str, situation: str, value: Term) -> Atom:
-        """Return "no individual of a class has a value" as an atom of a separate predicate."""
+        """Return the atom of ``no_CLASS_has_TYPE``: no individual of the class has the value."""
         name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
         return self.words.atom(name, (value,))
 
     def facts(self) -> Iterator[Atom]:
-        """Yield the initial atoms of these predicates."""
+        """Yield the atoms of the extra predicates that hold in the initial state."""
         state = self.problem.initial
         for situation, values in sorted(self.contrary.items()):
             for symbol, has in state.items():

@@ -1,4 +1,4 @@
-"""The declarations of a domain and a problem of PDDL, as values."""
+"""Dataclasses for the declarations in a PDDL domain and a PDDL problem."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 
 @dataclass(frozen=True)
 class Typed:
-    """A name (of a type, an object or, with its question mark, a variable) and its type."""
+    """A type, an object or a variable (with its question mark), together with its declared type."""
 
     name: str
     type: str
@@ -24,10 +24,10 @@ class Typed:
 
 @dataclass(frozen=True)
 class Action:
-    """An action as parsed; `precondition` and `effect` are forms whose words have been checked.
+    """A parsed action; the names in `precondition` and `effect` have been checked against the declarations.
 
-    For a durative action they are the conditions and effects of the action as a whole (`confab.reasoner.pddl.durative`);
-    `durative` has its parts.
+    The precondition and effect of a durative action are those of the action as a whole (`confab.reasoner.pddl.durative`).
+    `durative` contains its conditions and effects with their times; it is None for other actions.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Axiom:
-    """A derived predicate with variables and its checked condition."""
+    """A rule of a derived predicate: the predicate with its variables, and the checked condition."""
 
     predicate: str
     parameters: tuple[Typed, ...]
@@ -49,25 +49,25 @@ class Axiom:
 
 @dataclass
 class Pddl:
-    """A domain with a problem, checked: every type, predicate, function, object and variable is declared, every arity right."""
+    """A parsed domain and problem, in which all names have been declared and all numbers of arguments have been checked."""
 
     domain: str = "domain"
     problem: str = "problem"
-    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # and the types right above
+    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # with their direct supertypes
     predicates: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
-    objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
+    objects: dict[str, str] = field(default_factory=dict)  # with their types; constants first
     actions: dict[str, Action] = field(default_factory=dict)
     axioms: list[Axiom] = field(default_factory=list)
-    forbidden: list[str] = field(default_factory=list)  # the derived predicates that never hold
+    forbidden: list[str] = field(default_factory=list)  # derived predicates that must never hold
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
-    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # facts that begin or end to hold
+    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # (time, atom, new truth)
     goal: Form | None = None
     minimize: Form | None = None  # the metric
 
     def above(self, name: str) -> Sequence[str]:
-        """Return a type and its supertypes, from the nearest to ``object``."""
+        """Return a type and all its supertypes, from the nearest supertype to ``object``."""
         found = {name: None}
         layer = [name]
         while layer:
@@ -76,13 +76,13 @@ class Pddl:
         return tuple(found) if name == "object" else (*found, "object")
 
     def of_type(self, name: str) -> tuple[str, ...]:
-        """Return the objects of a type."""
+        """Return the objects of a type and of its subtypes."""
         kinds = {kind for kind in self.types if name in self.above(kind)}
         return tuple(o for o, t in self.objects.items() if t in kinds)
 
 
 def either(kinds: Sequence[str]) -> str:
-    """Return the name of the type above some types.
+    """Return the name of the common supertype that stands for PDDL's ``(either …)`` of some types.
 
     >>> either(["person", "aircraft"])
     'either aircraft person'

@@ -1,7 +1,9 @@
-"""Durative actions of PDDL 2.1: their parts at the start, over all and at the end, and the action as a whole.
+"""Durative actions of PDDL 2.1: their conditions and effects with times, and the durative action as one instantaneous action.
 
-The action as a whole is the action that no other one overlaps: it doesn't require a condition that its own effect at the start
-achieves, and it hides an effect at the start that its end deletes.
+The instantaneous action is equivalent to the durative action if no other action overlaps it:
+
+- its precondition omits conditions over all or at the end that an effect at the start achieves;
+- its effect omits effects at the start that an effect at the end overwrites.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ DURATION = "?duration"
 
 @dataclass(frozen=True)
 class Durative:
-    """A durative action's duration, and its conditions and effects, each with `start`, `all` or `end`."""
+    """The duration, conditions and effects of a durative action; each condition and effect has the time `start`, `all` or `end`."""
 
     duration: Word | Form
     conditions: tuple[tuple[str, Form], ...]
@@ -25,7 +27,7 @@ class Durative:
 
 
 class NotTimedError(ValueError):
-    """A part of a durative action has no time, or an unsupported time; `at` is its position."""
+    """Raised if a part of a durative action has no time or an unsupported time; `at` is the part's position in the text."""
 
     def __init__(self, at: Word | Form, text: str) -> None:
         super().__init__(text)
@@ -33,7 +35,10 @@ class NotTimedError(ValueError):
 
 
 def duration_in(form: Form) -> Word | Form:
-    """Return a duration as a number or an expression; if only bounds are given, return the lower bound."""
+    """Return the duration that a ``:duration`` form states, as a number or an expression.
+
+    Return the lower bound if the form states only bounds.
+    """
     if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
         return duration_in(form.items[2])
     bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]
@@ -53,7 +58,7 @@ def duration_in(form: Form) -> Word | Form:
 
 
 def timed(form: Form | None, what: str, duration: Word | Form) -> Iterator[tuple[str, Form]]:
-    """Yield the conditions or effects of a durative action, each with its span; the duration replaces its variable."""
+    """Yield the time and the form of each condition or effect of a durative action; `duration` replaces ``?duration``."""
     if form is None or not form.items:
         return
     words = tuple(item.text for item in form.items[:2] if isinstance(item, Word))
@@ -82,7 +87,7 @@ def timed(form: Form | None, what: str, duration: Word | Form) -> Iterator[tuple
 
 
 def whole(parts: Durative, place: Form) -> tuple[Form | None, Form | None]:
-    """Return the precondition and the effect of a durative action as a whole."""
+    """Return the precondition and the effect of the instantaneous action that is equivalent to a durative action."""
     begun = {_text(e) for span, effect in parts.effects if span == "start" for e in _conjuncts(effect)}
     ended = {
         _text(_atom(e)) for span, effect in parts.effects if span == "end" for e in _conjuncts(effect) if _plain(e)
@@ -116,7 +121,7 @@ def _conjuncts(form: Form) -> Iterator[Form]:
 
 
 def _plain(form: Form) -> bool:
-    """Return whether an effect makes one atom true or false."""
+    """Return whether an effect is a literal: it makes one atom true or false without a condition."""
     return form.head not in ("when", "forall", "assign", "increase", "decrease", "scale-up", "scale-down")
 
 
@@ -130,7 +135,7 @@ def _text(form: Word | Form) -> str:
 
 
 def _put(form: Form, duration: Word | Form) -> Form:
-    """Return a form in which the duration replaces its variable."""
+    """Return a copy of a form in which `duration` replaces the variable ``?duration``."""
     return replace(
         form,
         items=tuple(

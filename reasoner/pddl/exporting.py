@@ -1,8 +1,8 @@
-"""Export of one level of a scene to PDDL, as close to STRIPS as possible, for planners that support little more.
+"""Export of one level of a scene to PDDL, restricted to STRIPS where possible because many planners support little more.
 
-A class becomes a type, or a unary predicate if it overlaps others. An individual becomes an object, even if it is only a value.
-A situation type becomes a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering`
-describes the rest.
+A class becomes a type, or a unary predicate if it overlaps another class. Every individual becomes an object, including
+individuals that are only values. A situation type becomes a predicate of its arguments and, unless it is boolean, its value.
+`confab.reasoner.pddl.lowering` describes the translation of behaviours.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ LINE = "\n    "
 
 @dataclass(frozen=True)
 class Exported:
-    """A domain and a problem in PDDL, and the mapping of actions back to behaviours.
+    """An exported PDDL domain and problem, with the mapping from PDDL names to the names of the scene.
 
-    `actions` maps the name of an action to its behaviour and to the positions of the behaviour's parameters among those of the
-    action.
+    `actions` maps the name of an action to its behaviour and to the position of each of the behaviour's parameters among the
+    action's parameters. `objects` maps the name of an object to its individual.
     """
 
     domain: str
@@ -59,20 +59,20 @@ class Exported:
 def to_pddl(
     problem: Problem, level: int | None = None, initial: State | None = None, goal: State | None = None
 ) -> Exported:
-    """Write one level of a problem, the lowest if none is given, as PDDL.
+    """Return one level of a problem as a PDDL domain and a PDDL problem.
 
     Parameters
     ----------
     problem : Problem
     level : int, optional
+        The level whose behaviours become actions; by default the lowest level.
     initial, goal : State, optional
-        In place of the problem's own; by default, symbols at rest in the initial state must be at rest in the end.
+        Replacements for the problem's initial state and for its goal on the level.
 
     Raises
     ------
     KnowledgeError
-        A behaviour gives a symbol a value that others require and that holds only for its duration. Actions without time can't
-        express this.
+        A behaviour gives a symbol a value only while it lasts, and another behaviour or the goal may require this value.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(
@@ -88,7 +88,7 @@ def to_pddl(
 
 
 def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Read a plan in the format of the planning competitions: one ``(action object …)`` per line, and comments after ``;``.
+    """Return the steps of a plan in the competition format: one ``(action object …)`` per line, with comments after ``;``.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
     Raises
     ------
     ValueError
-        A line is no action of the exported domain; the message says which.
+        A line doesn't name an action and objects of the exported domain; the message states the line.
     """
     steps = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -117,7 +117,7 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
 
 
 class _Export:
-    """One level of a problem during its export."""
+    """Intermediate results of the export of one level of a problem."""
 
     def __init__(self, problem: Problem, level: int) -> None:
         self.problem, self.words = problem, Vocabulary(problem)
@@ -137,7 +137,7 @@ class _Export:
         self.costs = any(action.cost != 1 for action in self.actions.values())
 
     def exported(self) -> Exported:
-        """Return the domain and the problem."""
+        """Return the texts of the domain and the problem with their name mappings."""
         named = self.words.name("domain", self.problem.scene.rsplit("/", 2)[-2])
         constants = {term.name for term in self.named_in_domain() if not term.variable}
         found = [one for fact in self.facts for one in (fact.terms if isinstance(fact, Atom) else fact[0].terms)]
@@ -155,7 +155,7 @@ class _Export:
         )
 
     def named_in_domain(self) -> Iterator[Term]:
-        """Yield the terms in actions and rules."""
+        """Yield all terms in the exported actions and derived predicates."""
         for formula in self.formulas:
             yield from terms(formula)
         for change in self.changes:
@@ -164,7 +164,7 @@ class _Export:
             yield from (term for call in calls(action.cost) for term in call.terms)
 
     def requirements(self) -> str:
-        """Return the PDDL requirements."""
+        """Return the requirement flags of the domain, separated by spaces."""
         parts = [part for formula in (*self.formulas, self.goal) for part in inside(formula)]
         parts += [part for change in self.changes for part in inside(change.when)]
         numeric = any(isinstance(part, Compare) for part in parts)
@@ -182,7 +182,7 @@ class _Export:
         return " ".join([":strips", ":typing", *(key for key, needed in wanted.items() if needed)])
 
     def domain_text(self, name: str, constants: Sequence[str]) -> str:
-        """Return the domain."""
+        """Return the text of the PDDL domain."""
         types = [f"{kind} - {above}" for kind, above in self.words.above.items()]
         predicates = [
             f"({' '.join([name, *(f'?x{i}' for i in range(arity))])})"
@@ -204,7 +204,7 @@ class _Export:
         return f"(define (domain {name})\n  (:requirements {self.requirements()})\n{head}{body})\n"
 
     def action_text(self, name: str, action: Action) -> str:
-        """Return an action."""
+        """Return the PDDL text of an action."""
         made = {(change.what, change.when, change.variables) for change in action.changes}
         changes = [
             change
@@ -222,7 +222,7 @@ class _Export:
         )
 
     def problem_text(self, domain: str, objects: Sequence[str]) -> str:
-        """Return the problem."""
+        """Return the text of the PDDL problem."""
         facts = ["(= (total-cost) 0)"] * self.costs
         for fact in dict.fromkeys(self.facts):
             facts.append(

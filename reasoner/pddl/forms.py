@@ -1,4 +1,4 @@
-"""Conditions and effects of PDDL as nested lists of words: functions that flatten and inspect them."""
+"""Functions that flatten and inspect parsed PDDL conditions and effects, which are nested lists of words (`Form`)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from confab.reasoner.pddl.declarations import CHANGES, Typed, either
 from confab.reasoner.pddl.words import Form, Word
 
 Atom = tuple[str, ...]
-"""A predicate and its terms."""
+"""A predicate followed by its terms."""
 MOST_CONJUNCTS = 10_000
-"""Maximum number of objects for which a universally quantified goal becomes one goal each."""
+"""Maximum number of conjuncts that replace one universally quantified conjunct of a goal."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """An atom that becomes true or false if a condition holds."""
+    """An effect that makes an atom true or false for all values of `variables` that satisfy the conditions `when`."""
 
     atom: Atom
     true: bool
@@ -29,7 +29,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class NumericEffect:
-    """A function that changes by the operation `head` (a key of `CHANGES`) if a condition holds."""
+    """An effect that changes a function by the operation `head` (one of `CHANGES`) if the conditions `when` hold."""
 
     head: str
     function: Form
@@ -39,11 +39,11 @@ class NumericEffect:
 
 
 FormChange: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
-"""A change with its conditions and the variables over which it is quantified."""
+"""A single change of an effect, its conditions, and its universally quantified variables."""
 
 
 def typed_in(form: Form) -> list[Typed]:
-    """Return the variables of a quantifier that was checked before."""
+    """Return the variables, with their types, that a list such as ``(?x ?y - truck)`` declares; its syntax has been checked."""
     found: list[Typed] = []
     waiting: list[Word] = []
     items = iter(form.items)
@@ -61,12 +61,12 @@ def typed_in(form: Form) -> list[Typed]:
 
 
 def words_of(form: Form) -> Atom:
-    """Return the words of a list, without the lists inside it."""
+    """Return the words of a list, without the words of nested lists."""
     return tuple(item.text for item in form.items if isinstance(item, Word))
 
 
 def words_in(*forms: Form | None) -> Iterator[Atom]:
-    """Yield the words of all lists in some forms."""
+    """Yield the words of each list in the given forms, including nested lists."""
     for form in forms:
         if form is not None:
             yield words_of(form)
@@ -74,7 +74,7 @@ def words_in(*forms: Form | None) -> Iterator[Atom]:
 
 
 def conjuncts(form: Form | None) -> Iterator[Form]:
-    """Yield the conjuncts of a conjunction."""
+    """Yield the conjuncts of a formula; nested conjunctions are flattened."""
     if form is None:
         return
     if form.head == "and":
@@ -86,17 +86,18 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
 
 
 def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[[Atom], bool | None]) -> Iterator[Form]:
-    """Yield the conjuncts of a formula. A universal conjunct becomes one conjunct for each object.
+    """Yield the conjuncts of a formula, with one conjunct per object in place of a universally quantified conjunct.
 
-    Conjuncts that always hold are left out.
+    Conjuncts that always hold are omitted.
 
     Parameters
     ----------
     form : Form
-        Without free variables.
-    objects : function of a type
-    holds : function of an atom
-        Whether the atom holds; None if its truth may change.
+        A formula without free variables.
+    objects : callable
+        Returns the objects of a type.
+    holds : callable
+        Returns whether an atom always or never holds; None if its truth may change.
     """
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head == "and":
@@ -118,7 +119,7 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
 
 
 def _with(form: Form, terms: Mapping[str, str]) -> Form:
-    """Return a form in which terms replace free variables."""
+    """Return a copy of a form in which terms replace the free variables."""
     if form.head in ("exists", "forall"):
         assert isinstance(form.items[1], Form)
         own = {one.name for one in typed_in(form.items[1])}
@@ -133,7 +134,7 @@ def _with(form: Form, terms: Mapping[str, str]) -> Form:
 
 
 def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
-    """Return whether a condition without variables holds; None if its truth may change."""
+    """Return whether a condition without variables always holds (True) or never holds (False); None if its truth may change."""
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head in ("and", "or"):
         found = {_known(item, holds) for item in rest}
@@ -146,7 +147,7 @@ def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
 
 
 def effects_of(form: Form | None) -> Iterator[Effect]:
-    """Yield the effects that make atoms true or false."""
+    """Yield the parts of an effect that make atoms true or false."""
     for change, when, variables in _changes(form):
         if change.head == "not":
             negated = change.items[1]
@@ -157,7 +158,7 @@ def effects_of(form: Form | None) -> Iterator[Effect]:
 
 
 def numeric_of(form: Form | None) -> Iterator[NumericEffect]:
-    """Yield the effects on functions."""
+    """Yield the parts of an effect that change functions."""
     for change, when, variables in _changes(form):
         if change.head in CHANGES:
             function = change.items[1]
@@ -182,7 +183,7 @@ def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Ty
 
 
 def functions_read(form: Form | None) -> Iterator[str]:
-    """Yield the heads of all lists in a form, except the functions that an effect changes."""
+    """Yield the head of each list inside a form, except the function that a numeric effect changes."""
     if form is None:
         return
     for item in form.items[2 if form.head in CHANGES else 0 :]:
@@ -192,7 +193,7 @@ def functions_read(form: Form | None) -> Iterator[str]:
 
 
 def atoms_in(form: Form, predicates: Collection[str], own: dict[str, str]) -> list[tuple[Atom, dict[str, str]]]:
-    """Return the atoms of a formula, each with the types of the quantified variables around it."""
+    """Return the atoms of a formula, each with the types of the quantified variables in whose scope it occurs."""
     if form.head in ("exists", "forall"):
         own = own | {t.name: t.type for t in typed_in(form.items[1])}  # type: ignore[arg-type]
     elif form.head in predicates:

@@ -1,7 +1,7 @@
-"""Formulas and effects of PDDL as values, each with its text.
+"""Dataclasses for PDDL formulas and effects, and functions that build, inspect and write them.
 
-Subformulas that are known to be true or false are simplified when a formula is built, so that no unusual form such as ``(or)`` is
-written.
+The functions that build formulas simplify subformulas that are always true or always false, so that the written PDDL contains no
+empty disjunctions such as ``(or)``.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import TypeAlias
 from confab.reasoner.amounts import written
 
 DIGITS = 30
-"""Number of decimal places of an infinite decimal fraction if a quotient can't be written."""
+"""Number of decimal places to which `decimal` rounds a number without a finite decimal notation."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """A variable or an object: its `name` in PDDL, its type, and the individuals that it can denote."""
+    """A variable or an object: its PDDL name, its type, and the individuals that it can denote."""
 
     name: str
     type: str = field(default="object", compare=False)
@@ -27,13 +27,13 @@ class Term:
 
     @property
     def variable(self) -> bool:
-        """Whether it is a variable."""
+        """Whether the term is a variable."""
         return self.name.startswith("?")
 
 
 @dataclass(frozen=True)
 class FunctionTerm:
-    """The value of a function."""
+    """A function with its arguments."""
 
     function: str
     terms: tuple[Term, ...]
@@ -41,7 +41,7 @@ class FunctionTerm:
 
 @dataclass(frozen=True)
 class Operation:
-    """An arithmetic operation on two numbers."""
+    """The arithmetic operation `sign` on two numbers."""
 
     sign: str
     left: Number
@@ -53,7 +53,7 @@ Number: TypeAlias = "Fraction | FunctionTerm | Operation"
 
 @dataclass(frozen=True)
 class Atom:
-    """An atom."""
+    """A predicate with its arguments."""
 
     predicate: str
     terms: tuple[Term, ...]
@@ -69,7 +69,7 @@ class Same:
 
 @dataclass(frozen=True)
 class Compare:
-    """A comparison of two numbers."""
+    """A comparison of two numbers by the operator `sign`."""
 
     sign: str
     left: Number
@@ -99,7 +99,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Exists:
-    """An existential or universal quantification."""
+    """An existential quantification; a universal quantification is the negation of one."""
 
     variables: tuple[Term, ...]
     inner: Formula
@@ -112,7 +112,7 @@ FALSE: Formula = Or(())
 
 @dataclass(frozen=True)
 class Assignment:
-    """A function changes by a number: ``assign``, ``increase`` or ``decrease``."""
+    """An effect that sets or changes a function's value: ``assign``, ``increase`` or ``decrease``."""
 
     operation: str
     call: FunctionTerm
@@ -121,7 +121,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class ConditionalEffect:
-    """An effect: an atom becomes true or false, or a number changes, for all bindings for which a formula held before."""
+    """An effect on an atom or a function, for every binding of `variables` that satisfies `when` in the state before the action."""
 
     what: Atom | Not | Assignment
     when: Formula = TRUE
@@ -132,7 +132,7 @@ class ConditionalEffect:
 
 
 def both(parts: Iterable[Formula]) -> Formula:
-    """Return the conjunction of some formulas."""
+    """Return the simplified conjunction of some formulas."""
     flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, And) else (part,)))
     if FALSE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
         return FALSE
@@ -140,7 +140,7 @@ def both(parts: Iterable[Formula]) -> Formula:
 
 
 def either(parts: Iterable[Formula]) -> Formula:
-    """Return the disjunction of some formulas."""
+    """Return the simplified disjunction of some formulas."""
     flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, Or) else (part,)))
     if TRUE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
         return TRUE
@@ -148,7 +148,7 @@ def either(parts: Iterable[Formula]) -> Formula:
 
 
 def no(formula: Formula, yes: bool = True) -> Formula:
-    """Return the negation of a formula; with `yes` False, the formula itself."""
+    """Return the simplified negation of a formula; return the formula itself if `yes` is False."""
     if not yes:
         return formula
     if formula in (TRUE, FALSE):
@@ -157,7 +157,7 @@ def no(formula: Formula, yes: bool = True) -> Formula:
 
 
 def some(variables: Iterable[Term], formula: Formula) -> Formula:
-    """Return a quantification of a formula over some objects."""
+    """Return a formula existentially quantified over variables; variables that the formula doesn't mention are dropped."""
     variables = tuple(variables)
     if formula == FALSE or not all(one.members for one in variables):
         return FALSE
@@ -167,7 +167,7 @@ def some(variables: Iterable[Term], formula: Formula) -> Formula:
 
 
 def same(left: Term, right: Term) -> Formula:
-    """Return the equality of two terms."""
+    """Return the equality of two terms: true for equal terms, false for terms without a common individual."""
     if left == right:
         return TRUE
     return Same(left, right) if left.members & right.members else FALSE
@@ -182,7 +182,7 @@ def conjuncts(formula: Formula) -> tuple[Formula, ...]:
 
 
 def inside(formula: Formula) -> Iterator[Formula]:
-    """Yield a formula and all inside it."""
+    """Yield a formula and all its subformulas."""
     yield formula
     match formula:
         case Not(inner) | Exists(_, inner):
@@ -195,7 +195,7 @@ def inside(formula: Formula) -> Iterator[Formula]:
 
 
 def calls(number: Number) -> Iterator[FunctionTerm]:
-    """Yield the functions in a number."""
+    """Yield the function terms in a numeric expression."""
     match number:
         case FunctionTerm():
             yield number
@@ -207,7 +207,7 @@ def calls(number: Number) -> Iterator[FunctionTerm]:
 
 
 def terms(formula: Formula) -> Iterator[Term]:
-    """Yield the terms in a formula, including its quantified variables."""
+    """Yield the terms of all atoms, equalities and comparisons in a formula."""
     for one in inside(formula):
         match one:
             case Atom(_, its):
@@ -221,7 +221,7 @@ def terms(formula: Formula) -> Iterator[Term]:
 
 
 def terms_of(change: ConditionalEffect) -> Iterator[Term]:
-    """Yield the terms in an effect."""
+    """Yield the terms in an effect and its condition."""
     yield from terms(change.when)
     if isinstance(change.what, Assignment):
         numbers = (change.what.call, change.what.by)
@@ -234,12 +234,12 @@ def terms_of(change: ConditionalEffect) -> Iterator[Term]:
 
 
 def typed(variables: Sequence[Term]) -> str:
-    """Return terms with their types, as PDDL declares them."""
+    """Return variables with their types in the notation of PDDL declarations."""
     return " ".join(f"{one.name} - {one.type}" for one in variables)
 
 
 def formula_text(formula: Formula) -> str:
-    """Return a formula as PDDL."""
+    """Return the PDDL text of a formula."""
     match formula:
         case Atom(predicate, its):
             return f"({' '.join([predicate, *(term.name for term in its)])})"
@@ -258,7 +258,7 @@ def formula_text(formula: Formula) -> str:
 
 
 def change_text(change: ConditionalEffect) -> str:
-    """Return an effect as PDDL."""
+    """Return the PDDL text of an effect."""
     if isinstance(change.what, Assignment):
         text = f"({change.what.operation} {number_text(change.what.call)} {number_text(change.what.by)})"
     else:
@@ -268,7 +268,7 @@ def change_text(change: ConditionalEffect) -> str:
 
 
 def number_text(number: Number) -> str:
-    """Return a number as PDDL; an infinite decimal fraction as a quotient."""
+    """Return the PDDL text of a numeric expression; a number without a finite decimal notation becomes a quotient."""
     match number:
         case FunctionTerm(function, its):
             return f"({' '.join([function, *(term.name for term in its)])})"
@@ -280,6 +280,6 @@ def number_text(number: Number) -> str:
 
 
 def decimal(number: Fraction) -> str:
-    """Return a number without an operation, an infinite decimal fraction rounded down after `DIGITS` places."""
+    """Return a number in decimal notation, rounded to `DIGITS` places if it has no finite decimal notation."""
     text = written(number)
     return text if "/" not in text else written(Fraction(round(number * 10**DIGITS), 10**DIGITS))

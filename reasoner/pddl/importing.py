@@ -1,24 +1,24 @@
-"""From PDDL to the values of `confab.reasoner.symbols`.
+"""Translation of a PDDL domain and problem to the classes of `confab.reasoner.symbols`.
 
 ==============================  ================================================================
-in PDDL                         here
+PDDL                            planning problem
 ==============================  ================================================================
 type                            class, e.g. ``Truck``
 predicate that never changes    class (one argument), static relation (more)
 predicates of which at most     one functional situation type, e.g. ``AT`` for ``at`` and ``in``;
-one holds of an object          a value of its own where none does
+one holds of an object          with an extra value for "none of them holds"
 any other predicate             boolean situation type
 derived predicate               boolean situation type with rules
 action                          behaviour on level 1, all of whose variables are parameters
 cost that depends on objects    one behaviour per cost
-function that never changes     static relation, its number behind the arguments
-any other function              situation type whose values are amounts, unless it only counts costs
-goal that is no fact            precondition of the behaviour ``REACH_GOAL``, whose effect is a goal
+function that never changes     static relation, whose last argument is the number
+any other function              situation type whose values are amounts, unless it only counts cost
+goal that isn't a fact          precondition of the behaviour ``REACH_GOAL``, whose effect is the goal
 ==============================  ================================================================
 
-Invariant synthesis finds predicates that exclude one another: initially at most one of them holds for an object, and an action
-that adds one of them deletes another one, which held for the same object. Helmert, "Concise finite-domain representations for
-PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
+Invariant synthesis finds mutually exclusive predicates. At most one of these predicates holds for an object initially, and an
+action that adds one of them for an object deletes another one that held for the object. Helmert, "Concise finite-domain
+representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
 """
 
 from __future__ import annotations
@@ -78,13 +78,17 @@ THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
 REACH_GOAL = "reach-goal"
 WORLD, THE_WORLD = "World", "the_world"
-"""The class, and its only individual, that a predicate without arguments is about."""
+"""The class of the individual that takes the place of the argument of a predicate without arguments, and this individual."""
 BASE = "https://w3id.org/confab/pddl/"
 
 
 @dataclass(frozen=True)
 class Place:
-    """The translation of a predicate: a situation type with a separate value, or with one of the arguments as its value."""
+    """The translation of a predicate to a situation type and a value.
+
+    `part` states which argument is the symbol's object and which one is the value; it is None for a boolean situation type.
+    `value` is used if no argument is the value.
+    """
 
     situation: str
     part: Part | None = None
@@ -93,13 +97,13 @@ class Place:
 
 @dataclass(frozen=True)
 class Imported:
-    """A problem with its names in PDDL: the action of a behaviour, the object of an individual, and so on."""
+    """A planning problem, and the PDDL name of each behaviour and individual (`said`)."""
 
     problem: Problem
     said: Mapping[str, str]
 
     def line(self, behavior: str, arguments: Sequence[str]) -> str:
-        """Return a step in the notation of PDDL plans; an empty text for the step that only states that the goal is reached."""
+        """Return a step in PDDL's notation of plans, or an empty text for ``REACH_GOAL``, which has no PDDL action."""
         action = self.said.get(behavior, behavior)
         return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
 
@@ -111,9 +115,9 @@ def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
     ----------
     pddl : Pddl
     scene : str, optional
-        Last part of the scene's IRI; the problem's name if not given.
+        Last part of the scene's IRI; by default, the name of the PDDL problem.
     level : int
-        The level of the behaviours; a level above 1 leaves room for more abstract behaviours.
+        The level of all behaviours. With a level above 1, less abstract behaviours can be added on lower levels.
     """
     table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
@@ -125,10 +129,10 @@ class _Import:
     pddl: Pddl
     scene: str
     level: int
-    names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to ours
+    names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to the problem's name
     taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
     places: dict[str, Place] = field(default_factory=dict)
-    variables: dict[str, str] = field(default_factory=dict)  # ours to PDDL's
+    variables: dict[str, str] = field(default_factory=dict)  # the problem's name to the PDDL name
 
     def __post_init__(self) -> None:
         self.effects = {name: tuple(effects_of(action.effect)) for name, action in self.pddl.actions.items()}
@@ -159,7 +163,7 @@ class _Import:
     # -------------------------------------------------------------------------------------------------- names
 
     def name(self, kind: str, pddl_name: str, wanted: str | None = None) -> str:
-        """Return our name for a PDDL name of some kind; different names stay different."""
+        """Return the problem's name for a PDDL name of the given kind; different PDDL names have different names in the problem."""
         if (kind, pddl_name) not in self.names:
             text = re.sub(r"[^0-9A-Za-z_]", "_", wanted or pddl_name)
             while text in self.taken:
@@ -237,7 +241,7 @@ class _Import:
         Raises
         ------
         PddlError
-            A predicate is derived from its own negation.
+            The value of a derived predicate depends on its own negation.
         """
         found: dict[str, tuple[Rule, ...]] = {}
         for axiom in self.pddl.axioms:
@@ -258,7 +262,7 @@ class _Import:
     def situations(
         self, classes: dict[str, tuple[str, ...]], parents: dict[str, tuple[str, ...]]
     ) -> dict[str, SituationType]:
-        """Return the situation types, invariants first, and record in `places` the translation of each predicate."""
+        """Return all situation types, those of invariants first, and store the translation of each predicate in `places`."""
         found: dict[str, SituationType] = {}
         candidates = frozenset(self.changing - self.derived - self.happening)
         pddl, effects = snapped(self.pddl, self.effects)
@@ -284,7 +288,7 @@ class _Import:
                 if name in found:
                     classes[name] = tuple(dict.fromkeys((*classes[kind], *classes[name])))
         order = {self.name("object", thing): i for i, thing in enumerate(self.pddl.objects)}
-        for name in found:  # objects in declared order, then the values that are no objects
+        for name in found:  # declared objects in their order, then other values
             classes[name] = tuple(sorted(classes[name], key=lambda member: order.get(member, len(order))))
         for predicate, signature in self.signatures.items():
             if predicate in self.places or (predicate not in self.changing and signature):
@@ -323,9 +327,10 @@ class _Import:
         return found
 
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal, and the behaviour for the parts of the goal that aren't facts.
+        """Return the goal as values of symbols, and the behaviour ``REACH_GOAL``.
 
-        None if there are no such parts, or they always hold.
+        The preconditions of ``REACH_GOAL`` are the conjuncts of the PDDL goal. The behaviour is None if all conjuncts are facts or
+        always hold.
         """
         found: dict[Symbol, str] = {}
         parts = list(conjuncts(self.pddl.goal))
@@ -338,24 +343,25 @@ class _Import:
         if not single:
             return goal, None
         conditions = self.simplified(c for part in parts for c in variables.condition(part))
-        if conditions is None:  # it can be reached only if it holds already
+        if conditions is None:  # no action can reach the goal
             conditions = (ValueCondition(name, (THE_WORLD,), TRUE),)
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
         reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
         return goal, reach
 
     def holds(self, atom: Atom) -> bool | None:
-        """Return whether an atom holds; None if its truth may change."""
+        """Return whether an atom of a static predicate holds; None if actions can change the atom."""
         if atom[0] == "=":
             return atom[1] == atom[2]
         known = atom[0] in self.pddl.predicates and atom[0] not in self.changing
         return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to the found facts, if it is a fact.
+        """Add a conjunct of the goal to the facts in `found` if it is equivalent to a fact; return whether it is.
 
-        A negated boolean fact that agrees with the others, and a comparison of a changing function with a number, are facts,
-        too.
+        Facts include negated atoms of boolean situation types, and comparisons of a changing function with a number. A conjunct
+        that
+        contradicts an earlier one isn't added.
         """
         if part.head in COMPARISONS and part.items[1:] and isinstance(part.items[1], Form):
             function, limit = part.items[1:]
@@ -377,7 +383,7 @@ class _Import:
 
     @cached_property
     def signatures(self) -> dict[str, list[str]]:
-        """The types of each predicate's arguments: the declared type, or a wider one if a variable of a wider type occurs there."""
+        """The types of each predicate's arguments: the declared type, or the supertype of a variable that is an argument."""
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
         parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
         parts += [(axiom.parameters, (axiom.condition, None)) for axiom in self.pddl.axioms]
@@ -394,7 +400,7 @@ class _Import:
     # ---------------------------------------------------------------------------------------------- behaviours
 
     def atom(self, atom: Atom) -> ValueCondition:
-        """Return the value condition for an atom that may change."""
+        """Return the value condition that is equivalent to an atom of a changing predicate."""
         place, terms = self.places[atom[0]], [self.term(t) for t in atom[1:]]
         if place.part is None:
             return ValueCondition(place.situation, tuple(terms) or (THE_WORLD,), TRUE)
@@ -402,7 +408,7 @@ class _Import:
         return ValueCondition(place.situation, (terms[place.part.key],), value)
 
     def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
-        """Return a conjunction without conjuncts that always hold; None if it never holds."""
+        """Return a conjunction without the conjuncts that always hold; return None if the conjunction never holds."""
         found: list[Condition] = []
         for condition in conditions:
             holds: bool | None = None
@@ -431,7 +437,7 @@ class _Import:
         return any(self.sets[theirs] for (of, theirs), ours in self.names.items() if of == "type" and ours == kind)
 
     def behavior(self, name: str) -> Behavior | None:
-        """Return the behaviour of an action; None if the action is never applicable."""
+        """Return the behaviour for an action; return None if the action is never applicable."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
         found = self.simplified(c for form in conjuncts(action.precondition) for c in variables.condition(form))
@@ -458,7 +464,10 @@ class _Import:
         return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
 
     def price(self, name: str) -> Expression | None:
-        """Return the cost of an action in the metric: its increases, times their weights; None if it has none."""
+        """Return the cost of an action in the metric: the sum of its increases of functions, each times the function's weight.
+
+        Return None if the action increases no function of the metric.
+        """
         found: Expression | None = None
         for effect in self.numeric[name]:
             if effect.function.head not in self.weights or effect.when or effect.variables:
@@ -473,7 +482,7 @@ class _Import:
         return found
 
     def costing(self, changed: set[str]) -> dict[str, Fraction]:
-        """Return the functions in the metric with their weights; an action's increases of these functions are its cost."""
+        """Return the weight of each function in the metric."""
         found: dict[str, Fraction] = {"total-cost": Fraction(1)} if "total-cost" in changed else {}
         waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
         while waiting:
@@ -489,7 +498,7 @@ class _Import:
         return found
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
-        """Return the translation of a number, a function or a calculation."""
+        """Return the translation of a number, a function or an arithmetic expression."""
         if isinstance(item, Word):
             return Fraction(item.text)
         if item.head in ("+", "-", "*", "/"):
@@ -505,7 +514,7 @@ class _Import:
     def amount_effects(
         self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[AmountEffect, ...]:
-        """Return an action's effects on amounts."""
+        """Return the effects of an action on amounts, one for each binding of quantified variables."""
         found = []
         for effect in effects:
             if effect.function.head not in self.amounts:
@@ -530,14 +539,14 @@ class _Import:
         return tuple(found)
 
     def everywhere(self, function: str) -> bool:
-        """Return whether a function has an initial value for all objects."""
+        """Return whether a function has an initial value for every combination of arguments."""
         things = prod(len(self.pddl.of_type(one.type)) for one in self.pddl.functions[function])
         return sum(words[0] == function for words in self.pddl.numbers) == things
 
     def value_effects(
         self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
-        """Return an action's effects, deletions first."""
+        """Return the effects of an action on values. Effects that end values come before effects that give values."""
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
@@ -561,13 +570,13 @@ class _Import:
         return tuple(dict.fromkeys((*ends, *begins)))
 
     def instances(self, effect: Effect | NumericEffect) -> Iterator[dict[str, str]]:
-        """Yield the bindings of an effect's quantified variables."""
+        """Yield all bindings of an effect's quantified variables to objects."""
         names = [self.term(v.name) for v in effect.variables]
         things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether another effect always gives a symbol a new value when this effect ends its value."""
+        """Return whether an effect that ends a symbol's value is always accompanied by an effect that gives a new value."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol
@@ -578,7 +587,7 @@ class _Import:
 
 @dataclass
 class _Variables:
-    """The variables of one behaviour that aren't parameters, each with a unique name."""
+    """The quantified variables of one behaviour, each renamed to a unique name."""
 
     table: _Import
     kinds: dict[str, str] = field(default_factory=dict)
@@ -596,7 +605,7 @@ class _Variables:
     def condition(
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
-        """Yield conditions whose conjunction is equivalent to a formula."""
+        """Yield conditions whose conjunction is equivalent to a PDDL formula, or to its negation if `negated`."""
         named = named or {}
         head, rest = form.head, [item for item in form.items[1:] if isinstance(item, Form)]
         if head == "not":
@@ -631,10 +640,10 @@ class _Variables:
     def nested(
         self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
     ) -> tuple[Condition, ...]:
-        """Return the condition that some individuals satisfy all given pieces.
+        """Return conditions that are true if some individuals satisfy all pieces (conjuncts with their words).
 
-        Each individual is quantified as far inside as possible, so that "there are a car and a place such that …" doesn't
-        enumerate all pairs if the two occur in different pieces.
+        Each existential quantifier is moved as far inward as possible. A search for "a car and a place such that …" then doesn't
+        enumerate all pairs unless a conjunct mentions both variables.
         """
         left = dict(typed)
         while left:

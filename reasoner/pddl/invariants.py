@@ -1,9 +1,9 @@
-"""Invariants of a PDDL domain.
+"""Invariant synthesis for a PDDL domain.
 
-Invariants are sets of predicates of which at most one fact holds for an object, so that they form one variable.
-
-An invariant is guessed from changing predicates, and proved from the additions and deletions of each action. If the proof
-fails, a predicate that the action deletes is added to the invariant: *at* becomes *at or in*.
+An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. Its predicates form
+one state variable of the object. An invariant starts as a guess with one changing predicate. It is proved if every action that
+adds a fact of the invariant also deletes one. If the proof fails, a predicate that the action deletes is added to the guess, for
+example *in* to *at*.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_
 from confab.reasoner.pddl.words import Form
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
-"""The possible positions of the object and of the value, by arity."""
+"""The possible positions of the object and of the value among a predicate's arguments, by the number of arguments."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A predicate in an invariant, with the position of the object and that of the counted argument (none.
+    """A predicate of an invariant, with the positions of the object (`key`) and of the value (`counted`) among its arguments.
 
-    The predicate is the value).
+    `counted` is None for a predicate of one argument; the predicate itself is then the value.
     """
 
     predicate: str
@@ -36,14 +36,14 @@ class Part:
 
 @dataclass
 class Invariants:
-    """Searches for invariants among predicates.
+    """Search for the invariants of a domain.
 
     Parameters
     ----------
     pddl : Pddl
     effects : mapping of action to its effects
     changing : set of str
-        The predicates that may be part of an invariant.
+        The predicates that invariants may contain.
     fluent : set of str
         All predicates whose facts change.
     sets : mapping of type to its objects
@@ -56,7 +56,7 @@ class Invariants:
     sets: Mapping[str, frozenset[str]]
 
     def found(self) -> list[tuple[Part, ...]]:
-        """Return disjoint invariants: tuples of parts."""
+        """Return the proved invariants, of which no two share a predicate; each invariant is a tuple of its parts."""
         candidates: list[tuple[Part, ...]] = [
             (Part(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
@@ -88,13 +88,13 @@ class Invariants:
         return found
 
     def at_most_one(self, parts: Sequence[Part]) -> bool:
-        """Return whether initially at most one fact of the parts holds of each object."""
+        """Return whether at most one fact of the invariant holds for each object in the initial state."""
         of = {part.predicate: part for part in parts}
         count = Counter(fact[1 + of[fact[0]].key] for fact in dict.fromkeys(self.pddl.initial) if fact[0] in of)
         return all(number == 1 for number in count.values())
 
     def distinguishable(self, parts: Sequence[Part]) -> bool:
-        """Return whether an object and a value together determine their predicate, wherever both occur."""
+        """Return whether an object and a value always determine which predicate of the invariant relates them."""
         counted = [p for p in parts if p.counted is not None]
         of = {p.predicate: p for p in counted}
         for predicate, domains in self.mentioned:
@@ -109,7 +109,7 @@ class Invariants:
 
     @cached_property
     def possible(self) -> dict[str, list[frozenset[str]]]:
-        """The objects for which a predicate may ever hold, by its argument."""
+        """For each predicate, the objects that may occur at each argument position in a fact of a reachable state."""
         found = {name: [set[str]() for _ in signature] for name, signature in self.pddl.predicates.items()}
         for fact in self.pddl.initial:
             for position, thing in enumerate(fact[1:]):
@@ -123,7 +123,7 @@ class Invariants:
 
     @cached_property
     def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
-        """Every atom in a condition, an effect or the goal: its predicate, and the objects that each term may denote."""
+        """The predicate of every atom in conditions, effects and the goal, with the objects that each of its terms may denote."""
         found = []
         for _name, action in self.pddl.actions.items():
             forms = [form for form in (action.precondition, action.effect) if form]
@@ -138,7 +138,7 @@ class Invariants:
         return found
 
     def domain_of(self, action: Action, term: str) -> frozenset[str]:
-        """Return the objects that a term of an action may denote, by its type and static unary predicates."""
+        """Return the objects that a term of an action may denote, according to its type and the static preconditions on it."""
         if not term.startswith("?"):
             return frozenset({term})
         kind = next((p.type for p in action.parameters if p.name == term), "object")
@@ -150,7 +150,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action preserves the invariant; otherwise return parts that might repair it."""
+        """Return None if every action preserves the invariant; otherwise return the parts whose addition might repair it."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]

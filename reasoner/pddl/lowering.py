@@ -1,16 +1,16 @@
-"""Behaviours as actions of PDDL: their conditions and effects in the simplest form.
+"""Translation of behaviours to PDDL actions with the simplest possible conditions and effects.
 
 ==============================  ==================================================================
-here                            in PDDL
+in the scene                    in PDDL
 ==============================  ==================================================================
-effect on a known value         that value is deleted; an unknown one becomes a parameter first
-negated value, inequality       parameter for the value that it is instead, which isn't the same
-"no such object"                predicate for "free", kept up to date, if it can't hold twice;
-                                else one contrary per object
-symbol that may not exist       predicate that states for which it does
+effect on a value                the old value is deleted; an unknown one becomes a parameter
+negated value, inequality       parameter for the actual value, which must be different
+"no individual has the value"   extra predicate of the value, or of each individual and the
+                                value (`confab.reasoner.pddl.absence`)
+symbol that may not exist       static predicate of the arguments for which it exists
 defined situation               its definition; ``:derived`` if it is recursive
-two effects on one symbol       the first one under the condition that the second one isn't made
-anything else                   as it is, with ``or``, ``exists``, ``when``, ``forall``
+two effects on one symbol       the first effect if the condition of the second one is false
+anything else                   equivalent formula with ``or``, ``exists``, ``when``, ``forall``
 ==============================  ==================================================================
 """
 
@@ -66,12 +66,15 @@ from confab.reasoner.symbols import (
 
 Terms = Mapping[str, Term]
 CASES = 4
-"""Maximum number of cases into which an effect is split if the other values of a symbol become separate actions."""
+"""Maximum number of other values of a symbol if a conditional effect on it is split into one action per value."""
 
 
 @dataclass(frozen=True)
 class Action:
-    """An action; `places` are the positions of the behaviour's parameters among the parameters of the action."""
+    """A PDDL action for a behaviour.
+
+    `places` gives the position of each of the behaviour's parameters among the action's parameters. `needs` is the precondition.
+    """
 
     behavior: Behavior
     parameters: tuple[Term, ...]
@@ -83,7 +86,11 @@ class Action:
 
 @dataclass
 class Scope:
-    """The terms of a behaviour or rule: used names, parameters, and the known values of symbols."""
+    """The variables of a behaviour or rule during its translation.
+
+    `names` are the used variable names, `parameters` the variables that become parameters, `values` the known values of symbols,
+    and `needs` the preconditions found so far.
+    """
 
     kinds: Mapping[str, str]
     names: set[str] = field(default_factory=set)
@@ -92,7 +99,7 @@ class Scope:
     needs: list[Formula] = field(default_factory=list)
 
     def fresh(self, wanted: str) -> str:
-        """Return a new name for a variable."""
+        """Return an unused PDDL variable name that resembles `wanted`."""
         name = "?" + re.sub(r"[^0-9a-z_-]", "_", wanted.removeprefix("?").lower())
         name = name if re.match(r"\?[a-z]", name) else f"?x{name[1:]}"
         while name in self.names:
@@ -103,7 +110,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Cell:
-    """A change by an effect: a symbol, if a formula holds for some variables."""
+    """The symbol that an effect changes: its arguments, the new value, the condition, and the condition's own variables."""
 
     own: tuple[Term, ...]
     when: Formula
@@ -112,7 +119,7 @@ class Cell:
 
 
 class Lowering:
-    """Translates conditions and behaviours of one level into formulas and actions."""
+    """Translation of the conditions and behaviours of one level to formulas and actions."""
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
         self.problem, self.behaviors, self.words = problem, behaviors, words
@@ -125,20 +132,20 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------- conditions
 
     def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> Formula:
-        """Return the formula of a conjunction; unbound variables are existentially quantified."""
+        """Return the formula of a conjunction of conditions, in which unbound variables are existentially quantified."""
         own, inside = self.bound(conditions, terms, scope)
         parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
         parts += [self.formula(condition, inside, scope) for condition in conditions]
         return some((inside[name] for name in own), both(parts))
 
     def bound(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> tuple[list[str], Terms]:
-        """Return the unbound variables of a conjunction, and all terms including them."""
+        """Return the unbound variables of a conjunction, and the mapping of names to terms extended by these variables."""
         own = sorted(set[str]().union(*map(named, conditions)) - terms.keys())
         fresh = {name: self.words.variable(scope.fresh(name), scope.kinds[name]) for name in own}
         return own, {**terms, **fresh}
 
     def formula(self, condition: Condition, terms: Terms, scope: Scope) -> Formula:
-        """Return a condition as a formula."""
+        """Return the PDDL formula of a condition."""
         words = self.words
         match condition:
             case ValueCondition(situation, arguments, value, negated):
@@ -167,7 +174,10 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return the formula that a boolean symbol is true: its definition unless it is recursive, otherwise an atom."""
+        """Return the formula that a boolean symbol is true: an atom if the symbol isn't derived or its rules are recursive.
+
+        Otherwise, return the disjunction of the conditions of its rules.
+        """
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -179,7 +189,7 @@ class Lowering:
         return either(ways)
 
     def derived(self) -> Iterator[tuple[Atom, tuple[Term, ...], Formula]]:
-        """Yield the recursive rules: a predicate, its variables, and the formula."""
+        """Yield the atom, the variables and the condition of each recursive rule."""
         for situation in sorted(self.recursive):
             for rule in self.rules[situation]:
                 scope = Scope(rule.behavior.kinds)
@@ -189,15 +199,15 @@ class Lowering:
                 holds = both([*guards, self.all_of(rule.conditions, terms, scope)])
                 if holds != NEVER:
                     inside = {term.name for term in head.terms}
-                    left = [term for term in terms.values() if term.name not in inside]  # the world
+                    left = [term for term in terms.values() if term.name not in inside]  # PDDL omits the world
                     yield head, head.terms, some(left, holds)
 
     # ---------------------------------------------------------------------------------------------------- actions
 
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
-        """Yield a behaviour for each case of its conditional effects, if the cases are few; no case has conditional effects.
+        """Yield one behaviour for each case of a behaviour's conditional effects; together these behaviours are equivalent to it.
 
-        The condition has to be a value of one symbol; the other case has at most `CASES` other values.
+        An effect is split only if its condition is that one symbol has a value, and the symbol has at most `CASES` other values.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -225,12 +235,12 @@ class Lowering:
         yield behavior
 
     def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
-        """Return whether a symbol exists for all individuals that some terms of a behaviour can denote."""
+        """Return whether the symbols of a situation type exist for all individuals that the arguments can denote."""
         terms = [Term(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
         return self.words.total(situation, terms)
 
     def action(self, behavior: Behavior) -> Action | None:
-        """Return a behaviour as an action; None if it is never applicable or changes nothing."""
+        """Return the PDDL action of a behaviour; return None if the behaviour is never applicable or has no effect."""
         scope, terms = Scope(behavior.kinds), dict[str, Term]()
         used = set[str]().union(*map(named, behavior.preconditions), terms_of(behavior.price or Fraction(0)))
         for one in (*behavior.parameters, *(v for v in behavior.variables if v.name in used)):
@@ -259,13 +269,13 @@ class Lowering:
         return Action(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
 
     def parameter(self, wanted: str, members: Iterable[str], scope: Scope) -> Term:
-        """Return a new parameter of an action for a variable that a condition determines."""
+        """Add a parameter to an action for a value that the preconditions determine, and return it."""
         term = Term(scope.fresh(wanted), "object", frozenset(members))
         scope.parameters.append(term)
         return term
 
     def known(self, situation: str, its: tuple[Term, ...], wanted: str, scope: Scope) -> Term:
-        """Return the value of a symbol; a new parameter if no condition names it."""
+        """Return the value of a symbol; if no condition states the value, add a parameter for it and return the parameter."""
         if (situation, its) not in scope.values:
             value = self.parameter(wanted, self.range_of(situation), scope)
             scope.values[situation, its] = value
@@ -278,7 +288,7 @@ class Lowering:
         return self.problem.members(self.words.situations[situation].range) | initial
 
     def absences(self, kind: str, situation: str, value: str, terms: Terms) -> Iterator[Formula]:
-        """Yield a precondition "no individual of a class has this value" as atoms of the separate predicates."""
+        """Yield the atoms of the extra predicates for a precondition "no individual of the class has this value"."""
         its = self.words.terms((value,), terms)[0]
         if (kind, situation) in self.kept.free:
             yield self.kept.none_has(kind, situation, its)
@@ -288,7 +298,7 @@ class Lowering:
                 yield self.kept.lacks(situation, (one,), its)
 
     def need(self, condition: Condition, terms: Terms, scope: Scope) -> None:
-        """Add a precondition."""
+        """Add the translation of a precondition to `scope`."""
         words = self.words
         match condition:
             case ValueCondition(situation, arguments, said, True):
@@ -311,9 +321,9 @@ class Lowering:
         scope.needs.append(self.formula(condition, terms, scope))
 
     def cost(self, behavior: Behavior, terms: Terms, scope: Scope) -> Number:
-        """Return the cost of an action; if it is no number or is negative, the action isn't applicable.
+        """Return the cost of an action, and add the precondition that the cost is a number of at least 0.
 
-        A predicate states that there is a number, since planners that support costs needn't support comparisons.
+        A static predicate states that the numbers exist, because planners with action costs needn't support numeric comparisons.
         """
         if behavior.price is None:
             return Fraction(repr(float(behavior.cost)))
@@ -324,7 +334,7 @@ class Lowering:
         return price
 
     def positive(self, expression: Expression) -> bool:
-        """Return whether a calculation is never negative."""
+        """Return whether a numeric expression is never negative."""
         match expression:
             case Measure(relation):
                 return all(Fraction(row[-1]) >= 0 for row in self.problem.relations.get(relation, ()))
@@ -339,7 +349,7 @@ class Lowering:
     # ---------------------------------------------------------------------------------------------------- effects
 
     def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: Scope) -> tuple[Cell, Terms]:
-        """Return the changes of an effect with its terms."""
+        """Return the symbol that an effect changes, and the terms of the effect."""
         own, inside = self.bound(effect.when, terms, scope)
         its = self.words.terms(effect.arguments, inside)
         when = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
@@ -349,7 +359,7 @@ class Lowering:
         return Cell(tuple(inside[name] for name in own), both(when), its, value), inside
 
     def value_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the changes of a behaviour's effects on values; of two effects on one symbol, the later one."""
+        """Yield the PDDL effects of a behaviour on values; if two effects change one symbol, the later one takes precedence."""
         cells = [(effect, *self.cell(effect, terms, scope)) for effect in behavior.effects]
         for number, (effect, cell, inside) in enumerate(cells):
             if self.words.situations[effect.situation].boolean:
@@ -367,7 +377,7 @@ class Lowering:
                 yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
 
     def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the changes by which a symbol gets a new value in place of its current value."""
+        """Yield the PDDL effects that replace the old value of a symbol by a new one, and that update the extra predicates."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
         own, when = cell.own, cell.when
@@ -414,10 +424,10 @@ class Lowering:
                 yield ConditionalEffect(Not(self.kept.none_has(kind, situation, new)), both([when, member]), own)
 
     def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the changes by a behaviour's effects on amounts.
+        """Yield the PDDL effects of a behaviour on amounts, and add preconditions that their results are numbers within bounds.
 
-        If the result of an effect would be no number, the behaviour isn't applicable. An assignment or multiplication followed
-        by an increase becomes one assignment, since planners don't chain such effects.
+        A multiplication or assignment and a later increase of the same amount become one assignment, because planners don't apply
+        several such effects in sequence.
         """
         groups: dict[tuple[str, FunctionTerm, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
@@ -444,7 +454,7 @@ class Lowering:
                     scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
             if all(operation in ("increase", "decrease") for operation, _, _ in changes):
                 for (operation, by), times in Counter((operation, by) for operation, by, _ in changes).items():
-                    # Equal effects of one action are one effect to a reader of PDDL.
+                    # PDDL planners treat equal effects of one action as one effect.
                     total = _times(by, times)
                     yield ConditionalEffect(Assignment(operation, at, total), when, own)
             else:
@@ -453,7 +463,7 @@ class Lowering:
     def within_bounds(self, scope: Scope) -> Iterator[Formula]:
         """Yield the formulas that all totals are within their bounds.
 
-        It is a precondition of every action and a goal: a state in which a total is out of bounds leads nowhere.
+        They are preconditions of every action and part of the goal. A state with a total out of bounds is thereby a dead end.
         """
         for situation in self.totals:
             kind = self.words.situations[situation]
@@ -465,7 +475,10 @@ class Lowering:
                     yield no(some(own, both([*its, outside])))
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
-        """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers: PDDL has only numbers."""
+        """Raise `KnowledgeError` if an effect may give a fractional value to an amount of whole numbers.
+
+        PDDL can't restrict a function to whole numbers.
+        """
         situations = self.words.situations
         quantity = situations[effect.situation].quantity
         if quantity is None or not quantity.whole:
@@ -490,7 +503,7 @@ class Lowering:
     # ------------------------------------------------------------------------------------------------------- goals
 
     def goal(self, symbol: Symbol, wanted: str) -> Formula:
-        """Return the goal formula of a symbol."""
+        """Return the goal formula for the wanted value or bounds of a symbol."""
         words = self.words
         situation, its = words.situations[symbol.situation], words.terms(symbol.arguments, {})
         if situation.quantity is None:
@@ -501,7 +514,7 @@ class Lowering:
 
 
 def named(condition: Condition) -> set[str]:
-    """Return the variables in a condition, except those inside `AnyOf` and `Witness`, which are handled there."""
+    """Return the variables in a condition, except variables in a nested `AnyOf` or `Witness`."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms = {*arguments, value}
@@ -519,7 +532,7 @@ def named(condition: Condition) -> set[str]:
 
 
 def _times(number: Number, times: int) -> Number:
-    """Return a multiple of a number."""
+    """Return a numeric expression multiplied by a whole number."""
     if isinstance(number, Fraction):
         return number * times
     return number if times == 1 else Operation("*", number, Fraction(times))

@@ -1,10 +1,11 @@
-"""PDDL as text: nested lists of words with their positions, and the declarations and formulas in these lists.
+"""Parser of PDDL texts, which checks all declarations and formulas.
 
-The subset is that of classical planning: types, constants, predicates, actions with conditional and quantified parts, derived
-predicates, action costs. Other constructs are refused by name. Every error states file, line and column.
+The supported subset contains types, constants, predicates, functions, actions with conditional and quantified effects, durative
+actions, derived predicates, action costs, timed initial literals and ``always`` constraints. Other constructs are rejected by
+name. Every error states file, line and column.
 
-unified-planning's reader isn't used: it answers an undefined type with a bare ``KeyError``, gives no position for half of the
-errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
+The parser of unified-planning isn't used. It reports an undefined type as a ``KeyError`` without a message, states no position for
+half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
 
 McDermott et al., "PDDL: the planning domain definition language", 1998; Fox and Long, "PDDL2.1", JAIR 20 (2003).
 """
@@ -31,12 +32,12 @@ SECTIONS = {
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
-    """Read a domain and a problem from files.
+    """Parse the files of a domain and a problem.
 
     Raises
     ------
     PddlError
-        A file can't be read, is larger than 32 MB, or is no PDDL of the supported subset.
+        A file can't be read, is larger than 32 MB, or isn't PDDL of the supported subset.
     """
     texts = []
     for path in (domain, problem):
@@ -52,7 +53,7 @@ def parse_files(domain: Path, problem: Path) -> Pddl:
 
 
 def parse(domain: str, problem: str, domain_file: str = "domain", problem_file: str = "problem") -> Pddl:
-    """Read a domain and a problem from their texts; the file names are for the messages.
+    """Parse the texts of a domain and a problem; the file names are used in error messages.
 
     >>> pddl = parse("(define (domain d) (:predicates (p ?x)) (:action a :parameters (?x) :effect (p ?x)))",
     ...              "(define (problem e) (:domain d) (:objects o) (:init) (:goal (p o)))")
@@ -69,7 +70,7 @@ def parse(domain: str, problem: str, domain_file: str = "domain", problem_file: 
 class _Reader:
     file: str
     pddl: Pddl
-    derived: set[str] = field(default_factory=set)  # the predicates that follow from others
+    derived: set[str] = field(default_factory=set)  # names of derived predicates
 
     def fail(self, at: Word | Form, message: str) -> PddlError:
         return PddlError(f"{self.file}:{at.line}:{at.column}: {message}")
@@ -80,7 +81,7 @@ class _Reader:
         return item
 
     def define(self, form: Form, kind: str) -> Iterator[Form]:
-        """Yield the sections of ``(define (kind name) section …)``, after the name."""
+        """Store the name in ``(define (kind name) section …)``, and yield the sections."""
         if form.head != "define" or len(form.items) < 2 or not isinstance(form.items[1], Form):
             raise self.fail(form, f"wanted (define ({kind} …) …)")
         title = form.items[1]
@@ -163,7 +164,7 @@ class _Reader:
             self.pddl.minimize = wanted
 
     def typed(self, items: Sequence[Word | Form], declaring: bool = False) -> list[Typed]:
-        """Return ``a b - t c`` as typed names; without a type they are objects."""
+        """Return the names with their types in a list such as ``a b - t c``; a name without a type is an ``object``."""
         found: list[Typed] = []
         waiting: list[Word] = []
         position = 0
@@ -181,7 +182,7 @@ class _Reader:
         return [*found, *(Typed(name.text, "object", name) for name in waiting)]
 
     def kind(self, item: Word | Form, declaring: bool) -> str:
-        """Return the name of a type; ``(either a b)`` becomes a supertype of `a` and `b`, named after them."""
+        """Return the name of a type; for ``(either a b)``, declare a common supertype of `a` and `b` and return its name."""
         if isinstance(item, Form):
             words = [self.word(one, "a type") for one in item.items[1:]]
             if item.head != "either" or not words:
@@ -199,7 +200,7 @@ class _Reader:
         return item.text
 
     def types(self, items: Sequence[Word | Form]) -> None:
-        """Read types; a type that is declared twice, or as ``either``, has several supertypes."""
+        """Parse type declarations; a type that is declared twice or with ``either`` has several supertypes."""
         declared = self.typed(items, declaring=True)
         for one in declared:
             if one.name != "object":
@@ -212,7 +213,7 @@ class _Reader:
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[Word | Form]) -> None:
-        """Read objects; an object that is declared twice has the lower one of its types."""
+        """Parse object declarations; an object that is declared with two types has the subtype."""
         for one in self.typed(items):
             known = self.pddl.objects.get(one.name, one.type)
             if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
@@ -278,7 +279,7 @@ class _Reader:
         variables: Mapping[str, str],
         parts: Mapping[str, Form],
     ) -> None:
-        """Read a durative action; its parts are checked like those of any action, each separately."""
+        """Parse a durative action, and check each of its conditions and effects separately."""
         if ":duration" not in parts:
             raise self.fail(form, f"durative action '{name.text}' has no :duration")
         try:
@@ -299,7 +300,7 @@ class _Reader:
         self.pddl.actions[name.text] = Action(name.text, parameters, asked, made, name, found)
 
     def axiom(self, form: Form) -> None:
-        """Read ``(:derived (name ?x …) condition)``; a variable without a type has the type of the predicate."""
+        """Parse ``(:derived (name ?x …) condition)``; a variable without a type has the type in the predicate's declaration."""
         if len(form.items) != 3 or not isinstance(head := form.items[1], Form) or not isinstance(form.items[2], Form):
             raise self.fail(form, "wanted (:derived (PREDICATE ?x …) CONDITION)")
         if head.head not in self.pddl.predicates:
@@ -317,9 +318,9 @@ class _Reader:
         self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
 
     def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
-        """Read conditions on every state: ``(always CONDITION)``, also below ``and`` and ``forall``.
+        """Parse ``(always CONDITION)``, also inside ``and`` and ``forall``: a condition that must hold in every state.
 
-        Each becomes a derived predicate that holds where the condition doesn't, and that is forbidden.
+        Each condition becomes a derived predicate that holds if the condition is violated, and that is forbidden.
         """
         for part in parts:
             head = part.head if isinstance(part, Form) else ""
@@ -345,7 +346,7 @@ class _Reader:
                 )
 
     def stated(self, form: Form, where: str) -> None:
-        """Raise an error if a predicate is derived."""
+        """Raise an error if the predicate of an effect or an initial fact is a derived predicate."""
         if form.head in self.derived:
             raise self.fail(
                 form, f"'{form.head}' is derived, so it can't be {where}; change what its (:derived …) reads"
@@ -430,7 +431,7 @@ class _Reader:
             self.atom(form, variables)
 
     def number(self, item: Word | Form, variables: Mapping[str, str]) -> None:
-        """Check a number, a function, or a calculation."""
+        """Check a number, a function term or an arithmetic expression."""
         if isinstance(item, Word):
             self.constant(item)
         elif item.head in ("+", "-", "*", "/"):
@@ -455,7 +456,7 @@ class _Reader:
         known: Mapping[str, tuple[Typed, ...]] | None = None,
         what: str = "predicate",
     ) -> tuple[str, ...]:
-        """Check ``(name term …)``; return its words."""
+        """Check ``(name term …)`` against the declaration of the predicate or function, and return its words."""
         known = self.pddl.predicates if known is None else known
         if not form.head:
             raise self.fail(form, f"wanted a {what}, got a list")
@@ -478,11 +479,11 @@ class _Reader:
         return (form.head, *(self.word(item, "a term").text for item in got))
 
     def meet(self, kind: str, declared: Typed) -> bool:
-        """Return whether some type lies below both types."""
+        """Return whether some declared type is a subtype of both types."""
         return any({kind, declared.type} <= set(self.pddl.above(lower)) for lower in self.pddl.types)
 
     def term(self, item: Word | Form, variables: Mapping[str, str]) -> str:
-        """Return the type of a variable or object."""
+        """Return the type of a variable or object, which must be declared."""
         word = self.word(item, "a variable or an object")
         if word.text.startswith("?"):
             if word.text not in variables:
@@ -495,7 +496,7 @@ class _Reader:
         return self.pddl.objects[word.text]
 
     def fact(self, item: Word | Form) -> None:
-        """Read one entry of ``:init``."""
+        """Parse one element of ``:init``: an atom, a negated atom, the value of a function or a timed initial literal."""
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
         if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]):
@@ -512,13 +513,13 @@ class _Reader:
         elif item.head == "not":
             if len(item.items) != 2 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (not (predicate …))")
-            self.atom(item.items[1], {})  # what isn't stated is false anyway
+            self.atom(item.items[1], {})  # atoms that aren't listed are false
         else:
             self.stated(item, "stated")
             self.pddl.initial.append(self.atom(item, {}))
 
     def timed_fact(self, item: Form) -> None:
-        """Read a timed initial literal of PDDL 2.2: a fact that becomes true or false at a given time."""
+        """Parse a timed initial literal of PDDL 2.2, an atom that becomes true or false at a given time."""
         seconds, literal = self.constant(item.items[1]), item.items[2]
         true = not (isinstance(literal, Form) and literal.head == "not")
         inner = literal if true else literal.items[1] if isinstance(literal, Form) and len(literal.items) == 2 else None

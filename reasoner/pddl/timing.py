@@ -1,4 +1,4 @@
-"""Timings from durative actions and timed facts of PDDL: timings of behaviours, and behaviours at fixed times."""
+"""Translation of durative actions to behaviours with a duration, and of timed initial literals to behaviours at fixed times."""
 
 from __future__ import annotations
 
@@ -33,52 +33,51 @@ MOMENT, PASSED = "Moment", "passed"
 
 
 class Variables(Protocol):
-    """The variables of a behaviour that aren't its parameters."""
+    """Interface of `confab.reasoner.pddl.importing` for the quantified variables of one behaviour."""
 
     def condition(
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
-        """Yield the conditions whose conjunction is equivalent to a formula."""
+        """Yield conditions whose conjunction is equivalent to a PDDL formula, or to its negation if `negated`."""
 
 
 class Table(Protocol):
-    """The reader of actions: see `confab.reasoner.pddl.importing`."""
+    """Interface of `confab.reasoner.pddl.importing` for the names and translations of a problem."""
 
     pddl: Pddl
     level: int
 
     def name(self, kind: str, pddl_name: str, wanted: str | None = None) -> str:
-        """Return our name for a PDDL name of a kind."""
+        """Return the problem's name for a PDDL name of the given kind."""
 
     def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
-        """Return a conjunction without conditions that always hold, or None if it never holds."""
+        """Return a conjunction without the conjuncts that always hold; return None if the conjunction never holds."""
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
-        """Return the value of a number, a function or a calculation."""
+        """Return the translation of a number, a function or an arithmetic expression."""
 
     def value_effects(
         self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
-        """Return effects of an action that make atoms true or false."""
+        """Return the effects on values that are equivalent to PDDL effects on atoms."""
 
     def amount_effects(
         self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[AmountEffect, ...]:
-        """Return effects of an action on amounts."""
+        """Return the effects on amounts that are equivalent to PDDL effects on functions."""
 
 
 def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequence[Condition]) -> Timing:
-    """Return the timing of a durative action.
+    """Return the duration, conditions and effects of a durative action.
 
     Parameters
     ----------
     table : Table
-        The reader of actions.
     parts : Durative
     variables : Variables
-        Those of the behaviour that aren't its parameters.
+        The quantified variables of the behaviour.
     conditions : sequence of Condition
-        The preconditions of the action as a whole.
+        The preconditions of the equivalent instantaneous action.
     """
     asked: list[tuple[Span, Condition]] = []
     made: list[tuple[Span, AnyEffect]] = []
@@ -96,10 +95,10 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which each durative action is replaced by two actions, its start and its end.
+    """Return a domain in which two actions, for its start and its end, replace each durative action; with the actions' effects.
 
-    It is used to find invariants. A deletion is safe if the deleted fact is required at the same time. The end may add a fact
-    in place of a fact that the start deleted, unless the start adds one, too.
+    Invariant synthesis uses this domain. It accepts a deletion if the same action requires the deleted fact. For an end that adds a
+    fact after the start deleted one, the deletion and its condition are moved to the end, unless the start also adds a fact.
     """
     actions: dict[str, Action] = {}
     found: dict[str, tuple[Effect, ...]] = {}
@@ -136,7 +135,7 @@ def _all(forms: Sequence[Form], place: Word) -> Form | None:
 def happenings(
     table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
-    """Return the behaviours at fixed times in their order, the goal that all of them have happened, and their times."""
+    """Return the behaviours for timed initial literals in order of time, the goal that the last one happens, and their times."""
     pddl = table.pddl
     moments = sorted({time for time, _, _ in pddl.timed})
     if not moments:

@@ -1,7 +1,7 @@
-"""A planning problem written as a scene in Turtle, which `confab.reasoner.reading.problem` reads as the same problem.
+"""Export of a planning problem as a scene in Turtle, from which `confab.reasoner.reading.problem` reads the same problem.
 
-Domain and scene go into one file. Every condition and effect is an individual with an IRI, so that Protégé shows and edits it.
-Effects are numbered in the order in which they are made.
+Domain and scene are in one file. Every condition and effect is an individual with an IRI, so that Protégé can show and edit it.
+Effects are numbered in the order of their execution.
 """
 
 from __future__ import annotations
@@ -52,21 +52,22 @@ HEADER = f"""\
 """
 CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
-"""The origin of a name, written as its label."""
+"""Mapping from names to labels, for example to the original PDDL names."""
 _Stated: TypeAlias = "tuple[str, str, str, Properties]"
-"""A fact: its subject, the property that states it if there is one, the value, and the properties of a node that states it."""
+"""A fact: subject, value property (or an empty text), value, and the properties of the node if no value property exists."""
 
 
 def turtle(problem: Problem, title: str, description: str, labels: Said | None = None) -> str:
-    """Return a scene file that states everything in a problem.
+    """Return the text of a scene file that is equivalent to a problem.
 
     Parameters
     ----------
     problem : Problem
-        Its names become the local names of IRIs in the namespace of its scene.
+        Its names become local names of IRIs in the namespace of its scene.
     title, description : str
+        Annotations of the scene.
     labels : mapping of name to label, optional
-        A name without one is its own label.
+        A name without an entry is its own label.
     """
     writer = _SceneWriter(problem, dict(labels or {}))
     header = HEADER.format(scene=problem.scene, title=_quoted(title), description=_quoted(description))
@@ -108,7 +109,7 @@ class _SceneWriter:
         return f":{name}"
 
     def node(self, name: str, kinds: str, text: str, *pairs: tuple[str, str | Sequence[str]]) -> str:
-        """Return one subject with its label, its definition if any, and its properties."""
+        """Return the Turtle statements of one subject: classes, label, definition (unless `text` is empty) and properties."""
         said = [f"{self.iri(name)} a {kinds} ; rdfs:label {_quoted(self.labels.get(name, name))}@en"]
         if text:
             said.append(f"skos:definition {_quoted(text)}@en")
@@ -168,7 +169,7 @@ class _SceneWriter:
                 yield self.term(f"{one.name}.{i}", "c:Parameter", i, kind)
 
     def amount(self, one: SituationType) -> Iterator[str]:
-        """Yield a situation type whose values are numbers."""
+        """Yield the statements of a situation type whose values are numbers."""
         quantity, single = one.quantity, len(one.arguments) == 1
         assert quantity is not None
         pairs: list[tuple[str, str | Sequence[str]]] = [("c:fromLevel", str(one.level))] if one.level != 1 else []
@@ -196,7 +197,7 @@ class _SceneWriter:
 
     @cached_property
     def measures(self) -> frozenset[str]:
-        """The relations that behaviours use as numbers."""
+        """The relations whose last argument is a number."""
         return measures(self.problem.domain.behaviors.values())
 
     def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
@@ -242,7 +243,7 @@ class _SceneWriter:
         yield from self.terms(nodes, one)
 
     def terms(self, nodes: NodeWriter, one: Behavior | Rule) -> Iterator[str]:
-        """Yield the terms of a behaviour or rule, and the nodes of its parts."""
+        """Yield the statements of the parameters and variables of a behaviour or rule, and of its condition and effect nodes."""
         for i, parameter in enumerate(one.parameters, start=1):
             yield self.term(nodes.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
         for variable in one.variables:
@@ -250,7 +251,7 @@ class _SceneWriter:
         yield from (f"{statement} ." for statement in nodes.nodes)
 
     def lasting(self, name: str, timing: Timing, nodes: NodeWriter) -> Iterator[tuple[str, str | Sequence[str]]]:
-        """Yield the properties of the duration and the actors of a behaviour."""
+        """Yield the properties for the duration, the actors and the fixed time of a behaviour."""
         if isinstance(timing.duration, Fraction):
             yield "c:duration", seconds_text(timing.duration)
         elif timing.duration is not None:
@@ -268,13 +269,13 @@ class _SceneWriter:
         yield from self.terms(nodes, one)
 
     def behavior_nodes(self, where: str, terms: Iterable[Parameter]) -> NodeWriter:
-        """Return a writer of the conditions and effects of a behaviour or rule, whose terms are named after it."""
+        """Return a writer of the conditions and effects of a behaviour or rule `where`; the name is the prefix of all its nodes."""
         taken = {t.name: f":{where}.{t.name[1:]}" for t in terms}
         sought = set(taken.values())
 
         def variable(name: str, node: str, position: int) -> str:
             found = f":{where}.{name[1:]}"
-            if found in sought:  # of another part of the behaviour: a node is one term
+            if found in sought:  # the name already denotes a variable of another condition
                 found += f"_{position}"
             sought.add(found)
             return found
@@ -290,7 +291,7 @@ class _SceneWriter:
         )
 
     def individuals(self) -> Iterator[str]:
-        """Yield every individual with its lowest class, in the order in which the classes list them."""
+        """Yield the statements of all individuals with their most specific classes, in the order of the classes' members."""
         classes = self.problem.classes
         order = [name for kind in classes if kind not in CORE_CLASSES for name in classes[kind]]
         names = [name for name in dict.fromkeys(order) if name not in (TRUE, FALSE)]
@@ -317,7 +318,7 @@ class _SceneWriter:
             yield from self.above(parent)
 
     def facts(self) -> Iterator[str]:
-        """Yield the facts: as statements of a value property if there is one, otherwise as nodes."""
+        """Yield the initial facts, as statements of a value property if one exists and as nodes otherwise."""
         number = 0
         for subject, prop, value, properties in (*self.values(), *self.tuples()):
             if prop:
@@ -327,7 +328,7 @@ class _SceneWriter:
             yield f"{self.individual.statement(f':fact{number}', 'SituatedObjectInstance', properties)} ."
 
     def values(self) -> Iterator[_Stated]:
-        """Yield the values of symbols, unless they are the default."""
+        """Yield the initial values of symbols, except default values and rest values."""
         for symbol, value in self.problem.initial.items():
             situation = self.problem.domain.situations[symbol.situation]
             if value in (situation.default, situation.rest) or (situation.boolean and value == FALSE):
@@ -343,7 +344,7 @@ class _SceneWriter:
                 yield symbol.arguments[0], prop, amount, {**properties, "amount": [amount]}
 
     def tuples(self) -> Iterator[_Stated]:
-        """Yield the tuples of relations."""
+        """Yield the rows of static relations."""
         for relation, tuples in self.problem.relations.items():
             prop = self.iri(relation) if all(len(row) == 2 for row in tuples) else ""
             for row in sorted(tuples):
@@ -357,7 +358,7 @@ class _SceneWriter:
 
     @cached_property
     def individual(self) -> NodeWriter:
-        """A writer of nodes without variables."""
+        """Writer of nodes without variables, such as facts."""
         return self.behavior_nodes("", ())
 
     def task(self) -> Iterator[str]:
@@ -378,14 +379,14 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Write the span of a condition or an effect, if it isn't throughout; return its IRI."""
+    """Append the statement of a condition's or effect's time span unless it is the whole duration, and return its IRI."""
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri
 
 
 def seconds_text(seconds: Fraction) -> str:
-    """Return seconds as a literal in Turtle.
+    """Return a duration in seconds as a Turtle literal.
 
     >>> seconds_text(Fraction(5, 2))
     '"PT2.5S"^^xsd:dayTimeDuration'

@@ -1,4 +1,4 @@
-"""The names of a scene in PDDL (types, objects, predicates and functions) and their initial facts."""
+"""Names of a scene's types, objects, predicates and functions in PDDL, and the initial facts of the named predicates."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from confab.reasoner.pddl.formulas import Atom, Formula, FunctionTerm, Number, O
 from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
-"""A class whose only individual is the argument of predicates that have none in PDDL."""
+"""Class whose only individual is the argument of a symbol that has no argument in PDDL."""
 RESERVED = """
 all always and assign at-end at-most-once at-start constants decrease define derived domain effect either end
 exists forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number
 object objects or over parameters precondition predicates preference problem requirements scale-down scale-up
 sometime sometime-after sometime-before start total-cost total-time types undefined when within
 """
-"""Reserved words of PDDL."""
+"""Reserved words of PDDL, which can't be names."""
 
 
 class Vocabulary:
-    """The names of a problem in PDDL.
+    """Mapping from the names of a problem to PDDL names.
 
-    All names differ, even if they denote things of different kinds, since some readers use one table for all of them.
+    Two PDDL names are different even if they denote a type and an object, because some parsers have one table for all names.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -36,13 +36,13 @@ class Vocabulary:
         self.situations = domain.situations
         self.names: dict[tuple[str, str], str] = {}
         self.taken = set(RESERVED.split())
-        self.used: dict[str, None] = {}  # situation types that are named as predicates
-        self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # static predicates, with their rows
+        self.used: dict[str, None] = {}  # situation types that have become predicates
+        self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # rows of each static predicate
         self.arity: dict[str, int] = {}
-        self.functions: dict[str, list[set[str]]] = {}  # with the types of the terms that are their arguments
-        self.measured: dict[str, str] = {}  # relations that give a number, with their functions
-        self.counted: dict[str, str] = {}  # situation types that are amounts, with their functions
-        self.assigned: set[str] = set()  # situation types that are amounts and get values
+        self.functions: dict[str, list[set[str]]] = {}  # types of the terms at each argument position
+        self.measured: dict[str, str] = {}  # function of each relation whose last argument is a number
+        self.counted: dict[str, str] = {}  # function of each situation type that is an amount
+        self.assigned: set[str] = set()  # amounts that an effect assigns or scales
         self.existing: dict[str, set[tuple[str, ...]]] = {}
         for symbol in problem.initial:
             self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
@@ -50,7 +50,7 @@ class Vocabulary:
         self.lowest = {member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)}
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
-        """Return the PDDL name for a name of the scene."""
+        """Return the PDDL name for a name of the given kind in the scene."""
         if (kind, ours) not in self.names:
             text = re.sub(r"[^0-9a-z_-]", "_", (wanted or ours).lower())
             text = text if re.match(r"[a-z]", text) else f"x{text}"
@@ -63,7 +63,10 @@ class Vocabulary:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the classes that become types, each with its type and supertype; any two types are nested or disjoint."""
+        """Return the PDDL type of each class that becomes a type, and the supertype of each type.
+
+        Of overlapping classes, only the largest becomes a type, so that any two types are nested or disjoint.
+        """
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
@@ -84,38 +87,38 @@ class Vocabulary:
         return types, above
 
     def above_first(self) -> list[str]:
-        """Return the classes that become types, larger ones first."""
+        """Return the classes that become types, sorted from large to small."""
         return sorted(self.types, key=lambda kind: -len(self.problem.members(kind)))
 
     def variable(self, name: str, kind: str) -> Term:
-        """Return a variable for the individuals of a class."""
+        """Return a PDDL variable for the individuals of a class."""
         return Term(name, self.types.get(kind, "object"), self.problem.members(kind))
 
     def object(self, ours: str) -> Term:
-        """Return an individual."""
+        """Return the PDDL object for an individual."""
         return Term(self.name("object", ours), self.lowest.get(ours, "object"), frozenset((ours,)))
 
     # ----------------------------------------------------------------------------------------------------- predicates
 
     def atom(self, predicate: str, terms: Sequence[Term]) -> Atom:
-        """Return a predicate with its arguments."""
+        """Return an atom, and record the predicate's number of arguments."""
         self.arity[predicate] = len(terms)
         return Atom(predicate, tuple(terms))
 
     def about(self, situation: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-        """Return the arguments of a symbol without the individual for the world."""
+        """Return the arguments of a symbol, except the individual for the world."""
         kinds = self.situations[situation].arguments
         one = len(self.problem.classes.get(WORLD, ())) == 1
         return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
 
     def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
-        """Return the atom that a symbol has a value; without a value, that the symbol is true."""
+        """Return the atom that a symbol has a value, or the atom that a boolean symbol is true if `value` is None."""
         self.used[situation] = None
         words = self.about(situation, terms)
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
 
     def is_a(self, term: Term, kind: str) -> Formula:
-        """Return the atom that a term is an individual of a class."""
+        """Return the formula that a term denotes a member of a class; it is constant if this is known."""
         members = self.problem.members(kind)
         if term.members <= members:
             return ALWAYS
@@ -124,17 +127,17 @@ class Vocabulary:
         return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
 
     def guard(self, term: Term, kind: str) -> Formula:
-        """Return the conditions on a variable of a class besides its type."""
+        """Return the formula that a variable denotes a member of its class; it is always true if the class is a PDDL type."""
         if kind in self.types:
             return ALWAYS
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
 
     def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
-        """Return the atom of a relation."""
+        """Return the formula that a static relation holds for some terms."""
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
     def differs(self, term: Term, constant: Term) -> Formula:
-        """Return the atom that a term isn't a given individual, for planners that don't support equality."""
+        """Return the formula that a term doesn't denote a given individual, by a predicate instead of PDDL's equality."""
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
         found = self.static(
             "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)
@@ -142,7 +145,7 @@ class Vocabulary:
         return found if term.members & constant.members else ALWAYS
 
     def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
-        """Return a static predicate that holds for some rows."""
+        """Return the atom of a static predicate with the given rows; return a constant formula if its truth is known."""
         if not rows:
             return NEVER
         if not any(term.variable for term in terms):
@@ -152,7 +155,7 @@ class Vocabulary:
         return self.atom(name, terms)
 
     def total(self, situation: str, terms: Sequence[Term]) -> bool:
-        """Return whether a symbol of a situation type exists for all individuals that some terms can denote."""
+        """Return whether the symbols of a situation type exist for all individuals that some terms can denote."""
         kind = self.situations[situation]
         within = all(t.members <= self.problem.members(k) for k, t in zip(kind.arguments, terms, strict=True))
         if kind.boolean:
@@ -163,14 +166,14 @@ class Vocabulary:
         return all(row in rows for row in product(*(sorted(term.members) for term in terms)))
 
     def symbols(self, situation: str) -> int:
-        """Return the number of symbols of a situation type if all of them existed."""
+        """Return the maximum number of symbols of a situation type, one for each combination of its argument classes' members."""
         number = 1
         for kind in self.situations[situation].arguments:
             number *= len(self.problem.classes.get(kind, ()))
         return number
 
     def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
-        """Return the atom that a symbol of a situation type exists for some terms."""
+        """Return the formula that the symbol of a situation type exists for some terms."""
         kind = self.situations[situation]
         if self.total(situation, terms):
             return ALWAYS
@@ -182,36 +185,36 @@ class Vocabulary:
     # -------------------------------------------------------------------------------------------------------- numbers
 
     def amount(self, situation: str, terms: Sequence[Term]) -> FunctionTerm:
-        """Return the function for an amount."""
+        """Return the PDDL function term for an amount."""
         name = self.name("function", situation, situation)
         self.counted[situation] = name
         return self.call(name, self.about(situation, terms))
 
     def measure(self, relation: str, terms: Sequence[Term]) -> FunctionTerm:
-        """Return the function for a relation that gives a number."""
+        """Return the PDDL function term for a static relation whose last argument is a number."""
         name = self.name("function", f"relation {relation}", relation)
         self.measured[relation] = name
         return self.call(name, terms)
 
     def call(self, name: str, terms: Sequence[Term]) -> FunctionTerm:
-        """Return a function with its arguments."""
+        """Return a function term, and record the types of its arguments."""
         for types, term in zip(self.functions.setdefault(name, [set() for _ in terms]), terms, strict=True):
             types.add(term.type)
         return FunctionTerm(name, tuple(terms))
 
     def common(self, types: Iterable[str]) -> str:
-        """Return the lowest common supertype."""
+        """Return the lowest common supertype of some types."""
         chains = [list(self.upwards(one)) for one in sorted(types)]
         return next((one for one in chains[0] if all(one in chain for chain in chains)), "object")
 
     def upwards(self, kind: str) -> Iterator[str]:
-        """Yield a type and its supertypes."""
+        """Yield a type and its supertypes except ``object``."""
         while kind != "object":
             yield kind
             kind = self.above[kind]
 
     def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
-        """Return a calculation in PDDL, with terms for its variables."""
+        """Return the PDDL expression for a numeric expression, in which terms replace variables."""
         match expression:
             case Amount(situation, arguments):
                 return self.amount(situation, self.terms(arguments, terms))
@@ -223,7 +226,7 @@ class Vocabulary:
                 return expression
 
     def there(self, expression: Expression, terms: Mapping[str, Term]) -> Iterator[Formula]:
-        """Yield the conditions for all numbers in a calculation to exist."""
+        """Yield the formulas that all amounts and measures in a numeric expression exist."""
         match expression:
             case Amount(situation, arguments):
                 yield self.exists(situation, self.terms(arguments, terms))
@@ -239,13 +242,13 @@ class Vocabulary:
                 return
 
     def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
-        """Return the PDDL terms for names of the scene."""
+        """Return the PDDL terms for names of variables and individuals."""
         return tuple(terms[name] if name in terms else self.object(name) for name in names)
 
     # ---------------------------------------------------------------------------------------------------- statements
 
     def facts(self) -> Iterator[Atom | tuple[FunctionTerm, Fraction]]:
-        """Yield the initial atoms and numbers of everything that has been named."""
+        """Yield the initial atoms and function values of all predicates and functions that have been named."""
         for symbol, value in self.problem.initial.items():
             boolean, its = self.situations[symbol.situation].boolean, self.terms(symbol.arguments, {})
             if symbol.situation in self.counted:
@@ -253,7 +256,7 @@ class Vocabulary:
             elif symbol.situation in self.used and (value == TRUE or not boolean):
                 yield self.value(symbol.situation, its, None if boolean else self.object(value))
         every = dict.fromkeys(one for members in self.problem.classes.values() for one in members)
-        for situation in sorted(self.assigned):  # numbers that no action reads, for readers that want one of each
+        for situation in sorted(self.assigned):  # some planners want an initial value for all arguments
             kinds = self.situations[situation].arguments
             types = iter(map(self.common, self.functions[self.counted[situation]]))
             kept = self.about(situation, [Term(str(place)) for place in range(len(kinds))])
@@ -274,5 +277,5 @@ class Vocabulary:
                 yield self.atom(predicate, self.terms(row, {}))
 
     def declared(self, ours: str) -> str:
-        """Return an object with its type."""
+        """Return the PDDL declaration of an object, with its type."""
         return f"{self.name('object', ours)} - {self.lowest.get(ours, 'object')}"

@@ -1,4 +1,4 @@
-"""A PDDL text as nested lists of words, each with its position."""
+"""Tokenizer of PDDL: a text as nested lists of words with their positions."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
-"""A variable begins at its '?', as in (aircraft?a), a type at its name, as in (?b -boat)."""
+"""A variable begins at its ``?``, as in ``(aircraft?a)``. A type begins at its name, as in ``(?b -boat)``."""
 
 
 @dataclass(frozen=True)
 class Word:
-    """A name or number in lower case, with its place."""
+    """A name or number in lower case, with its line and column."""
 
     text: str
     line: int
@@ -21,7 +21,7 @@ class Word:
 
 @dataclass(frozen=True)
 class Form:
-    """A list in parentheses, with its place."""
+    """A list in parentheses, with its line and column."""
 
     items: tuple[Word | Form, ...]
     line: int
@@ -29,16 +29,16 @@ class Form:
 
     @property
     def head(self) -> str:
-        """The first word; empty if there is none."""
+        """The first item if it is a word, otherwise an empty text."""
         return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
 
 
 class PddlError(ValueError):
-    """The PDDL can't be used; the message states file, line and column, the error, and what was expected."""
+    """Raised for PDDL that can't be used; the message states file, line and column, the error, and the expected text."""
 
 
 def form_of(text: str, file: str) -> Form:
-    """Return the only form in a text."""
+    """Return the single list that a PDDL text consists of."""
     stack: list[tuple[list[Word | Form], int, int]] = []
     line, start = 1, 0
     done: Form | None = None
@@ -75,5 +75,5 @@ def form_of(text: str, file: str) -> Form:
 
 
 def is_number(item: Word | Form) -> bool:
-    """Return whether a word is a number."""
+    """Return whether an item is a number."""
     return isinstance(item, Word) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None
