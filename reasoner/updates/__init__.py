@@ -1,1 +1,1 @@
-"""Behaviours as SPARQL updates: compiled into individuals, and written back."""
+"""Behaviours as SPARQL updates: compilation into individuals, and the inverse translation."""

@@ -1,24 +1,25 @@
-"""A behaviour written as a SPARQL update, or a rule as a CONSTRUCT query, compiled into equivalent individuals.
+"""Compilation of a SPARQL update into a behaviour's individuals, and of a CONSTRUCT query into a rule's individuals.
 
 ==========================================  =====================================================================
 in the update                               as individuals
 ==========================================  =====================================================================
-``?cup a :Cup`` in the first WHERE          a `:Parameter`, in the order of these patterns
-``?cup :at ?from``, ``?from`` being new     a `:ValueCondition` that determines the `:Variable` ``?from``
-``?from a :Slot`` behind that               the type of that variable
+``?cup a :Cup`` in the first WHERE          a `:Parameter`, numbered in the order of these patterns
+``?cup :at ?from`` with a new ``?from``      a `:ValueCondition` that determines the `:Variable` ``?from``
+``?from a :Slot`` after this pattern        the type of ``?from``
 ``?cup :fits ?slot``                        a `:RelationCondition`
-``?shelf :COLOR (?cup :red)``               a situation type without a property of its own, or with several arguments
-``FILTER(?a != ?b)``, ``IN``, ``VALUES``    `:EqualityCondition`, several in an `:AnyOf`
-``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` denote numbers; a FILTER of them is a `:Comparison`
-``FILTER EXISTS { ?x a :Tube … }``          a `:Witness` that looks for ``?x``
-``FILTER NOT EXISTS { … }``                 the conditions inside, negated
+``?shelf :COLOR (?cup :red)``               a `:ValueCondition` whose situation type has several arguments or no value property
+``FILTER(?a != ?b)``, ``IN``, ``VALUES``    an `:EqualityCondition`, or an `:AnyOf` of several
+``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` denote numbers; a FILTER on numbers is a `:Comparison`
+``FILTER EXISTS { ?x a :Tube … }``          a `:Witness` for ``?x``
+``FILTER NOT EXISTS { … }``                 the negation of the conditions inside
 ``{ … } UNION { … }``, ``||``               an `:AnyOf`
-``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation with its WHERE as `:when`
-``CONSTRUCT { ?a :p ?b } WHERE { … }``      a `:Rule` with these conditions; a variable that isn't in the head, in a `:Witness`
-``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of that rule, `:over` the variables that begin with their type
+``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; a further operation's WHERE is their `:when`
+``CONSTRUCT { ?a :p ?b } WHERE { … }``      a `:Rule` with these conditions; a `:Witness` for variables that the head lacks
+``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of the rule, `:over` the variables that have a type pattern
 ==========================================  =====================================================================
 
-All conditions are evaluated before the behaviour, including those of further operations; a variable is the same in all of them.
+All conditions are evaluated in the state before the behaviour, including the conditions of further operations. A variable has the
+same value in all operations.
 """
 
 from __future__ import annotations
@@ -46,16 +47,16 @@ from confab.reasoner.updates.words import (
 )
 
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
-"""The changes of an amount, by operator: the amount becomes itself, the operator, and a term."""
+"""The change of an amount by operator: the new amount is the old amount, the operator and a term."""
 
 
 class UpdateCompiler:
-    """Compiles the updates of one behaviour, or the query of one rule.
+    """Compiler of the updates of one behaviour, or of the query of one rule.
 
     Attributes
     ----------
     known : set of str
-        The variables of the first WHERE of each update so far.
+        The variables in the first WHERE of all updates compiled so far.
     """
 
     def __init__(self, behavior: str, vocabulary: Vocabulary, declared: Mapping[str, tuple[str, str, int]]) -> None:
@@ -66,7 +67,7 @@ class UpdateCompiler:
         self.known: set[str] = set()
 
     def write(self, update: Update) -> None:
-        """Add an update; its first operation belongs to the behaviour, further operations are conditional effects."""
+        """Compile an update: its first operation gives preconditions and effects, further operations give conditional effects."""
         own, operations = parsed(update.text)
         self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
         for name, (node, kind, number) in self.scope.declared.items():
@@ -95,7 +96,7 @@ class UpdateCompiler:
             self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
 
     def write_rule(self, query: Update) -> None:
-        """Add a CONSTRUCT query: its head is the conclusion, its WHERE the conditions, or the aggregated tuples."""
+        """Compile a CONSTRUCT query: its head is the rule's conclusion, its WHERE states the conditions or aggregated tuples."""
         own, rule = constructed(query.text)
         self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
         self.nodes.links = {}
@@ -123,7 +124,7 @@ class UpdateCompiler:
         self.nodes.links = {key: values for key, values in self.nodes.links.items() if values}
 
     def total(self, rule: Construction, group: Group, within: set[str]) -> None:
-        """Add an aggregate: its amount, the variables that it aggregates over, and the number that each tuple contributes."""
+        """Compile an aggregate: its amount, the variables that it aggregates over, and the number that each binding adds."""
         at = rule.head.subject.at
         if last_of(rule.head) != rule.name or not self.scope.vocabulary.numeric(self.scope.iri(rule.head.predicate)):
             raise UpdateError(
@@ -141,7 +142,7 @@ class UpdateCompiler:
             self.numbers.side(self.nodes.behavior, "right", self.numbers.expression(rule.argument, within, at), at)
 
     def effects(self, operation: Operation, when: Sequence[str], known: Collection[str], *asked: Group) -> None:
-        """Add the deletions and insertions of an operation."""
+        """Compile the deletions and insertions of an operation into effects with the conditions `when`."""
         inserted = {(one.subject, one.predicate, middle_of(one)) for one in operation.insert}
         said = {(t.subject, t.predicate, t.object) for group in asked for t in group.parts if isinstance(t, Triple)}
         vocabulary = self.scope.vocabulary
@@ -171,7 +172,7 @@ class UpdateCompiler:
             self.effect(one, when, known, negated=False)
 
     def changes(self, one: Triple) -> None:
-        """Raise `UpdateError` unless a triple is about a changing situation."""
+        """Raise `UpdateError` unless the predicate of a triple is a situation type or its property, which behaviours can change."""
         prop = "" if one.predicate == A else self.scope.iri(one.predicate)
         if prop and prop not in self.scope.vocabulary.relations:
             return
@@ -181,7 +182,7 @@ class UpdateCompiler:
         raise UpdateError(what, "use the property of a situation type", one.predicate.at)
 
     def effect(self, one: Triple, when: Sequence[str], known: Collection[str], negated: bool) -> None:
-        """Add the effect of a triple: inserted, or deleted if negated."""
+        """Compile an inserted triple, or a deleted triple if `negated`, into an effect."""
         if self.scope.vocabulary.numeric(self.scope.iri(one.predicate)):
             node = self.nodes.new("effect", "AmountEffect", one.subject.at)
             own, by = self.numbers.measured(one, known), self.numbers.expression(last_of(one), known, one.predicate.at)

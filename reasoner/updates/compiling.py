@@ -1,4 +1,4 @@
-"""The SPARQL updates of a graph's behaviours, compiled into individuals (`confab.reasoner.updates.behaviors`)."""
+"""Compilation of all SPARQL updates in a graph into individuals (see `confab.reasoner.updates.behaviors`)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UPDATES = """SELECT ?behavior ?property ?value WHERE {
   FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
   FILTER(?property != :construct || NOT EXISTS { ?behavior :situationType ?situation })
 } ORDER BY ?behavior ?property ?value"""
-"""Updates of behaviours that have no individuals yet; in a store that was filled from files all behaviours have them."""
+"""Selects the updates of behaviours without individuals; stores that were filled from files contain the individuals already."""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
   ?behavior a/rdfs:subClassOf* :Behavior . { ?behavior :update ?text } UNION { ?behavior :extends ?other }
   ?term :termType ?type . FILTER(STRSTARTS(STR(?term), CONCAT(STR(?behavior), ".")) || EXISTS { ?behavior :parameter ?term })
@@ -31,20 +31,20 @@ PREFERRED = """SELECT ?prefix ?namespace WHERE {
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault for which an update can't be read."""
+    """The reason why an update can't be compiled, with its position and a remedy."""
 
     place: Place
     what: str
     remedy: str
 
     def __str__(self) -> str:
-        """Return the fault in one line."""
+        """Return behaviour, reason, position and remedy in one line."""
         return f"<{self.place.behavior}>: {self.what} ({self.place}); {self.remedy}"
 
 
 @dataclass
 class Compiled:
-    """The individuals of a graph's updates: triples, the place of each individual, and faults."""
+    """Result of the compilation of a graph's updates: the individuals' triples, the individuals' positions, and the faults."""
 
     triples: list[ox.Triple] = field(default_factory=list)
     places: dict[str, Place] = field(default_factory=dict)
@@ -52,16 +52,16 @@ class Compiled:
 
 
 def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mapping[str, str]) -> Compiled:
-    """Return the individuals of a graph's updates.
+    """Compile the updates of a graph into individuals.
 
     Parameters
     ----------
     ask : callable
         Returns the rows of a query on the graph.
     spelled : mapping of behaviour to prefixes
-        The prefixes of the file that states its update.
+        The prefixes of the file that contains the behaviour's update.
     prefixes : mapping of prefix to namespace
-        The prefixes of all files, for results of a store without files.
+        The prefixes of all files, used if the file of an update is unknown.
     """
     texts: dict[str, str] = {}
     extends: dict[str, list[str]] = {}
@@ -109,7 +109,7 @@ def _compile(
     vocabulary: Vocabulary,
     done: Compiled,
 ) -> None:
-    """Compile one behaviour after those that it extends, or record why that isn't possible."""
+    """Compile one behaviour together with the behaviours that it extends, or record the fault."""
     sources = list(_sources(behavior, extends, ()))
     if lacking := [source for source in sources if source not in updates and source not in extends]:
         name = local_name(lacking[0])
@@ -133,7 +133,7 @@ def _compile(
 
 
 def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield a behaviour after all that it extends; one that extends itself occurs twice."""
+    """Yield all behaviours that a behaviour extends, and the behaviour itself last; a cycle yields a behaviour twice."""
     if behavior in above:
         yield behavior
         return

@@ -1,4 +1,4 @@
-"""Conditions of an update: patterns, filters and groups, compiled into nodes."""
+"""Compilation of the conditions of an update (patterns, filters and groups) into nodes."""
 
 from __future__ import annotations
 
@@ -22,26 +22,29 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE
 
 SIGNS = {sign: sign for sign in ("<", "<=", "=", ">=", ">")} | {"!=": "="}
 ANYONE = "?anyone"
-"""The name of a variable that is only the subject of an absence condition."""
+"""Name of the witness variable in a written absence condition."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Compiles the conditions of a behaviour or rule."""
+    """Compiler of the conditions of one behaviour or rule."""
 
     nodes: Nodes
     scope: Scope
     numbers: Numbers
 
     def sought(self, group: Group, known: Collection[str], at: int) -> list[str]:
-        """Return the conditions of a nested group, with witnesses for the variables that it introduces."""
+        """Return the condition nodes of a nested group, inside witnesses if the group introduces variables with a type."""
         if not group.chosen:
             self.scope.determine(group)
             return self.all_of(group, {*known, *group.names})
         return [self.witness(group, known, at)]
 
     def witness(self, group: Group, known: Collection[str], at: int) -> str:
-        """Return nested witnesses for the variables that a group introduces."""
+        """Return the outermost of the nested witnesses for the variables that a group introduces.
+
+        Each condition is put into the outermost witness in which all of its variables are bound.
+        """
         inside = {*known, *group.names}
         names = list(group.chosen)
         depth = {name: level for level, name in enumerate(names)}
@@ -64,17 +67,17 @@ class Conditions:
         for level, (node, sought, kind) in enumerate(made):
             found = self.all_of(Group(levels[level]), inside)
             found += [deeper for deeper, *_ in made[level + 1 : level + 2]]
-            if not found:  # that there is one of its class is all
+            if not found:  # the only condition is the class
                 found = [self.nodes.condition("ClassCondition", at, class_properties(self.scope.terms[sought], kind))]
             self.nodes.said[node]["condition"] = found
         return made[0][0]
 
     def all_of(self, group: Group, known: Collection[str]) -> list[str]:
-        """Return the nodes of a group's conditions."""
+        """Return the condition nodes of all parts of a group."""
         return [node for part in group.parts for node in self.part(part, known)]
 
     def part(self, part: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions of one part of a group."""
+        """Return the condition nodes of one part of a group."""
         if isinstance(part, Triple):
             return [self.pattern(part, known)]
         if part.name == "Filter":
@@ -94,11 +97,11 @@ class Conditions:
         )
 
     def inside(self, graph: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions of a group in braces."""
+        """Return the condition nodes of a group in braces."""
         return self.sought(self.scope.group(parts(graph), known), known, place(graph))
 
     def filter(self, expression: Any, known: Collection[str]) -> list[str]:
-        """Return the conditions whose conjunction is equivalent to a FILTER."""
+        """Return the nodes of conditions whose conjunction is equivalent to a FILTER."""
         one = unwrapped(expression)
         name = getattr(one, "name", "")
         if name == "ConditionalAndExpression":
@@ -131,13 +134,13 @@ class Conditions:
         )
 
     def equal(self, left: Any, right: Any, negated: bool, known: Collection[str]) -> str:
-        """Return the condition that two terms are the same, or differ."""
+        """Return the condition node that two terms are equal, or that they are different if `negated`."""
         at = place((left, right))
         one, other = (self.scope.put(term(unwrapped(side), at), known, at) for side in (left, right))
         return self.nodes.condition("EqualityCondition", at, equality_properties(one, other), negated)
 
     def values(self, part: Any, known: Collection[str]) -> str:
-        """Return the condition of VALUES: one of its rows applies."""
+        """Return the condition node of VALUES: the variables equal the values of some row."""
         at = place(part)
         several = not isinstance(part.var[0], str) or len(part.var) > 1
         rows = [tuple(row) if several else (row,) for row in part.value or ()]
@@ -154,7 +157,7 @@ class Conditions:
         return self.any_of(groups, at)
 
     def any_of(self, groups: Sequence[Sequence[str]], at: int, negated: bool = False) -> str:
-        """Return a disjunction of groups of conditions; of a single condition, that condition."""
+        """Return the node of a disjunction of conjunctions; a disjunction of a single condition is that condition's node."""
         if len(groups) == 1 and len(groups[0]) == 1 and not negated:
             return groups[0][0]
         node = self.nodes.new("condition", "AnyOf", at)
@@ -173,14 +176,14 @@ class Conditions:
         return node
 
     def negated(self, conditions: Sequence[str], binds: bool, at: int) -> str:
-        """Return the negation of a conjunction."""
+        """Return the node of the negation of a conjunction."""
         if len(conditions) != 1 or (binds and "witness" not in self.nodes.said[conditions[0]]):
             return self.any_of([conditions], at, negated=True)
         self.nodes.negate(conditions[0])
         return self.absence(conditions[0])
 
     def absence(self, witness: str) -> str:
-        """Return the absence condition that is equivalent to a witness which only tests a value."""
+        """Change a negated witness that only tests one value to an absence condition, if possible, and return its node."""
         said = self.nodes.said[witness]
         sought, inner = said.get("witness", [""])[0], said.get("condition", [])
         if sought.rpartition(".")[2] != ANYONE[1:] or len(inner) != 1:
@@ -202,7 +205,7 @@ class Conditions:
         return {s for p, s in self.scope.vocabulary.properties.items() if p not in self.scope.vocabulary.functional}
 
     def pattern(self, one: Triple, known: Collection[str]) -> str:
-        """Return the condition of a triple."""
+        """Return the condition node of a triple pattern."""
         at = one.subject.at
         if one.predicate == A:
             if not isinstance(one.object, Word) or one.object.variable:
@@ -219,7 +222,7 @@ class Conditions:
         return self.nodes.condition("ValueCondition", at, self.situation(one, known))
 
     def arguments(self, one: Triple, known: Collection[str]) -> list[str]:
-        """Return the nodes of subject and object without ``true``."""
+        """Return the nodes of the subject and the objects of a triple, without a final ``true``."""
         said = one.object if isinstance(one.object, tuple) else (one.object,)
         at = one.predicate.at
         if said and isinstance(said[-1], Truth):
@@ -229,7 +232,7 @@ class Conditions:
         return [self.scope.put(each, known, at) for each in (one.subject, *said)]
 
     def situation(self, one: Triple, known: Collection[str]) -> Properties:
-        """Return the properties that state a situation's value."""
+        """Return the properties of a condition or effect node that states a symbol's value."""
         prop, at, vocabulary = self.scope.iri(one.predicate), one.predicate.at, self.scope.vocabulary
         if prop in vocabulary.properties:
             if isinstance(one.object, tuple):

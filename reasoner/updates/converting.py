@@ -1,7 +1,7 @@
-"""Conversion of the behaviours in a Turtle file to updates or to individuals; the rest of the file is unchanged.
+"""Conversion of the behaviours in a Turtle file to SPARQL updates or to individuals.
 
-The file is split into statements. The statements of a behaviour and its parts are replaced. A behaviour that the other form
-can't express is unchanged, and the reason is noted.
+The file is split into statements, and only the statements about behaviours and their parts are replaced. A behaviour that the
+other form can't express remains unchanged, and the reason is reported.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Triples = Sequence[tuple[ox.NamedNode | ox.BlankNode, ox.NamedNode, ox.NamedNode
 
 @dataclass(frozen=True)
 class Converted:
-    """The converted file, the converted behaviours, and the reasons why others are unchanged."""
+    """Result of a conversion: the file's new text, the converted behaviours, and why other behaviours are unchanged."""
 
     text: str
     behaviors: Sequence[str]
@@ -48,7 +48,7 @@ class Converted:
 
 @dataclass
 class _Statement:
-    """A statement of a file; prefixes and comments have no triples."""
+    """A statement of a Turtle file with its triples; prefix declarations and comments have no triples."""
 
     text: str
     triples: Triples = ()
@@ -57,14 +57,14 @@ class _Statement:
 
 @dataclass
 class _File:
-    """A Turtle file as statements, with the notation of its names."""
+    """A Turtle file as a list of statements, with the prefixes that abbreviate its IRIs."""
 
     statements: list[_Statement]
     prefixes: Mapping[str, str]
     said: dict[str, list[_Statement]] = field(default_factory=dict)
 
     def spell(self, iri: str) -> str:
-        """Return the notation of an IRI in this file and its updates."""
+        """Return an IRI as it is written in the file and its updates, abbreviated by a prefix if possible."""
         for prefix, namespace in sorted(self.prefixes.items(), key=lambda pair: -len(pair[1])):
             local = iri.removeprefix(namespace)
             if iri.startswith(namespace) and LOCAL.fullmatch(local):
@@ -86,7 +86,7 @@ class _File:
         return str(term)
 
     def statement(self, subject: str, triples: Triples) -> str:
-        """Return some triples of a subject as one statement."""
+        """Return triples with a common subject as one Turtle statement."""
         said: dict[str, list[str]] = {}
         for _, predicate, value in triples:
             name = "a" if predicate.value == TYPE else self.spell(predicate.value)
@@ -96,18 +96,18 @@ class _File:
 
 
 def convert(path: Path, form: Form) -> Converted:
-    """Return a Turtle file with its behaviours in one form.
+    """Return a Turtle file in which all behaviours have the same form.
 
     Parameters
     ----------
     path : Path
     form : str
-        ``sparql`` for updates, ``individuals`` for conditions and effects that are individuals.
+        ``sparql`` for SPARQL updates, ``individuals`` for individuals that are conditions and effects.
 
     Raises
     ------
     KnowledgeError
-        The file isn't Turtle, it or an import can't be read, or an update in it has a fault.
+        The file isn't Turtle, the file or an import can't be read, or an update in the file has a fault.
     """
     path = Path(os.path.realpath(path))
     if path.suffix != ".ttl":
@@ -121,12 +121,12 @@ def convert(path: Path, form: Form) -> Converted:
 
 
 def update_of(graph: KnowledgeGraph, schema: Schema, iri: str) -> str:
-    """Return a behaviour as a SPARQL update, with the PREFIX lines that it needs.
+    """Return a behaviour as a SPARQL update with the PREFIX declarations for its names.
 
     Raises
     ------
     ValueError
-        It has parts that an update can't express.
+        The behaviour has parts that an update can't express.
     """
     (behavior,) = as_written(schema, [iri]).values()
     file = _File([], dict(sorted(graph.spoken.items(), key=lambda pair: pair[0] != "confab")))
@@ -226,7 +226,7 @@ def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> C
 def _exchange(
     file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
 ) -> None:
-    """Replace the parts of a behaviour in its statements; the statements of the behaviour itself follow the first replaced one."""
+    """Replace the conditions and effects of a behaviour by `links`; append the statements `behind` to its first statement."""
     node = ox.NamedNode(iri)
     for number, statement in enumerate(file.said[iri]):
         rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]
@@ -238,7 +238,7 @@ def _exchange(
 
 
 def _lead(statement: str) -> str:
-    """Return the space and the comments before a statement."""
+    """Return the white space and comments at the beginning of a statement's text."""
     found = ""
     for token in (match.group() for match in TOKEN.finditer(statement)):
         if token.startswith("#"):
@@ -279,7 +279,7 @@ def _is_said(iri: str, schema: Schema) -> bool:
 
 
 def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str:
-    """Return why the parts of a behaviour can't be replaced; None if they can."""
+    """Return why the statements of a behaviour's parts can't be replaced; return an empty text if they can."""
     for part in sorted(parts):
         if part not in file.said:
             return f"{local_name(part)} isn't stated in this file"
@@ -292,7 +292,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Return whether the other form expresses a triple of a part, or may omit it because it is the label of a condition."""
+    """Return whether a triple of a part can be dropped: the other form expresses it, or it is a condition's label or definition."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
@@ -300,7 +300,7 @@ def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> boo
 
 
 def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
-    """Return the difference between an update and the behaviour; None if they are equivalent."""
+    """Return why an update isn't equivalent to the behaviour; return an empty text if it is."""
     if behavior.price is not None:
         return "a price that is calculated stays with individuals"
     if spans_of(behavior):
@@ -312,7 +312,7 @@ def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, 
 
 
 def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapping[str, str]) -> Behavior | str:
-    """Return the behaviour of an update in a graph that has it as individuals, or why there is none."""
+    """Return the behaviour that results from compiling an update in the graph, or a text that states why compilation fails."""
 
     def ask(query: str) -> Sequence[Sequence[object]]:
         if "?text" in query:
@@ -329,7 +329,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
         nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
     schema = read_schema(graph)
     nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
-    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # an update has no price, so its calculation stays
+    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # updates don't express prices, so the calculation is kept
     while (
         more := {v for node in priced for values in schema.nodes[node].values() for v in values}
         & schema.nodes.keys() - priced
@@ -344,7 +344,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
 
 
 def situations_of(schema: Schema) -> Situations:
-    """Return the notation of a schema's situations, by their IRIs."""
+    """Return the value properties and the many-valued situation types of a schema."""
     properties = {
         iri: prop
         for iri in schema.of_kind("SituationType")
@@ -354,7 +354,7 @@ def situations_of(schema: Schema) -> Situations:
 
 
 def plainly(behavior: Behavior) -> object:
-    """Return a canonical form of a behaviour, independent of names of bound variables and of order."""
+    """Return a canonical form of a behaviour: equal for behaviours that differ only in bound variables' names and in order."""
     effects = ((e.situation, e.arguments, e.value, _plain(e.when), e.each) for e in behavior.effects)
     return (
         behavior.name,
@@ -371,7 +371,7 @@ def plainly(behavior: Behavior) -> object:
 
 
 def spans_of(behavior: Behavior) -> frozenset[object]:
-    """Return the conditions and effects of a behaviour that aren't throughout, with their spans."""
+    """Return the conditions and effects of a behaviour that hold only at its start or its end, each with its span."""
     if behavior.timing is None:
         return frozenset()
     asked = ((span, _plain([c])) for span, c in behavior.timing.conditions if span is not Span.THROUGHOUT)
@@ -379,7 +379,7 @@ def spans_of(behavior: Behavior) -> frozenset[object]:
 
 
 def _plain(conditions: Iterable[Condition], depth: int = 0) -> frozenset[object]:
-    """Return a canonical form of a conjunction; a disjunction with one alternative is that alternative."""
+    """Return a canonical form of a conjunction, in which bound variables are numbered and trivial disjunctions are resolved."""
     found: set[object] = set()
     for condition in conditions:
         match condition:

@@ -1,4 +1,4 @@
-"""The nodes of one behaviour or rule while it is compiled: their properties, and their positions in the update."""
+"""The individuals (nodes) of one behaviour or rule during compilation, with their properties and positions in the update."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 @dataclass
 class Nodes:
-    """The nodes of a behaviour or rule.
+    """The nodes of one behaviour or rule.
 
     Attributes
     ----------
     behavior : str
     said : mapping of node to properties
-        By their names in the core; `TYPE` has the classes of the node.
+        Maps names of core properties to values; `TYPE` maps to the node's classes.
     places : mapping of node to Place
     links : Properties
         The properties of the behaviour itself.
     count : mapping of name to int
-        The number of nodes of each name.
+        The number of nodes whose IRI contains the name.
     now : Update
-        The update that is being read.
+        The update that is being compiled.
     """
 
     behavior: str
@@ -38,7 +38,7 @@ class Nodes:
     now: Update = field(default_factory=lambda: Update("", "", {}))
 
     def new(self, name: str, kind: str, at: int) -> str:
-        """Return a new node with a number in its name."""
+        """Return the IRI of a new node, which consists of the behaviour's IRI, `name` and a number."""
         self.count[name] = self.count.get(name, 0) + 1
         node = f"{self.behavior}.{name}{self.count[name]:03}"
         self.said[node] = {TYPE: [INDIVIDUAL, CORE + kind]}
@@ -46,7 +46,7 @@ class Nodes:
         return node
 
     def condition(self, kind: str, at: int, properties: Properties, negated: bool = False) -> str:
-        """Return a new condition with some properties."""
+        """Return the IRI of a new condition node with the given properties."""
         node = self.new("condition", kind, at)
         self.said[node] |= properties
         if negated:
@@ -54,11 +54,11 @@ class Nodes:
         return node
 
     def negate(self, node: str) -> None:
-        """Negate a condition or effect; a negated one becomes positive."""
+        """Negate a condition or effect; the negation of a negated node is positive."""
         if self.said[node].pop("negated", None) is None:
             self.said[node]["negated"] = ["true"]
 
     def triples(self) -> Iterator[ox.Triple]:
-        """Yield the triples of the behaviour and its nodes."""
+        """Yield the triples of the behaviour and of all its nodes."""
         for node, properties in [(self.behavior, self.links), *self.said.items()]:
             yield from triples(ox.NamedNode(node), properties)

@@ -1,4 +1,4 @@
-"""Numbers of an update: amounts denoted by variables, calculations, and comparisons."""
+"""Compilation of the numbers in an update: variables that denote amounts, calculations, and comparisons."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 
 @dataclass(frozen=True)
 class Measured:
-    """The amount of some individuals, or the number that a relation states for them."""
+    """An amount with its arguments, or a static relation that maps its arguments to a number."""
 
     kind: str
     of: str
@@ -27,13 +27,13 @@ class Measured:
 
     @property
     def properties(self) -> Properties:
-        """The properties that name the amount."""
+        """The properties of a node that refers to the amount or relation."""
         return {self.kind: [self.of], **argument_properties(self.terms)}
 
 
 @dataclass(frozen=True)
 class Sum:
-    """An arithmetic operation on two numbers."""
+    """The arithmetic operation `sign` on two numbers."""
 
     sign: str
     left: Side
@@ -45,20 +45,20 @@ Side: TypeAlias = "Measured | Sum | Number"
 
 @dataclass(frozen=True)
 class Numbers:
-    """Compiles the numbers of a behaviour or rule."""
+    """Compiler of the numeric expressions of one behaviour or rule."""
 
     nodes: Nodes
     scope: Scope
 
     def is_number(self, tree: Any) -> bool:
-        """Return whether an expression is numeric."""
+        """Return whether an expression denotes a number."""
         one = unwrapped(tree)
         if isinstance(one, Word):
             return one in self.scope.numbers
         return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
 
     def expression(self, tree: Any, known: Collection[str], at: int) -> Side:
-        """Return the calculation of a number."""
+        """Return the compiled form of a numeric expression, in which amounts replace the variables that denote them."""
         one = unwrapped(tree)
         if isinstance(one, Number):
             return one
@@ -81,21 +81,25 @@ class Numbers:
         raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
 
     def measured(self, one: Triple, known: Collection[str]) -> Measured:
-        """Return the amount in a triple."""
+        """Return the amount or relation of a triple, with the triple's subject and other arguments."""
         prop, at = self.scope.iri(one.predicate), one.predicate.at
         terms = [self.scope.put(each, known, at) for each in (one.subject, *middle_of(one))]
         kind = "relation" if prop in self.scope.vocabulary.measures else "situationType"
         return Measured(kind, self.scope.vocabulary.properties.get(prop, prop), tuple(terms))
 
     def comparison(self, left: Side, sign: str, right: Side, negated: bool, at: int) -> str:
-        """Return a comparison of two numbers."""
+        """Return the node of a comparison of two numeric expressions."""
         node = self.nodes.condition("Comparison", at, {"sign": [sign]}, negated)
         self.side(node, "left", left, at)
         self.side(node, "right", right, at)
         return node
 
     def side(self, node: str, name: str, side: Side, at: int) -> None:
-        """Write one side of a comparison, calculation or effect: an amount on the left and a number on the right need no node."""
+        """Add an operand to a comparison, calculation or effect node.
+
+        An amount as the left operand and a number as the right operand are properties of the node itself. Other operands become
+        separate nodes.
+        """
         if name == "left" and isinstance(side, Measured):
             self.nodes.said[node] |= side.properties
             return
@@ -116,14 +120,14 @@ class Numbers:
 
 
 def _term_or_none(tree: Any) -> Said | None:
-    """Return a term, if it is one."""
+    """Return a term of the grammar; return None for an expression that isn't a term."""
     with suppress(UpdateError):
         return term(tree, 0)
     return None
 
 
 def unwrapped(expression: Any) -> Any:
-    """Return an expression without redundant levels of the grammar."""
+    """Return an expression without the grammar's nested levels that have only one operand."""
     passing = ("ConditionalOrExpression", "ConditionalAndExpression", "RelationalExpression", "AdditiveExpression")
     while getattr(expression, "name", "") in (*passing, "MultiplicativeExpression") and not expression.other:
         expression = expression.expr

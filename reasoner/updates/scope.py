@@ -1,4 +1,4 @@
-"""The meaning of variables in an update: terms of the behaviour, or numbers; and the groups of patterns that introduce them."""
+"""Resolution of the variables in an update: to terms of the behaviour or to numbers, by the patterns that introduce them."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 @dataclass
 class Group:
-    """A group of patterns, without the patterns that only introduce variables.
+    """The parts of a group graph pattern, without the patterns that only introduce variables.
 
-    `chosen` has the variables that are introduced with their type. `determined` has the variables that are introduced as the
-    value of a situation, each with its position and its type (a word), or the situation type if it has no type. `numbers` has
-    the variables that denote a number, each with the triple or the BIND expression that gives the number.
+    - `chosen` maps each variable that a type pattern introduces to its class.
+    - `determined` maps each variable that a value condition introduces to its class, or its situation type, and its position.
+    - `numbers` maps each variable that denotes a number to the triple or BIND expression that gives the number.
     """
 
     parts: list[Any] = field(default_factory=list)
@@ -30,7 +30,7 @@ class Group:
 
     @property
     def names(self) -> set[str]:
-        """The variables that are introduced."""
+        """The variables that the group introduces."""
         return {*self.chosen, *self.determined, *self.numbers}
 
 
@@ -43,10 +43,10 @@ class Scope:
     nodes : Nodes
     vocabulary : Vocabulary
     declared : mapping of variable to (node, class, index)
-        The terms that the file declares besides the update.
+        The terms that the file declares outside the update.
     terms : mapping of variable to node
-    kinds : mapping of node to (role, class, whether a witness seeks it)
-        Two variables of one name become two nodes.
+    kinds : mapping of node to (role, class, whether a witness binds it)
+        Two different variables with one name have two nodes.
     prefixes : mapping of prefix to namespace
     numbers : mapping of variable to the triple or expression that gives its number
     """
@@ -60,7 +60,7 @@ class Scope:
     numbers: dict[str, Any] = field(default_factory=dict)
 
     def bind(self, name: str, kind: str, role: str, node: str, place: Place, sought: bool = False) -> None:
-        """Make a variable a term of the behaviour; a different variable of the same name becomes another term."""
+        """Map a variable to a term node; a different variable with the same name gets a different node."""
         found = self.declared.get(name, ("", "", 0))
         if not node and found[0]:
             node = found[0]
@@ -80,13 +80,13 @@ class Scope:
                 self.nodes.said[iri]["index"] = [str(len(self.nodes.links["parameter"]))]
 
     def determine(self, group: Group) -> None:
-        """Make terms of the variables that value conditions determine."""
+        """Map the variables that a group's value conditions introduce to term nodes."""
         for name, (kind, at) in group.determined.items():
             iri = self.iri(kind) if isinstance(kind, Word) else kind
             self.bind(name, iri, "Variable", "", self.nodes.now.place(at))
 
     def iri(self, word: Word) -> str:
-        """Return the IRI of a name."""
+        """Return the IRI of a name in the update."""
         if word.startswith("<"):
             return word[1:-1]
         prefix, _, name = word.partition(":")
@@ -99,7 +99,7 @@ class Scope:
         return self.prefixes[prefix] + name
 
     def put(self, said: Said, known: Collection[str], at: int) -> str:
-        """Return the node or individual of a term."""
+        """Return the node of a variable, or the IRI of an individual or truth value."""
         if isinstance(said, Truth):
             return CORE + ("true" if said.value else "false")
         if isinstance(said, Number):
@@ -123,7 +123,7 @@ class Scope:
         return self.terms[said]
 
     def group(self, where: Sequence[Any], known: Collection[str]) -> Group:
-        """Return the parts of a group, and the variables introduced in it: by class, or as the value of a situation."""
+        """Return the parts of a group graph pattern and the variables that they introduce."""
         found = Group()
         for part in where:
             if part.name in ("TriplesBlock", "Read"):
@@ -143,7 +143,7 @@ class Scope:
         return found
 
     def begins(self, one: Triple, group: Group, known: Collection[str]) -> bool:
-        """Record a triple that introduces new variables; return whether the triple has no other meaning."""
+        """Record the variables that a triple introduces; return whether the triple states no condition."""
         subject, value = one.subject, one.object
         if one.predicate == A:
             if subject.variable and isinstance(value, Word) and not value.variable and subject not in known:
@@ -168,21 +168,21 @@ class Scope:
 
 
 def variables_in(one: Triple) -> list[Word]:
-    """Return the variables in the subject and the object of a triple."""
+    """Return the variables in the subject and object of a triple."""
     said = one.object if isinstance(one.object, tuple) else (one.object,)
     return [word for word in (one.subject, *said) if isinstance(word, Word) and word.variable]
 
 
 def last_of(one: Triple) -> Said:
-    """Return the object of a triple; if it is a list, return its last part."""
+    """Return the object of a triple, or its last element if it is a list."""
     return one.object[-1] if isinstance(one.object, tuple) else one.object
 
 
 def middle_of(one: Triple) -> tuple[Said, ...]:
-    """Return the object of a triple without its last part, if it is a list."""
+    """Return the elements of a triple's object except the last one; return no element if the object isn't a list."""
     return one.object[:-1] if isinstance(one.object, tuple) else ()
 
 
 def mentioned(part: Any) -> set[str]:
-    """Return the variables in a part of a group."""
+    """Return the variables in a part of a group graph pattern."""
     return {word for word in words(part) if word.variable}

@@ -1,4 +1,4 @@
-"""The context of an update: its text with the prefixes of its file, positions, and available properties."""
+"""The text of an update with its prefixes, positions in it, and the properties that an update can use."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from confab.reasoner.names import local_name
 
 Ask = Callable[[str], Sequence[Sequence[Any]]]
-"""Function that returns the rows of a query."""
+"""Function that returns the rows of a SPARQL query."""
 
 VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
   { ?term a/rdfs:subClassOf* :SituationType . BIND("situation" AS ?kind) OPTIONAL { ?term :valueProperty ?other } }
@@ -23,7 +23,7 @@ VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
 
 @dataclass(frozen=True)
 class Place:
-    """A position in the update of a behaviour; line and column count from 1."""
+    """A position in a behaviour's update or a rule's query; lines and columns are counted from 1."""
 
     behavior: str
     line: int
@@ -31,7 +31,7 @@ class Place:
     form: str = "update"
 
     def __str__(self) -> str:
-        """Return the position for a message."""
+        """Return the position as a phrase for messages."""
         of = (
             f"the update of {local_name(self.behavior)}"
             if self.form == "update"
@@ -42,25 +42,26 @@ class Place:
 
 @dataclass(frozen=True)
 class Update:
-    """The text of an update, with the prefixes that its file has."""
+    """The text of a behaviour's update, with the prefixes of its file."""
 
     behavior: str
     text: str
     prefixes: Mapping[str, str]
 
     def place(self, at: int) -> Place:
-        """Return the line and column of a character."""
+        """Return the line and column of the character at an index of the text."""
         before = self.text[:at]
         return Place(self.behavior, before.count("\n") + 1, at - (before.rfind("\n") + 1) + 1)
 
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """The properties that an update can use, as IRIs.
+    """The IRIs of situation types, relations and properties that an update can use.
 
-    `properties` maps a value property to its situation type; `functional` has the properties with one value at a time. `bare`
-    has the situation types without a property; their names are used instead. `amounts` has the situation types, and `measures`
-    the relations, that give numbers.
+    - `properties` maps a value property to its situation type.
+    - `functional` contains the value properties with one value at a time.
+    - `bare` contains the situation types without a value property; an update uses their IRIs as predicates.
+    - `amounts` and `measures` contain the situation types and the relations whose values are numbers.
     """
 
     properties: Mapping[str, str]
@@ -71,12 +72,12 @@ class Vocabulary:
     measures: Collection[str]
 
     def numeric(self, prop: str) -> bool:
-        """Return whether a property, or a situation type or relation, gives numbers."""
+        """Return whether the values of a property, situation type or relation are numbers."""
         return prop in self.measures or self.properties.get(prop, prop) in self.amounts
 
     @classmethod
     def read(cls, ask: Ask) -> Vocabulary:
-        """Return the vocabulary of a graph."""
+        """Read the vocabulary of a graph."""
         rows = [[part.value if part is not None else "" for part in row] for row in ask(VOCABULARY)]
         return cls(
             properties={prop: term for kind, term, prop in rows if kind == "situation" and prop},

@@ -1,7 +1,7 @@
-"""The text of a SPARQL update or CONSTRUCT, parsed by rdflib, as a tree whose words have positions.
+"""Parser of SPARQL updates and CONSTRUCT queries; it uses rdflib's grammar and adds positions.
 
-rdflib's grammar doesn't record positions. In a copy of it, the parsers of variables and names yield a `Word` instead: the
-original text, and its position. The rest of the tree (groups, filters, unions) is rdflib's.
+rdflib's grammar doesn't record positions. In a copy of the grammar, variables and names are parsed as a `Word` with its original
+text and position. All other parts of the syntax tree are those of rdflib.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ FIRST, REST, NIL = (RDF + name for name in ("first", "rest", "nil"))
 
 
 class Word(str):
-    """A variable (``?cup``), a name (``:Cup``, ``<https://…>``) or ``a``, as written, with its position."""
+    """A variable (``?cup``), a name (``:Cup``, ``<https://…>``) or ``a`` in its original notation, with its position `at`."""
 
     at: int = 0
 
     @property
     def variable(self) -> bool:
-        """Whether it is a variable."""
+        """Whether the word is a variable."""
         return self.startswith("?")
 
 
 @dataclass(frozen=True)
 class Truth:
-    """``true`` or ``false``."""
+    """A truth value, ``true`` or ``false``."""
 
     value: bool
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number, exact."""
+    """An exact number."""
 
     value: Fraction
 
@@ -56,7 +56,7 @@ Value = Word | Truth | Number | tuple[Said, ...]
 
 @dataclass(frozen=True)
 class Triple:
-    """A triple pattern; an object that is written as a list, ``(?shelf true)``, is a tuple."""
+    """A triple pattern; if the object is a list such as ``(?shelf true)``, it is a tuple."""
 
     subject: Word
     predicate: Word
@@ -65,7 +65,7 @@ class Triple:
 
 @dataclass(frozen=True)
 class Operation:
-    """``DELETE { … } INSERT { … } WHERE { … }``; `where` has the parts of the group."""
+    """``DELETE { … } INSERT { … } WHERE { … }``; `where` contains the parts of the WHERE group."""
 
     delete: Sequence[Triple]
     insert: Sequence[Triple]
@@ -75,7 +75,11 @@ class Operation:
 
 @dataclass(frozen=True)
 class Construction:
-    """``CONSTRUCT { head } WHERE { … }``; an inner SELECT has a function, its argument and its grouping variables."""
+    """``CONSTRUCT { head } WHERE { … }``.
+
+    For a SELECT in WHERE, `function` is the aggregate, `argument` its operand, `name` the variable of its result, and `grouped` the
+    variables of GROUP BY.
+    """
 
     head: Triple
     where: Sequence[Any]
@@ -86,7 +90,7 @@ class Construction:
 
 
 class UpdateError(ValueError):
-    """An update can't be read: the fault, the remedy, and the position."""
+    """Raised if an update can't be compiled; contains the reason, a remedy, and the position in the text."""
 
     def __init__(self, what: str, remedy: str, at: int) -> None:
         super().__init__(f"{what}; {remedy}")
@@ -104,7 +108,7 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
     Raises
     ------
     UpdateError
-        The text is no SPARQL update, or an update with other operations than deletion and insertion.
+        The text isn't a SPARQL update, or it contains an operation other than a deletion or an insertion.
     """
     write = "write DELETE { … } INSERT { … } WHERE { … }"
     tree = _tree("UpdateUnit", text, "update", write)[0]
@@ -120,7 +124,7 @@ AGGREGATE = re.compile("Aggregate_(Sum|Count|Max|Min)")
 
 @silent_about_numbers()
 def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
-    """Return the prefixes that a CONSTRUCT query declares, and its content.
+    """Return the prefixes that a CONSTRUCT query declares, and its head and conditions.
 
     >>> total = "SELECT ?a (COUNT(?b) AS ?n) WHERE { ?b <urn:q> ?a } GROUP BY ?a"
     >>> _, one = constructed(f"CONSTRUCT {{ ?a <urn:p> ?n }} WHERE {{ {total} }}")
@@ -130,7 +134,7 @@ def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
     Raises
     ------
     UpdateError
-        The text is no CONSTRUCT query, or has more than one pattern in its head.
+        The text isn't a CONSTRUCT query, or its head has more than one pattern.
     """
     prologue, tree = _tree("QueryUnit", text, "CONSTRUCT query", CONSTRUCT)
     if tree.name != "ConstructQuery" or tree.datasetClause or not tree.template:
@@ -176,12 +180,12 @@ def _aggregated(head: Triple, select: Any) -> Construction:
 
 
 def _tree(unit: str, text: str, what: str, write: str) -> Any:
-    """Return the parsed text.
+    """Return the syntax tree of a text.
 
     Raises
     ------
     UpdateError
-        The text isn't of that language; the error has the position where parsing stopped.
+        The text doesn't match the grammar; the error contains the position at which parsing stopped.
     """
     try:
         return _grammar(unit).parse_string(text, parse_all=True)
@@ -193,7 +197,7 @@ def _tree(unit: str, text: str, what: str, write: str) -> Any:
 
 
 def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
-    """Return the prefixes that are declared at the beginning."""
+    """Return the prefixes that PREFIX declarations define."""
     prefixes = {}
     for prologue in prologues:
         for declared in prologue:
@@ -231,7 +235,7 @@ def _grammar(unit_name: str) -> pyparsing.ParserElement:
 
 
 def _stuck(unit_name: str, text: str) -> int:
-    """Return the position up to which any part of the grammar matches an invalid text."""
+    """Return the farthest position in an invalid text at which an element of the grammar failed."""
     from rdflib.plugins.sparql import parser
 
     unit, farthest = deepcopy(getattr(parser, unit_name)).parse_with_tabs(), 0
@@ -248,7 +252,7 @@ def _stuck(unit_name: str, text: str) -> int:
 
 
 def _skipped(text: str, at: int) -> int:
-    """Return the position of the first character after white space."""
+    """Return the position of the first character at or after `at` that isn't white space."""
     return len(text) - len(text[at:].lstrip())
 
 
@@ -272,7 +276,7 @@ def _operation(request: Any, text: str) -> Operation:
 
 @dataclass(frozen=True)
 class _Block:
-    """The triples of DELETE WHERE, as a group has them."""
+    """The triples of DELETE WHERE in the form of a group's part."""
 
     triples: Sequence[Triple]
     name: str = "Read"
@@ -296,7 +300,7 @@ def parts(group: Any) -> Sequence[Any]:
 
 
 def triples(block: Sequence[Any]) -> Iterator[Triple]:
-    """Yield the triples of a flat list of terms; lists in it become tuples."""
+    """Yield the triples of a flat list of terms; RDF lists become tuples."""
     cells: dict[object, list[Any]] = {}
     rows = [(block[i], block[i + 1], block[i + 2]) for i in range(0, len(block), 3)]
     for subject, predicate, value in rows:
@@ -326,12 +330,12 @@ def _value(value: Any, cells: Mapping[object, list[Any]], at: int) -> Value:
 
 
 def term(value: Any, at: int) -> Said:
-    """Return a variable, a name, a truth value or a number.
+    """Return a variable, a name, a truth value or a number of the syntax tree.
 
     Raises
     ------
     UpdateError
-        It is of another kind.
+        The value is something else, for example a text or a blank node.
     """
     if isinstance(value, Word):
         return value
@@ -352,7 +356,7 @@ def term(value: Any, at: int) -> Said:
 
 
 def _predicate(path: Any) -> Word:
-    """Return the one property of a path that consists of one."""
+    """Return the property of a property path that consists of a single property."""
     while not isinstance(path, Word):
         inner = path.part if isinstance(path.part, Word) else (path.part or [None])
         if path.mod or path.name == "PathEltOrInverse" or (not isinstance(inner, Word) and len(inner) != 1):
@@ -364,7 +368,7 @@ def _predicate(path: Any) -> Word:
 
 
 def words(tree: Any) -> Iterator[Word]:
-    """Yield the words of a part of the tree.
+    """Yield the words of a part of the syntax tree.
 
     >>> _, (operation,) = parsed("INSERT {} WHERE { FILTER NOT EXISTS { ?a <urn:p> ?b } }")
     >>> [str(word) for word in words(operation.where)]
@@ -381,5 +385,5 @@ def words(tree: Any) -> Iterator[Word]:
 
 
 def place(tree: Any) -> int:
-    """Return the position of a part of the tree, if its words determine it."""
+    """Return the smallest position of a word in a part of the syntax tree; return 0 if it contains no word."""
     return min((word.at for word in words(tree)), default=0)

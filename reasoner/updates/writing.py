@@ -1,7 +1,7 @@
-"""A behaviour written as the SPARQL update that `confab.reasoner.updates.compiling` reads as the same behaviour.
+"""Export of a behaviour as the SPARQL update that `confab.reasoner.updates.compiling` compiles to the same behaviour.
 
-Parameters come first, each with its type; then one condition per line. The type of a determined variable follows the condition
-that determines it, unless every value of the situation is allowed.
+The first line of WHERE states the parameters with their types; each further line states one condition. The type of a determined
+variable follows the condition that determines it, unless the variable may have every value of the situation type.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Spell = Callable[[str], str]
 
 @dataclass(frozen=True)
 class Situations:
-    """The notation of situations: the property of each type that has one, and the types whose property takes many values."""
+    """The value property of each situation type that has one, and the situation types with several values per subject (`pairs`)."""
 
     properties: Mapping[str, str]
     pairs: Collection[str]
@@ -51,11 +51,11 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     ----------
     behavior : Behavior
     situations : Situations
-        By the names that the behaviour uses.
+        The keys are the names of situation types in the behaviour.
     spell : callable
-        Returns the notation of a name, e.g. ``:cup1``; the truth values are `TRUE` and `FALSE`.
+        Returns the notation of a name, e.g. ``:cup1``.
     labels : sequence of str
-        Labels of the preconditions, in order; they become comments.
+        Labels of the preconditions in their order; they become comments.
     """
     writer = _Writer(behavior, situations, spell)
     behavior = _by_their_class(behavior)
@@ -65,7 +65,7 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
 
 
 def _by_their_class(behavior: Behavior) -> Behavior:
-    """Return a behaviour whose effects on all of a class name the class, as updates do."""
+    """Return a behaviour in which effects on all members of a class mention the class itself, as in updates."""
     effects = [effect if effect.each is None else made_of(effect, effect.each.kind) for effect in behavior.every_effect]
     return replace(
         behavior,
@@ -75,9 +75,9 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 
 
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
-    """Return the operations: conditions besides the preconditions, and effects; the first has no condition.
+    """Return the conditions and effects of each operation; the first operation has no conditions besides the preconditions.
 
-    The operations are in the order of the effects; the order matters only if no effect makes a fact false.
+    Operations are in the order of the effects. Effects that make facts false are added to an operation with the same conditions.
     """
     found: list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]] = [((), [])]
     for effect in (e for e in behavior.effects if e.value != FALSE):
@@ -100,11 +100,11 @@ class _Writer:
     situations: Situations
     spell: Spell
     names: dict[str, str] = field(default_factory=dict)
-    scope: dict[str, bool] = field(default_factory=dict)  # of the first WHERE
-    given: dict[Expression, str] = field(default_factory=dict)  # the numbers that it names
+    scope: dict[str, bool] = field(default_factory=dict)  # variables of the first WHERE, as in `group`
+    given: dict[Expression, str] = field(default_factory=dict)  # variables of its numbers
 
     def main(self, effects: Sequence[ValueEffect | AmountEffect], labels: Sequence[str]) -> str:
-        """Return the first operation, with parameters and preconditions."""
+        """Return the first operation, which contains the parameters and preconditions."""
         behavior = self.behavior
         for term in (*behavior.parameters, *behavior.variables):
             self.put(term.name)
@@ -114,7 +114,7 @@ class _Writer:
         return self.operation(effects, behavior.asked, [chosen, *lines] if chosen else lines)
 
     def conditional(self, when: tuple[Condition, ...], effects: Sequence[ValueEffect | AmountEffect]) -> str:
-        """Return a further operation."""
+        """Return an operation for effects with the conditions `when`."""
         known = self.chosen()
         self.group(self.behavior.asked, known)
         return self.operation(effects, (*self.behavior.asked, *when), self.group(when, known))
@@ -139,7 +139,7 @@ class _Writer:
         return "\n".join([*head, "WHERE {", *(f"  {line}" for line in (*lines, *more)), "}"])
 
     def changed(self, effect: AmountEffect) -> tuple[str, str, list[str]]:
-        """Return the deletions and insertions of an amount's change, and the lines that calculate it."""
+        """Return the deletion and the insertion of an effect on an amount, and the lines that calculate the new amount."""
         own, lines = Amount(effect.situation, effect.arguments), list[str]()
         given = dict(self.given)
         before = self.number(own, lines, given)
@@ -158,7 +158,7 @@ class _Writer:
         return self.with_number(*said, before), self.with_number(*said, after), [" ".join(lines)] if lines else []
 
     def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
-        """Return the deletion of an effect: the fact that it makes false, or the value that the conditions require."""
+        """Return the triple that an effect deletes: the fact that it makes false, or the old value in the preconditions."""
         if effect.value == FALSE:
             return self.situation(effect.situation, effect.arguments, TRUE)
         if effect.value == TRUE:
@@ -170,7 +170,7 @@ class _Writer:
         return None
 
     def put(self, term: str) -> str:
-        """Return the written form of a term; names of variables have letters, digits and underscores."""
+        """Return the notation of a term; names of variables contain only letters, digits and underscores."""
         if term in (TRUE, FALSE):
             return term
         if not term.startswith("?"):
@@ -192,11 +192,11 @@ class _Writer:
         return f"{subject} {self.spell(situation)} {_listed([*rest, self.put(value)])}"
 
     def group(self, conditions: Sequence[Condition], known: dict[str, bool], labels: Sequence[str] = ()) -> list[str]:
-        """Return a line for each of some conditions.
+        """Return one line for each condition.
 
-        `known` maps the variables bound so far to whether their type is written; variables that the conditions determine are
-        added, for all lines: the order of lines in a group has no meaning, except that a class condition on a determined
-        variable comes after it.
+        `known` maps the variables bound so far to whether their type has been written. Variables that the conditions determine are
+        added to `known` for all lines, because SPARQL ignores the order of patterns. Only a class condition on a determined
+        variable has to follow the condition that determines the variable.
         """
         said = list(_flat(zip(conditions, [*labels, *[""] * len(conditions)], strict=False)))
         for one, _ in said:
@@ -220,7 +220,7 @@ class _Writer:
         return self.said(condition, known)
 
     def said(self, condition: Condition, known: dict[str, bool]) -> str:
-        """Return a condition without its negation."""
+        """Return the notation of a condition without its negation."""
         match condition:
             case ValueCondition(situation, arguments, value):
                 line = f"{self.situation(situation, arguments, value)} ."
@@ -233,7 +233,7 @@ class _Writer:
             case EqualityCondition(left, right):
                 return f"FILTER({self.put(left)} = {self.put(right)})"
             case Witness(variable, kind, conditions):
-                if variable in known or variable in self.behavior.kinds:  # here it is another one
+                if variable in known or variable in self.behavior.kinds:  # rename a shadowing variable
                     own = f"{variable}_inside"
                     inner = tuple(substituted(one, {variable: own}) for one in conditions)
                     return self.said(Witness(own, kind, inner), known)
@@ -247,7 +247,7 @@ class _Writer:
                 return " ".join([*patterns, compared])
 
     def number(self, expression: Expression, patterns: list[str], given: dict[Expression, str]) -> str:
-        """Return an expression over variables; missing patterns that give the variables their amounts are added."""
+        """Return the notation of a numeric expression; append the patterns that bind its variables to amounts."""
         match expression:
             case Fraction():
                 said = written(expression)
@@ -281,7 +281,7 @@ class _Writer:
         return " UNION ".join(f"{{ {group} }}" for group in groups)
 
     def typed(self, situation: str, value: str, known: dict[str, bool]) -> Iterator[str]:
-        """Yield the class of a determined variable, unless its situation implies it."""
+        """Yield the type pattern of a determined variable, unless the situation type implies the type."""
         if not value.startswith("?") or known.get(value, True):
             return
         known[value] = True
@@ -290,7 +290,7 @@ class _Writer:
             yield f"{self.put(value)} a {self.spell(kind)} ."
 
     def asked_of_class(self, term: str) -> bool:
-        """Return whether there is a class condition on a term, whose line could be mistaken for its declaration."""
+        """Return whether a class condition on a term exists; without the type pattern, it would be read as the term's type."""
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
             for condition in self.behavior.conditions
@@ -299,7 +299,7 @@ class _Writer:
 
 
 def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:
-    """Yield labelled conditions; an `AnyOf` with one alternative becomes that alternative."""
+    """Yield the labelled conditions; the conjuncts of an `AnyOf` with one alternative replace it."""
     for condition, label in conditions:
         match condition:
             case AnyOf((group,), False):
@@ -309,7 +309,10 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of a disjunction that only enumerates individuals."""
+    """Return the variable and the individuals of a disjunction that only enumerates the variable's possible individuals.
+
+    Return None for any other disjunction.
+    """
     found: list[str] = []
     name = ""
     for group in alternatives:
