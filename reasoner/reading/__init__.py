@@ -1,1 +1,1 @@
-"""From the graph to values: problems, quantified behaviours, affordances, and the part of a world that a task can need."""
+"""Reading of problems, quantified behaviours and affordances from the graph, limited to the task's part of a scene."""

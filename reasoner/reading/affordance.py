@@ -1,17 +1,17 @@
 """Situated affordances: the behaviours that each object affords in a state, found by SPARQL.
 
-A state is written into a separate named graph (`SITUATION`): one fact for each symbol, including defaults. A behaviour's
-preconditions become graph patterns on it:
+A state is written into a separate named graph (`SITUATION`) with one fact for each symbol, including default values. The
+preconditions of a behaviour become graph patterns:
 
 =========================  ===================================================================
 condition                  pattern
 =========================  ===================================================================
 `ValueCondition`           ``GRAPH <urn:confab:graph:situation> { ?cup k:location ?l }``
-`RelationCondition`        ``?hand k:canReach ?l``, static, on asserted and inferred facts
+`RelationCondition`        ``?hand k:canReach ?l`` on asserted and inferred facts
 `ClassCondition`           ``?cup a/rdfs:subClassOf* k:Cup``
 `Comparison`               ``GRAPH … { ?bottle k:servings ?n1 } FILTER(?n1 >= 2)``
-`Witness`, `AnyOf`         ``FILTER EXISTS { … }``, joined by ``||``
-negated                    ``FILTER NOT EXISTS { … }``
+`Witness`, `AnyOf`         ``FILTER EXISTS { … }``, with ``||`` between alternatives
+negated condition          ``FILTER NOT EXISTS { … }``
 =========================  ===================================================================
 """
 
@@ -58,12 +58,12 @@ RELATION_PROPERTIES = (
 TYPE = ox.NamedNode(RDF + "type")
 SIGNS = {"increase": "+", "decrease": "-"}
 MOST_TOGETHER = 3
-"""Maximum number of effects that may change the same amount; with more, the query has no condition on bounds."""
+"""Maximum number of other effects on the same amount for which the query tests the amount's bounds."""
 
 
 @dataclass(frozen=True, order=True)
 class Affordance:
-    """The affordances of an object in a situation.
+    """A behaviour that an object affords in a situation.
 
     Attributes
     ----------
@@ -72,9 +72,9 @@ class Affordance:
     arguments : tuple of str
         The arguments of the behaviour, including the object.
     situation : tuple of Fact
-        The true facts that the preconditions name.
+        The facts that satisfy the positive value conditions among the preconditions.
     effect : tuple of Fact
-        The facts that would hold afterwards.
+        The facts that hold after the behaviour.
     """
 
     object: str
@@ -85,7 +85,7 @@ class Affordance:
 
 
 def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
-    """Write a state (default: the initial one), with its derived facts, into the graph `SITUATION`."""
+    """Write a state (by default the initial state) and its derived facts into the graph `SITUATION`."""
     name, properties = ox.NamedNode(SITUATION), value_properties(graph)
     graph.store.clear_graph(name)
     count = 0
@@ -108,7 +108,7 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
     """Yield the derived facts of the graph `SITUATION`, in order of derivation.
 
-    Each fact has to be added before the next one is requested.
+    The caller must add each fact to the graph before it requests the next fact.
     """
     rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
     again = circular(rules)
@@ -126,7 +126,7 @@ def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
 
 
 def _names(condition: Condition, variable: str) -> bool:
-    """Return whether a condition, if true, determines a variable."""
+    """Return whether a true condition binds a variable."""
     match condition:
         case ValueCondition(_, arguments, value, False) if value != FALSE:
             return variable in (*arguments, value)
@@ -139,15 +139,16 @@ def _names(condition: Condition, variable: str) -> bool:
 def applicable_query(
     graph: KnowledgeGraph, reading: Reading, behavior: Behavior, when: Sequence[Condition] = ()
 ) -> str:
-    """Return the SPARQL query whose rows are the arguments and variables with which a behaviour is applicable.
+    """Return the SPARQL query for the arguments and variable bindings with which a behaviour is applicable.
 
-    It queries the graph `SITUATION`, which `write_situation` fills. `when` has additional conditions.
+    The query reads the graph `SITUATION`, which `write_situation` fills. `when` contains conditions in addition to the
+    preconditions.
     """
     return _Writer(graph, reading).query(behavior, when)
 
 
 def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> list[Affordance]:
-    """Return the affordances of every object in a state (by default the initial state), in order.
+    """Return the sorted affordances of all objects in a state (by default the initial state).
 
     Examples
     --------
@@ -180,7 +181,7 @@ def _pairs(graph: KnowledgeGraph, query: str) -> Iterator[tuple[str, str]]:
 
 
 def _facts(conditions: Sequence[Condition], bindings: dict[str, str]) -> Iterator[Fact]:
-    """Yield the facts that positive value conditions name."""
+    """Yield the facts that satisfy positive value conditions for the given variable bindings."""
     for condition in conditions:
         if isinstance(condition, ValueCondition) and not condition.negated:
             yield _fact(condition, bindings)
@@ -192,9 +193,9 @@ def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
 
 
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
-    """Yield the preconditions that follow from the bounds of amounts that several effects of a behaviour may change at once.
+    """Yield the preconditions that keep amounts within their bounds if several effects of a behaviour change the same amount.
 
-    Each effect is combined with those that change the same symbol if their arguments are equal.
+    The arguments of two effects may or may not denote the same symbol. There is one condition for each combination of these cases.
     """
     for effect in behavior.amounts:
         quantity = situations[effect.situation].quantity
@@ -211,7 +212,7 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
                 pairs = zip(effect.arguments, other.arguments, strict=True)
                 equal = (*(EqualityCondition(a, b) for a, b in pairs if a != b), *other.when)
                 if not (equal or is_same):
-                    break  # they change one symbol wherever both do
+                    break  # both always change the same symbol
                 if is_same:
                     total = Calculation(SIGNS[other.operation], total, other.amount)
                     where += equal
@@ -224,28 +225,28 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
 
 
 def _may_coincide(one: AmountEffect, other: AmountEffect) -> bool:
-    """Return whether two effects can change one symbol."""
+    """Return whether two effects can change the same symbol."""
     pairs = zip(one.arguments, other.arguments, strict=True)
     return all(a == b or a.startswith("?") or b.startswith("?") for a, b in pairs)
 
 
 class _Writer:
-    """Writes conditions as SPARQL patterns."""
+    """Translation of conditions to SPARQL patterns."""
 
     def __init__(self, graph: KnowledgeGraph, reading: Reading) -> None:
         self.graph, self.reading = graph, reading
         self.properties = dict(_pairs(graph, VALUE_PROPERTIES))
-        self.numbers = 0  # amounts that were named so far
+        self.numbers = 0  # number of variables for amounts
         self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
 
     def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
-        """Yield the bindings of parameters and variables with which a behaviour is applicable, once per binding."""
+        """Yield each binding of parameters and variables with which a behaviour is applicable; no binding is repeated."""
         names = self.names(behavior, when)
         for row in self.graph.select(self.query(behavior, when, ordered=False), SCENE):
             yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
 
     def effects(self, behavior: Behavior, arguments: tuple[str, ...], bindings: dict[str, str]) -> Iterator[Fact]:
-        """Yield the effects of a behaviour, conditional ones included."""
+        """Yield the facts of a behaviour's effects, including conditional effects whose conditions hold."""
         for effect in behavior.effects:
             if not effect.when:
                 yield _fact(effect, bindings)
@@ -255,7 +256,7 @@ class _Writer:
                     yield _fact(effect, row)
 
     def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
-        """Return the terms that a query binds: the parameters in order, then the variables that value conditions determine."""
+        """Return the variables that a query binds: the parameters in order, then the variables that value conditions determine."""
         found = dict.fromkeys(parameter.name for parameter in behavior.parameters)
         for condition in (*behavior.preconditions, *when):
             if isinstance(condition, ValueCondition) and not condition.negated and condition.value.startswith("?"):
@@ -290,7 +291,7 @@ class _Writer:
         return name if name.startswith("?") else f"<{self.reading.names.iri(name)}>"
 
     def pattern(self, condition: Condition) -> Iterator[str]:
-        """Yield the lines of one condition."""
+        """Yield the SPARQL lines for a condition."""
         if condition.negated:
             inner = " ".join(self.positive(condition))
             yield f"FILTER NOT EXISTS {{ {inner} }}"
@@ -300,7 +301,7 @@ class _Writer:
             yield from self.positive(condition)
 
     def positive(self, condition: Condition) -> Iterator[str]:
-        """Yield the lines of a condition without its negation."""
+        """Yield the SPARQL lines for a condition without its negation."""
         match condition:
             case ValueCondition(situation, arguments, value):
                 yield self.value(situation, arguments, value)
@@ -314,7 +315,7 @@ class _Writer:
                 for inner in conditions:
                     yield from self.pattern(inner)
                 known = any(_names(inner, variable) for inner in conditions)
-                # Of a known individual the class is only tested, not joined: hundreds of times as fast.
+                # If the conditions bind the variable, a test of the class is hundreds of times as fast as a join.
                 yield f"FILTER EXISTS {{ {self.typed(variable, kind)} }}" if known else self.typed(variable, kind)
             case AnyOf(alternatives):
                 groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)
@@ -325,7 +326,7 @@ class _Writer:
                 yield from (*patterns, test)
 
     def amount(self, expression: Expression, patterns: list[str]) -> str:
-        """Return an amount as an expression, and add the patterns that bind its variables."""
+        """Return the SPARQL expression of a numeric expression, and add the patterns that bind its variables to `patterns`."""
         match expression:
             case Calculation(sign, left, right):
                 return f"({self.amount(left, patterns)} {sign} {self.amount(right, patterns)})"

@@ -1,21 +1,21 @@
-"""Classes defined by situations, compiled into conditions.
+"""Compilation of classes that are defined by situations into conditions.
 
-The members of a class such as "a full vessel is a vessel that carries some beverage" change, so the reasoner must not conclude
-them before planning. In a behaviour, such a class is replaced by its definition:
+The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL reasoner must
+not infer them before planning. In a behaviour, the conditions of the definition replace such a class:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
 =========================================  =======================================================
 ``A and B``                                 both conditions
 ``A or B``                                  `AnyOf`
-``not A``                                   the condition negated
+``not A``                                   negated condition
 ``p value v``, p a value property           `ValueCondition`
-``p some C``, p a value property            `Witness`: some C is the value
+``p some C``, p a value property            `Witness`: the value is a member of C
 ``p only C``, p a value property            negated `Witness`: no value is outside C
-the same with a static relation             `RelationCondition` in place of the `ValueCondition`
-``inverse p some C``                        `Witness`: some C has the individual as its value
-``p min 2 C``, ``max``, ``exactly``         `Witness` in `Witness`: another one, and so on; negated for at most
-``p Self``                                  the condition of the individual and itself
+the same with a static relation             `RelationCondition` instead of the `ValueCondition`
+``inverse p some C``                        `Witness`: the individual is the value of a member of C
+``p min 2 C``, ``max``, ``exactly``         nested `Witness`es of different values; negated for a maximum
+``p Self``                                  the condition with the individual as its own value
 ``{a, b}``                                  `AnyOf` of `EqualityCondition`
 ``p some decimal[>= 2]``, p an amount       `Comparison`s of the amount with the bounds
 =========================================  =======================================================
@@ -62,11 +62,11 @@ INSIDE = "|".join(
         *("onDataRange", "withRestrictions", "datatypeComplementOf"),
     )
 )
-"""Properties from a class expression to its parts, except lists."""
+"""Properties that lead from a class expression to its parts, except the properties of RDF lists."""
 EXPRESSIONS = f"""{{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(!isLiteral(?value)) }} UNION
     {{ ?class owl:equivalentClass ?expression . ?expression ({INSIDE}|rdf:first|rdf:rest)* ?node .
       ?node ?property ?value . FILTER(isBlank(?node)) }}"""
-"""The part of a SPARQL query that yields every definition with its parts, as (node, property, value)."""
+"""SPARQL pattern for all class definitions and their parts, as (node, property, value)."""
 
 AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
       FILTER(?property IN (owl:propertyChainAxiom, owl:inverseOf, owl:equivalentProperty)
@@ -78,32 +78,32 @@ AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
       FILTER(?property IN (rdf:first, rdf:rest)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest*/rdf:first ?node . ?node ?property ?value .
       FILTER(?property = owl:inverseOf && isBlank(?node)) }"""
-"""The part of a SPARQL query that yields the axioms about value properties, as (node, property, value)."""
+"""SPARQL pattern for all axioms about value properties, as (node, property, value)."""
 
 _DEFINED = OWL + "equivalentClass"
 CLOSED = {OWL + name for name in ("complementOf", "allValuesFrom", "oneOf", "hasSelf")}
 CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinality")}
 CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
-"""Constructs from which OWL 2 RL concludes no class; planning can, since unstated facts are false."""
+"""OWL constructs from which OWL 2 RL infers no members; planning can, because it treats unstated facts as false."""
 MOST = 5
-"""Maximum cardinality; the test of a larger cardinality would take longer than planning."""
+"""Maximum cardinality in a definition; the evaluation of larger cardinalities would take longer than planning."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
 
 
 @dataclass(frozen=True)
 class Definitions:
-    """The class expressions of an ontology, by node.
+    """The class definitions and property axioms of an ontology.
 
     Attributes
     ----------
     nodes : mapping of node to property to values
     situations : mapping of value property to its situation type, and whether it is functional
     names : Names
-    numbers : set of properties that lead to numbers
-    kinds : mapping of property to the classes of subject and value, as names; "" where none is stated
+    numbers : set of properties whose values are numbers
+    kinds : mapping of property to its domain and range as class names; an empty text for an unstated class
     concluded : mapping of class to situation type and owner
-        Classes that rules conclude (SWRL's, `confab.reasoner.reading.swrl`, or others), or that are defined recursively; each
-        with the situation type that is true of its members, and the class that has this type ("" if there are several).
+        Classes whose members follow from rules, from SWRL or from a recursive definition. The situation type is true for the
+        members; the owner is the class that has the situation type, or an empty text if several classes have it.
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
@@ -114,12 +114,12 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether a class is tested by its definition, because its members change or OWL 2 RL doesn't find all of them."""
+        """Return whether conditions replace a class because its members change or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
 
     @cached_property
     def recursive(self) -> frozenset[str]:
-        """The classes whose definitions are recursive, directly or through other classes."""
+        """The classes whose definitions refer to themselves, directly or through other classes."""
         names = {iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
         found = set()
         for iri in names:
@@ -141,7 +141,7 @@ class Definitions:
         return self._spread(set(self.concluded))
 
     def _spread(self, found: set[str]) -> frozenset[str]:
-        """Return some classes, and all classes whose definitions use a value property or one of these classes."""
+        """Return the classes in `found`, and all classes whose definitions depend on them or on a value property."""
         defined = {
             iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node
         }
@@ -151,9 +151,9 @@ class Definitions:
 
     @cached_property
     def _closed(self) -> frozenset[str]:
-        """The classes for which OWL 2 RL finds no members, since their definitions use `CLOSED` constructs.
+        """The classes whose members OWL 2 RL can't infer because their definitions contain `CLOSED` constructs.
 
-        They have the form *Base and …*, with terms that planning knows.
+        Only definitions of the form *Base and …* with known properties are included.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -170,13 +170,13 @@ class Definitions:
         return frozenset(found)
 
     def _mentioned(self, iri: str) -> set[str]:
-        """Return the properties and classes in a definition."""
+        """Return the properties and classes that a definition mentions."""
         inside = [self.nodes.get(node, {}) for node in self._expressions(iri)]
         named = [*self._definitions(iri), *(value for said in inside for values in said.values() for value in values)]
         return {value for value in named if not _blank(value)}
 
     def _expressions(self, iri: str) -> list[str]:
-        """Return the expressions of a definition, nested ones included."""
+        """Return all class expressions in a definition, including nested ones."""
         found = dict.fromkeys(node for node in self._definitions(iri) if _blank(node))
         waiting = list(found)
         while waiting:
@@ -189,7 +189,7 @@ class Definitions:
         return self.nodes.get(iri, {}).get(OWL + "equivalentClass", [])
 
     def base(self, iri: str) -> str:
-        """Return a static superclass of a changing class: the first static class in its definition."""
+        """Return a class itself if it is static; otherwise return the first static class in its definition."""
         if not self.changes(iri):
             return iri
         if iri in self.concluded:
@@ -211,7 +211,7 @@ class Definitions:
         )
 
     def conditions(self, term: str, iri: str, negated: bool = False) -> tuple[Condition, ...]:
-        """Return the conditions for a term to be in a class: a class condition, or the definition of a changing class."""
+        """Return the conditions that a term is a member of a class: a class condition, or the definition of a changing class."""
         if not self.changes(iri):
             return (ClassCondition(term, self.names.short(iri), negated),)
         if iri in self.recursive - self.concluded.keys():
@@ -223,12 +223,12 @@ class Definitions:
         if iri in self.concluded:
             return (ValueCondition(self.names.short(self.concluded[iri][0]), (term,), TRUE, negated),)
         found = tuple(self.expression(term, self._one_definition(iri)))
-        if iri not in self._situated:  # a scene may state the members of a static class
+        if iri not in self._situated:  # a scene may also state members of the class
             found = (AnyOf(((ClassCondition(term, self.names.short(iri)),), found)),)
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions for a situation type of a class's members, in addition to those of rules."""
+        """Return the conditions for a situation type that is true for the members of a class, apart from rules for it."""
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):
@@ -236,12 +236,12 @@ class Definitions:
         return (ClassCondition(term, self.names.short(iri)),)
 
     def condition(self, term: str, iri: str, negated: bool = False) -> Condition:
-        """Return these conditions as one condition."""
+        """Return the conjunction of `conditions` as one condition."""
         found = self.conditions(term, iri, negated)
         return found[0] if len(found) == 1 else AnyOf((found,))
 
     def beyond_base(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions of a changing class on a term, in addition to its base class; empty for a static class."""
+        """Return the conditions of a changing class on a term of its base class; return no conditions for a static class."""
         return self.conditions(term, iri) if self.changes(iri) else ()
 
     def _one_definition(self, iri: str) -> str:
@@ -255,10 +255,10 @@ class Definitions:
     # -------------------------------------------------------------------------------------------------------- properties
 
     def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
-        """Return the rules of the axioms about a value property: subproperties and chains.
+        """Return the rules that follow from the axioms about a value property: subproperties, chains, inverses and characteristics.
 
-        A transitive property is derived from its other rules, one link after another; `more` states whether there are rules of
-        another kind.
+        A transitive property is derived from its other rules by adding one link at a time. `more` states whether the situation type
+        has rules that don't follow from axioms.
         """
         said = self.nodes.get(prop, {})
         ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
@@ -288,7 +288,7 @@ class Definitions:
         )
 
     def _way(self, way: Sequence[str], situation: str, kinds: Sequence[str]) -> Rule:
-        """Return the rule of a property chain."""
+        """Return the rule that a property chain implies."""
         variables: list[Parameter] = []
 
         def rest(place: int, one: str) -> tuple[Condition, ...]:
@@ -316,7 +316,7 @@ class Definitions:
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
     def _between(self, one: str, other: str) -> str:
-        """Return the class of the individuals between two properties of a chain: the values of the first one."""
+        """Return the class of the individuals that join two properties of a chain."""
         for prop, at_its_end in ((one, True), (other, False)):
             iri, inverse = self._named(prop)
             if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
@@ -329,7 +329,7 @@ class Definitions:
     # -------------------------------------------------------------------------------------------------- class expressions
 
     def expression(self, term: str, node: str) -> Iterator[Condition]:
-        """Yield the conditions whose conjunction a class expression means."""
+        """Yield conditions whose conjunction is equivalent to membership of a term in a class expression."""
         if not _blank(node):
             if node != THING:
                 yield from self.conditions(term, node)
@@ -365,7 +365,7 @@ class Definitions:
 
     @staticmethod
     def _cardinality(said: Mapping[str, Sequence[str]]) -> tuple[int, int | None] | None:
-        """Return the minimum and maximum cardinality of a restriction; None if it has none."""
+        """Return the minimum and maximum (None if unbounded) of a cardinality restriction; None for other restrictions."""
         for name in ("cardinality", "qualifiedCardinality"):
             capital = name[0].upper() + name[1:]
             found = [said.get(OWL + one, [""])[0] for one in (name, f"min{capital}", f"max{capital}")]
@@ -377,7 +377,7 @@ class Definitions:
         return None
 
     def _counted(self, prop: str, term: str, filler: str, least: int, most: int | None) -> Iterator[Condition]:
-        """Yield the conditions that the number of values in a class lies between a minimum and a maximum."""
+        """Yield the conditions that the number of a term's values in a class lies between a minimum and a maximum."""
         if max(least, -1 if most is None else most) > MOST:
             raise KnowledgeError(
                 f"a definition counts up to {max(least, most or 0)} values of {local_name(self._named(prop)[0])}; planning counts "
@@ -389,7 +389,7 @@ class Definitions:
             yield replace(self._some(prop, term, filler, outside=False, others=most), negated=True)
 
     def _numbers(self, said: Mapping[str, Sequence[str]], term: str) -> Condition:
-        """Return the condition of a restriction on an amount, or on the number of a relation."""
+        """Return the condition of a restriction on an amount or on a relation whose values are numbers."""
         prop = said[OWL + "onProperty"][0]
         amount = self.number(prop, term)
         there = Comparison(amount, "=", amount)
@@ -406,7 +406,7 @@ class Definitions:
         )
 
     def _data_range(self, prop: str, amount: Expression, node: str) -> tuple[Condition, ...]:
-        """Return the conditions, all of which must hold, for an amount to be in a data range."""
+        """Return conditions whose conjunction is equivalent to an amount being in a data range."""
         said = self.nodes.get(node, {})
         if not said:
             return (Comparison(amount, "=", amount),)  # a datatype
@@ -441,7 +441,7 @@ class Definitions:
         return found
 
     def number(self, prop: str, term: str) -> Expression:
-        """Return the number of a term that a property states."""
+        """Return the numeric expression for the value of a property of a term."""
         if prop not in self.situations:
             return Measure(self.names.short(prop), (term,))
         return Amount(self.names.short(self.situations[prop][0]), (term,))
@@ -449,9 +449,9 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return the condition that some value is in a class, with `others` further values.
+        """Return the condition that a term has a value in a class, and `others` further values different from it.
 
-        With `outside`, that no value is outside it.
+        If `outside`, return the condition that no value of the term is outside the class.
         """
         variable = f"{term if term.startswith('?') else '?' + term}_{local_name(self._named(prop)[0])}"
         variable += str(len(before) + 1) if before else ""
@@ -469,7 +469,7 @@ class Definitions:
         return Witness(variable, kind, (self.related(prop, term, variable), *inside), negated=outside)
 
     def _range(self, prop: str) -> str:
-        """Return the class of a property's values: the situation type, for a value property."""
+        """Return the class of a property's values; for a value property, it is the situation type."""
         iri, inverse = self._named(prop)
         kind = self.kinds.get(iri, ("", ""))[not inverse]
         if not kind:
@@ -494,7 +494,7 @@ class Definitions:
         return ValueCondition(name, (one,), other) if functional else ValueCondition(name, (one, other), TRUE)
 
     def _named(self, prop: str) -> tuple[str, bool]:
-        """Return a property's IRI, and whether the expression is its inverse."""
+        """Return the IRI of a property expression, and whether the expression is the inverse of this property."""
         inverse = self.nodes.get(prop, {}).get(OWL + "inverseOf", [])
         return (inverse[0], True) if inverse and prop not in self.situations else (prop, False)
 
@@ -517,7 +517,7 @@ class Definitions:
 
 
 def _negation(conditions: tuple[Condition, ...]) -> Condition:
-    """Return the condition that at least one of some conditions is false."""
+    """Return the condition that a conjunction is false."""
     if len(conditions) == 1:
         return replace(conditions[0], negated=not conditions[0].negated)
     return AnyOf((conditions,), negated=True)

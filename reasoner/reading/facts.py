@@ -1,4 +1,4 @@
-"""The facts of a scene as values: static relations, and the initial state."""
+"""Reading of a scene's facts: static relations and the initial state."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def facts_of(
     names: Names,
     numbers: Collection[str],
 ) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
-    """Return the static relations, and the values that the scene states of each symbol."""
+    """Return the rows of each static relation, and the values that the scene states for each symbol."""
     relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
-    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # relations with a number at the end of each row
+    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # relations whose rows end with a number
     stated: dict[Symbol, set[str]] = defaultdict(set)
     for subject, predicate, value in rows:
         number = predicate in numbers
@@ -39,7 +39,7 @@ def facts_of(
             continue
         situation, boolean = properties[predicate]
         if situation in domain.rules:
-            continue  # it follows from facts about others
+            continue  # its facts are derived
         if boolean:
             stated[Symbol(situation, pair)].add(TRUE)
         else:
@@ -88,12 +88,12 @@ def facts_of(
 
 
 def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
-    """Return the number of individuals that behaviours and rules name for each static relation.
+    """Return the number of individuals in each static relation according to behaviours and rules.
 
     Raises
     ------
     KnowledgeError
-        Two of them name different numbers of individuals for one relation.
+        Two conditions or calculations have different numbers of individuals for the same relation.
     """
     found: dict[str, tuple[int, str]] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
@@ -114,7 +114,7 @@ def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
 
 
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
-    """Raise `KnowledgeError` if a relation gives two numbers for the same individuals, or no number for some."""
+    """Raise `KnowledgeError` if a relation has two numbers for the same individuals, or a number for only some individuals."""
     for row in bare:
         raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its :amount")
     found: dict[tuple[str, ...], str] = {}
@@ -126,9 +126,9 @@ def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collect
 def initial_state(
     domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
 ) -> dict[Symbol, str]:
-    """Return the value of each symbol: the stated value, or the default.
+    """Return the initial value of each symbol: the stated value, or the situation type's default.
 
-    Raise `KnowledgeError` if a symbol has no value, or several.
+    Raise `KnowledgeError` if a symbol has several stated values, or neither a stated value nor a default.
     """
     initial = {}
     for situation in domain.situations.values():
@@ -137,7 +137,7 @@ def initial_state(
         for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
             symbol = Symbol(situation.name, arguments)
             if situation.quantity and len(arguments) > 1 and symbol not in stated and not situation.default:
-                continue  # distances, prices: only stated ones exist
+                continue  # e.g. a distance exists only if it is stated
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
                 what = f"several values ({', '.join(values)})" if values else "no value"
@@ -149,12 +149,12 @@ def initial_state(
     ):
         kinds = domain.situations[symbol.situation].arguments
         if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
-            initial[symbol] = TRUE  # other symbols aren't read
+            initial[symbol] = TRUE  # symbols of unread individuals are omitted
     return initial
 
 
 def check_values(state: State, domain: Domain, names: Names) -> None:
-    """Raise `KnowledgeError` if a symbol has an undeclared value, or an amount outside its bounds."""
+    """Raise `KnowledgeError` if a symbol has an undeclared value, an amount is out of bounds, or a constraint is violated."""
     for fault in values_at_fault(state, domain, names):
         constraint = domain.constraints.get(fault.symbol.situation)
         about = next(iter(fault.symbol.arguments), "") if constraint is None else constraint.situation

@@ -1,4 +1,4 @@
-"""A schema as values for some individuals: situation types, behaviours, rules and aggregates, each checked."""
+"""Translation of a schema for some individuals: situation types, behaviours, rules and aggregates, with all checks."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 
 
 class _Whole(Names):
-    """Names that are IRIs, except for truth values."""
+    """Names that are whole IRIs, except the names of truth values."""
 
     def short(self, iri: str) -> str:
         return {CORE + TRUE: TRUE, CORE + FALSE: FALSE}.get(iri, iri)
@@ -62,7 +62,7 @@ class _Whole(Names):
 
 
 def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
-    """Return behaviours with IRIs as names; classes that situations define keep their names."""
+    """Return the given behaviours with IRIs as names and without replacing classes by their definitions."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
@@ -71,10 +71,10 @@ def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
 
 @dataclass(frozen=True)
 class Frame:
-    """A schema as values, for some individuals: everything of a problem except its facts and its goal.
+    """The domain of a problem and the classes of some individuals: everything in a problem except its facts and its goal.
 
-    `properties` maps the IRI of a value property to the name of its situation type, and to True if it has many values. `lifted`
-    has the behaviours before effects on all of a class are expanded.
+    `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values.
+    `lifted` contains the behaviours in which an effect may be on all members of a class.
     """
 
     schema: Schema
@@ -97,10 +97,10 @@ def frame(
     namesakes: Collection[str] = (),
     earlier: Frame | None = None,
 ) -> Frame:
-    """Return the behaviours and situation types as values, and the classes of some individuals.
+    """Return the domain of a schema, and the classes of some individuals.
 
-    `namesakes` are other individuals with the same local name as one of these, so that names are those of the whole scene;
-    `earlier` is the frame of fewer individuals, whose behaviours stay valid unless a new individual changes a name in them.
+    `namesakes` are IRIs of unread individuals with the same local names, so that names are unique in the whole scene. `earlier` is
+    a frame of fewer individuals; its behaviours are reused unless a name in them has changed.
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -143,7 +143,7 @@ def frame(
 
 
 def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
-    """Return short names of a schema's terms, of some individuals, and of others with the same local name."""
+    """Return unique short names for a schema's terms, some individuals, and other IRIs with the same local names."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
     derived = {*derived_goals(schema)}
@@ -161,13 +161,12 @@ def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str]
 
 
 def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:
-    """Return the rules of each situation type that is defined: by rules, by a class, or by axioms about its value property.
+    """Return the rules of each derived situation type: from rules, from a class, or from axioms about its value property.
 
     Raises
     ------
     KnowledgeError
-        A behaviour changes a defined situation type; or a defined situation type isn't boolean, or is defined by its own
-        negation.
+        A behaviour changes a derived situation type, or a derived situation type isn't boolean or depends on its own negation.
     """
     changed = {
         parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
@@ -230,12 +229,12 @@ def _aggregates(
     rules: Mapping[str, Sequence[Rule]],
     constraints: Mapping[str, Constraint],
 ) -> dict[str, Aggregate]:
-    """Return the derived amounts, and the counts of the exceptions to constraints, in order of dependency.
+    """Return the derived amounts, and the counts of the violations of constraints, in order of dependency.
 
     Raises
     ------
     KnowledgeError
-        A behaviour changes a derived amount; or a derived amount has two rules, isn't an amount, or depends on itself.
+        A behaviour changes a derived amount, or a derived amount has two rules, isn't an amount, or depends on itself.
     """
     found: dict[str, Aggregate] = {}
     for iri in schema.of_kind("Rule"):
@@ -277,12 +276,12 @@ def _aggregates(
 
 
 def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationType]) -> dict[str, Constraint]:
-    """Return the constraints, by the names of the counts of their exceptions.
+    """Return the constraints by the name of the amount that counts their violations.
 
     Raises
     ------
     KnowledgeError
-        A constrained situation type isn't boolean, or is both never and always true.
+        A constrained situation type isn't boolean, or it is constrained to be both never and always true.
     """
     found, known = {}, {situation.name: situation for situation in situations}
     for iri in sorted(schema.of_kind("SituationType"), key=parts.names.short):
@@ -301,7 +300,7 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
 
 
 def _exceptions(name: str, constraint: Constraint, situation: SituationType) -> Aggregate:
-    """Return the count of the arguments of which a constrained situation type is true, or false if it must always be true."""
+    """Return the aggregate that counts the violations of a constraint: the symbols that are true, or false if they must be true."""
     variables = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(situation.arguments))
     true = ValueCondition(situation.name, tuple(one.name for one in variables), TRUE, constraint.always)
     return Aggregate(name, "count", Fraction(1), (), variables, (true,))
@@ -312,7 +311,7 @@ def _on_their_levels(
     rules: Mapping[str, Sequence[Rule]],
     aggregates: Mapping[str, Aggregate],
 ) -> Iterator[SituationType]:
-    """Yield situation types; a defined type exists from the first level that has all situation types of its definition."""
+    """Yield the situation types with their levels; a derived type exists from the first level that has all types it depends on."""
     known = {s.name: s for s in situations}
     before = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
@@ -326,7 +325,7 @@ def _on_their_levels(
 
 
 def _definitions(schema: Schema, names: Names) -> Definitions:
-    """Return the definitions of classes and situation types, with the classes of subjects and values of their properties."""
+    """Return the definitions of classes and situation types, with the domains and ranges of properties."""
     properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
     owners: dict[str, list[str]] = defaultdict(list)
     for kind, situation in schema.owners:
@@ -350,7 +349,7 @@ def _definitions(schema: Schema, names: Names) -> Definitions:
 
 
 def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
-    """Return the situation type of each value property, and whether it is functional."""
+    """Return the situation type of each value property, and whether the property is functional."""
     return {
         prop: (iri, iri not in schema.pairs)
         for iri in schema.of_kind("SituationType")
@@ -359,7 +358,12 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a condition or effect has a wrong number of arguments."""
+    """Raise `KnowledgeError` if a behaviour is inconsistent.
+
+    - Two terms must not have the same name.
+    - Every condition and effect must have as many arguments as its situation type.
+    - Every situation type must exist on the behaviour's level.
+    """
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
         raise KnowledgeError(
@@ -393,7 +397,7 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 def _situations(
     schema: Parts, read: Schema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
-    """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
+    """Return the sorted situation types; and, for each value property, its situation type and whether this type is boolean."""
     found, properties = [], {}
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)
@@ -401,7 +405,7 @@ def _situations(
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
         value_property = schema.values(iri, "valueProperty")
-        # The value property determines this even if none of the individuals read is a value.
+        # A situation type with a value property has values other than true and false, even if none has been read.
         boolean = not value_property and set(classes.get(name, ())) <= {TRUE, FALSE}
         if iri in schema.pairs:
             arguments, boolean = (*arguments, name), True
@@ -430,7 +434,7 @@ def _situations(
 
 
 def _perceived(schema: Parts, iri: str, exclusive: bool) -> Perceived | None:
-    """Return how a situation type is perceived; None if it has no perceiver."""
+    """Return how a situation type is perceived; return None if no perceiver is stated."""
     node = schema.nodes[iri]
     if not (perceivers := node.get(EMBODIMENT + "perceiver")):
         return None
@@ -452,7 +456,7 @@ def _quantity(schema: Parts, iri: str, whole: bool) -> Quantity | None:
 
 
 def _union(kinds: Sequence[str], classes: dict[str, tuple[str, ...]]) -> str:
-    """Return the class of all individuals of several classes, made if there is more than one."""
+    """Return the name of the union of several classes, and add the union to `classes` if it doesn't exist."""
     name = "|".join(kinds)
     if name not in classes:
         classes[name] = tuple(dict.fromkeys(member for kind in kinds for member in classes.get(kind, ())))

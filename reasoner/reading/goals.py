@@ -1,4 +1,4 @@
-"""Goals: the goals of a task, and goals that users type."""
+"""Goals: reading of a task's goals, and parsing of goals that users write."""
 
 from __future__ import annotations
 
@@ -37,18 +37,20 @@ from confab.reasoner.symbols import (
 )
 
 TASK = "Task"
-"""The class of the individual that is the argument of derived goals."""
+"""Class of the individual that is the argument of derived goals."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
-"""The notation of users for the goal of an amount."""
+"""Notation of a number or bounds in a goal on an amount."""
 
 
 def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
-    """Return the problem with some goals replaced, each written like ``cup2 LOCATION location8``.
+    """Return a problem in which the given goals replace the task's goals on the same symbols.
+
+    Each goal is a text such as ``cup2 LOCATION location8``.
 
     Raises
     ------
     KnowledgeError
-        A word is unknown, the object doesn't have the situation type, or two goals exclude each other.
+        A word is unknown, an object doesn't have the situation type, or two goals contradict each other.
     """
     given: dict[Symbol, str] = {}
     for fact in goals:
@@ -64,12 +66,12 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
 
 
 def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
-    """Return symbol and value of a fact written as ``object SITUATION [argument …] value``.
+    """Return the symbol and the value of a fact in the notation ``object SITUATION [argument …] value``.
 
     Raises
     ------
     KnowledgeError
-        A word is unknown; the message has the nearest known name.
+        A word is unknown; the message suggests the most similar known name.
     """
     words = fact.split()
     individuals = problem.individuals
@@ -113,12 +115,12 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 
 
 def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
-    """Return the problem with the goals of some tasks.
+    """Return a problem with the goals of the given tasks.
 
     Raises
     ------
     KnowledgeError
-        Two goals exclude each other, or a goal names an individual that isn't in the scene.
+        Two goals contradict each other, or a goal mentions an individual that isn't in the scene.
     """
     goal = dict[Symbol, str]()
     for task in tasks:
@@ -142,7 +144,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
             kind = problem.domain.situations[symbol.situation]
             members = (problem.classes.get(of, ()) for of in kind.arguments)
             if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
-                continue  # impossible members are left out
+                continue  # the symbol doesn't exist
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
@@ -153,7 +155,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
 
 
 def _is_fact(wanted: Condition, problem: Problem) -> bool:
-    """Return whether a goal is a fact: a value of a symbol, or bounds of an amount in the state."""
+    """Return whether a goal is equivalent to a fact: the value of a symbol, or bounds of an amount that the state contains."""
     match wanted:
         case ValueCondition():
             return True
@@ -165,9 +167,9 @@ def _is_fact(wanted: Condition, problem: Problem) -> bool:
 
 
 def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition) -> tuple[Problem, Symbol]:
-    """Return the problem with a situation type that a rule derives from a condition, and its symbol.
+    """Return a problem with a new boolean situation type whose rule is a condition, and the symbol of this type.
 
-    The symbol is about the task. So a goal with alternatives, or about some individual, is a fact like other goals.
+    The argument of the symbol is the task. A goal with alternatives or quantifiers thereby becomes a fact like other goals.
     """
     domain = problem.domain
     names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]
@@ -185,12 +187,12 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
 
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the value of a goal; for a negated goal, the only other value on the first level that sees the symbol.
+    """Return the wanted value of a goal; for a negated goal, the only other value on the lowest level that has the symbol.
 
     Raises
     ------
     KnowledgeError
-        Several values are left.
+        The symbol has several other values.
     """
     if not wanted.negated:
         return wanted.value
@@ -208,7 +210,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return the goals that a goal denotes: one goal for each member if the goal names a class in place of an individual."""
+    """Return the goals that a goal node denotes: one for each member of a class if the node names a class as an argument."""
     if is_a(parts.nodes.get(iri, {}), "AllOf") and not parts.flag(iri, "negated"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
@@ -233,7 +235,7 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
 
 
 def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
-    """Return the symbol of a goal on an amount, and the bounds."""
+    """Return the symbol and the bounds of a goal on an amount."""
     contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
     sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
     if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):
@@ -243,12 +245,12 @@ def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
 
 
 def check_arguments(symbol: Symbol, domain: Domain, what: str) -> None:
-    """Raise `KnowledgeError` if a symbol names more or fewer individuals than its situation type takes."""
+    """Raise `KnowledgeError` if a symbol and its situation type have different numbers of arguments."""
     many, wanted = len(symbol.arguments), len(domain.situations[symbol.situation].arguments)
     if many != wanted:
         raise KnowledgeError(f"{symbol}: {what} about {many} individuals; {symbol.situation} is about {wanted}")
 
 
 def some_of(names: Sequence[str], most: int = 12) -> str:
-    """Return the first of some names as text."""
+    """Return a text that lists the first `most` names."""
     return ", ".join(names[:most]) + (", …" if len(names) > most else "")

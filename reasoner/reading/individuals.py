@@ -1,4 +1,4 @@
-"""The facts about some individuals of a scene, read by queries whose size doesn't depend on the scene."""
+"""Reading of the facts about some individuals, by queries whose cost doesn't depend on the size of the scene."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
 PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
-"""Properties from a fact with a node of its own to its individuals."""
+"""Properties that lead from a fact that is a node to its individuals."""
 NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
 INDEX = CORE + "index"
 FACT = CORE + "SituatedObjectInstance"
 
 
 class Individuals:
-    """The facts read about some individuals so far.
+    """The facts about individuals that have been read so far.
 
     Attributes
     ----------
-    triples : set of triples
-        All facts about the individuals in `seen`, and facts about others that were found backward, in the order of reading.
+    triples : ordered set of triples
+        All facts about the individuals in `seen`, and facts about other individuals that mention a searched individual.
     seen : set of individuals
     """
 
@@ -46,7 +46,10 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Read the facts about some individuals, about members of some classes, and the facts that name given individuals."""
+        """Read all facts about some individuals and about the members of some classes, and return the new triples.
+
+        `back` maps a property to individuals; facts with these individuals as the property's value are read, too.
+        """
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, targets in (back or {}).items():
             if not targets:
@@ -70,7 +73,7 @@ class Individuals:
                 rows.append(stated((s, p, o), numbers))
                 continue
             if not names and said in links and subject not in nodes:
-                link((s, p, o))  # reports its fault
+                link((s, p, o))  # raises an error
             if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
                 rows.append((subject, said, text(o)))
         self.triples.update(dict.fromkeys(rows))
@@ -79,7 +82,7 @@ class Individuals:
         return rows
 
     def below(self, classes: Iterable[str]) -> set[str]:
-        """Return some classes with their subclasses."""
+        """Return some classes and all their subclasses."""
         found, waiting = set[str](), [*classes]
         while waiting:
             if (kind := waiting.pop()) not in found:
@@ -88,7 +91,7 @@ class Individuals:
         return found
 
     def members(self) -> list[Member]:
-        """Return the individuals read, by class."""
+        """Return each class of the individuals that have been read, with the individual and its index."""
         named = set[str]()
         kinds: list[tuple[str, str]] = []
         indices: dict[str, int] = {}
@@ -103,12 +106,12 @@ class Individuals:
         return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
 
     def facts(self, known: Frame) -> list[Triple]:
-        """Return the values and relations between individuals whose own facts were read."""
+        """Return the facts of value properties and relations between individuals in `seen`."""
         wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
         return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
 
     def tuples(self) -> dict[str, Node]:
-        """Return the facts with nodes of their own all of whose individuals were read."""
+        """Return the facts that are nodes and mention only individuals in `seen`."""
         nodes = self.schema.nodes
         facts = (
             {s for s, p, o in self.triples if p == TYPE and o == FACT} - nodes.keys() if self.schema.tuples else set()
@@ -124,12 +127,12 @@ class Individuals:
 
 
 def values_of(iris: Iterable[str]) -> str:
-    """Return IRIs for a VALUES clause, without invalid ones."""
+    """Return the valid IRIs among `iris` in the notation of a VALUES clause."""
     return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
 
 
 def constants_of(schema: Schema) -> set[str]:
-    """Return the individuals that the schema names: in conditions, effects, definitions, and as rest and default values."""
+    """Return the individuals that a schema mentions in conditions, effects and definitions, or as rest and default values."""
     goals = goal_conditions(schema)
     names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
     found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
@@ -143,5 +146,5 @@ def constants_of(schema: Schema) -> set[str]:
 
 
 def goal_conditions(schema: Schema) -> set[str]:
-    """Return the conditions that are goals of a task."""
+    """Return the nodes of all goals of tasks."""
     return {iri for node in schema.nodes.values() for iri in node.get(CORE + "goal", ())}

@@ -1,8 +1,8 @@
-"""Observed facts in the graph: a separate file beside the edited scene. Each fact is a situated object instance.
+"""Observed facts of a scene, stored in a separate file.
 
-An individual with object, situation type and value. It isn't a property assertion, so that the place of a cup in the scene
-doesn't contradict its observed place in the file. A planning call that starts from observations puts these values in place of
-the scene's.
+Each observed fact is a situated object instance, an individual with an object, a situation type and a value. It isn't a property
+assertion, because the observed place of a cup would contradict its place in the scene. A planning call that starts from
+observations replaces the scene's values by the observed values.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ;
 
 
 def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
-    """Write an observed state as situated object instances.
+    """Write an observed state to a file, as situated object instances.
 
     Parameters
     ----------
     path : Path
     state : State
-        As perceived.
+        The observed value of each symbol.
     names : Names
-        The scene's names, which give the IRIs.
+        Mapping from the scene's names to IRIs.
     scene : str
-        IRI of the scene, which the file imports.
+        IRI of the scene; the file imports it.
     """
     prefixes = {"owl": OWL, "": CORE, "s": observed_iri(scene) + "#"}
     write_whole(path, ox.serialize(_triples(state, names, scene), format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
 
 def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
-    """Put an observed state into the graph `observed`, replacing the previous one."""
+    """Replace the contents of the graph `observed` by an observed state."""
     target = ox.NamedNode(BASE + "observed")
     graph.store.clear_graph(target)
     triples = _triples(state, names, graph.scene)
@@ -53,12 +53,12 @@ def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:
-    """Return a reading whose initial state has the observed facts of a file in the place of the scene's.
+    """Return a reading in whose initial state the observed facts of a file replace the scene's facts.
 
     Raises
     ------
     KnowledgeError
-        The file is missing or not Turtle, or mentions terms that the scene doesn't have.
+        The file is missing, isn't Turtle, or mentions names that the scene doesn't have.
     """
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such file of observed facts; 'confab run' and 'confab execute' write one")
@@ -87,7 +87,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
 
 
 def observed_iri(scene: str) -> str:
-    """Return the IRI of the ontology of a scene's observed facts."""
+    """Return the IRI of the ontology that contains the observed facts of a scene."""
     return f"{scene.rstrip('#/')}.observed"
 
 

@@ -1,4 +1,4 @@
-"""From nodes to the parts of behaviours and goals: terms, conditions, calculations, effects."""
+"""Translation of nodes to the parts of behaviours and goals: terms, conditions, calculations and effects."""
 
 from __future__ import annotations
 
@@ -40,19 +40,17 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE
 
 @dataclass(frozen=True)
 class Parts(NodeReader):
-    """The nodes of behaviours, conditions and situation types, read as values."""
+    """Reader of the nodes of behaviours, conditions and situation types."""
 
     error: ClassVar[type[ValueError]] = KnowledgeError
     nodes: Mapping[str, Node]
     names: Names
     terms: set[str]
-    pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
+    pairs: set[str]  # situation types with a many-valued value property
     definitions: Definitions
-    individuals_of: frozenset[str] = frozenset()  # classes that represent all of their individuals
-    standing: dict[str, str] = field(
-        default_factory=dict
-    )  # those of the current item, and the term for each individual
-    inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
+    individuals_of: frozenset[str] = frozenset()  # classes that can stand for all of their members
+    standing: dict[str, str] = field(default_factory=dict)  # variable of each class that stands for its members
+    inside: list[str] = field(default_factory=list)  # the nested conditions that are being read
     count: list[int] = field(default_factory=lambda: [0])
 
     def short(self, iri: str) -> str:
@@ -60,7 +58,7 @@ class Parts(NodeReader):
         return self.names.short(iri)
 
     def number(self, iri: str, name: str, least: int, most: int, default: int | None = None) -> int:
-        """Return the value of a property as a whole number between bounds."""
+        """Return the value of a property as a whole number between `least` and `most`; without a value, return the default."""
         found = self.values(iri, name)
         if not found and default is not None:
             return default
@@ -71,7 +69,7 @@ class Parts(NodeReader):
         return self.number(iri, "level", 1, HIGHEST_LEVEL)
 
     def price(self, iri: str) -> Expression | None:
-        """Return the price of a behaviour; None if it has none."""
+        """Return the expression for the price of a behaviour; return None if the behaviour has no price."""
         if not self.values(iri, "price"):
             return None
         if self.values(iri, "cost"):
@@ -79,7 +77,7 @@ class Parts(NodeReader):
         return self.expression(self.one(iri, "price"))
 
     def cost(self, iri: str) -> float:
-        """Return the fixed cost of a behaviour."""
+        """Return the fixed cost of a behaviour, which is 1 by default."""
         if not self.values(iri, "cost"):
             return 1.0
         said = self.one(iri, "cost")
@@ -92,7 +90,7 @@ class Parts(NodeReader):
         return cost
 
     def term(self, iri: str) -> str:
-        """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
+        """Return the name of a term (``?hand`` for the parameter ``B2_PICK.hand``) or of an individual."""
         if iri in self.terms:
             return "?" + local_name(iri).rsplit(".", 1)[-1]
         if iri in self.standing:
@@ -106,7 +104,7 @@ class Parts(NodeReader):
         return name
 
     def parameter(self, iri: str) -> Parameter:
-        """Return a parameter or variable as a term with its class."""
+        """Return a parameter or variable with its name and class."""
         if iri not in self.terms:
             raise KnowledgeError(
                 f"<{iri}> is used as a parameter but isn't declared as one; declare it, or correct the name"
@@ -114,11 +112,11 @@ class Parts(NodeReader):
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
-        """Return the variable of a witness, and the conditions of its class, if situations define it."""
+        """Return the variable of a witness; and, if situations define its class, the conditions of the definition."""
         return self.parameter(iri), self.membership(iri)
 
     def membership(self, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions of a term's class, if situations define it."""
+        """Return the conditions that define a term's class; return no conditions for a static class."""
         return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
 
     def situation(self, iri: str) -> str:
@@ -129,7 +127,7 @@ class Parts(NodeReader):
         return situation
 
     def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
-        """Return situation type, arguments and value; the value of a boolean symbol may be its last argument."""
+        """Return situation type, arguments and value of a node; the value of a many-valued property becomes the last argument."""
         situation = self.situation(iri)
         if self.is_a(situation, "Amount"):
             raise KnowledgeError(
@@ -150,11 +148,11 @@ class Parts(NodeReader):
         return self.names.short(relation)
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition of a class, by its definition."""
+        """Return the condition that a term is a member of a class, or the conditions of its definition."""
         return self.definitions.condition(term, kind, negated)
 
     def measured(self, iri: str) -> Amount | Measure:
-        """Return the amount of an object, or the number of a relation."""
+        """Return the amount or the relation whose number a node refers to."""
         found = super().measured(iri)
         if isinstance(found, Amount) and not self.is_a(situation := self.situation(iri), "Amount"):
             raise KnowledgeError(
@@ -164,7 +162,7 @@ class Parts(NodeReader):
         return found
 
     def classes_in(self, iri: str) -> list[str]:
-        """Return the classes that stand in place of individuals in a condition or effect and have no variable yet."""
+        """Return the classes among the arguments and the value of a node that stand for all of their members."""
         said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
@@ -181,7 +179,7 @@ class Parts(NodeReader):
         return found
 
     def read(self, iri: str) -> Condition:
-        """Return a condition; a class in the place of an individual means all its members."""
+        """Return the condition of a node; if a class stands for its members, the condition is universally quantified over them."""
         kinds = self.classes_in(iri)
         for kind in kinds:
             self.standing[kind] = f"?each{len(self.standing) or ''}"
@@ -201,7 +199,7 @@ class Parts(NodeReader):
         return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not self.flag(iri, "negated"))
 
     def effect(self, iri: str) -> Effect:
-        """Return an effect; if a class stands in place of an individual, the effect is on every member for which `when` holds."""
+        """Return the effect of a node; if a class stands for its members, the effect is on every member that satisfies `when`."""
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
         kinds = self.classes_in(iri)
@@ -220,14 +218,14 @@ class Parts(NodeReader):
         return found
 
     def value_effect(self, iri: str) -> ValueEffect:
-        """Return an effect that gives a symbol a value."""
+        """Return the effect of a node that gives a symbol a value."""
         situation, arguments, value = self.symbol(iri)
         if self.flag(iri, "negated"):
             value = FALSE
         return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
 
     def amount_effect(self, iri: str) -> AmountEffect:
-        """Return an effect that changes an amount."""
+        """Return the effect of a node that changes an amount."""
         changed = self.measured(iri)
         if not isinstance(changed, Amount):
             raise KnowledgeError(f"<{iri}>: a static relation can't be changed; make it an :Amount")
@@ -236,7 +234,7 @@ class Parts(NodeReader):
         return AmountEffect(changed.situation, changed.arguments, operation, self.right(iri), when)
 
     def behavior(self, iri: str) -> Behavior:
-        """Return a behaviour with all its parts."""
+        """Return a behaviour with its terms, conditions, effects, cost and timing."""
         parameters = tuple(map(self.parameter, ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
         asked = [(self.span(one), c) for one in self.values(iri, "precondition") for c in self.group(one)]
@@ -266,7 +264,7 @@ class Parts(NodeReader):
         )
 
     def span(self, iri: str) -> Span:
-        """Return the span of a condition or an effect of a behaviour."""
+        """Return the time span of a behaviour's condition or effect."""
         if not self.values(iri, "during"):
             return Span.THROUGHOUT
         said = self.one(iri, "during")
@@ -276,7 +274,7 @@ class Parts(NodeReader):
         return found
 
     def duration(self, iri: str) -> Expression | None:
-        """Return the duration of a behaviour in seconds; None if none is stated."""
+        """Return the duration of a behaviour in seconds; return None if no duration is stated."""
         if self.values(iri, "calculatedDuration"):
             if self.values(iri, "duration"):
                 raise KnowledgeError(f"<{iri}> has a :duration and a :calculatedDuration; keep one of them")
@@ -284,7 +282,7 @@ class Parts(NodeReader):
         return self.seconds(iri, "duration")
 
     def seconds(self, iri: str, name: str) -> Fraction | None:
-        """Return the seconds of the duration that a property states; None if it states none."""
+        """Return a property's value, a duration, in seconds; return None if the property has no value."""
         if not self.values(iri, name):
             return None
         found = seconds_of(self.one(iri, name))
@@ -296,7 +294,10 @@ class Parts(NodeReader):
         return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
-        """Return a rule of a situation type with arguments of some classes; an individual among its terms becomes an equality."""
+        """Return a rule of a situation type whose arguments have the given classes.
+
+        An individual among the rule's arguments becomes a parameter with an equality condition.
+        """
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
@@ -304,7 +305,7 @@ class Parts(NodeReader):
         return Rule(situation, parameters, variables, conditions)
 
     def aggregate(self, iri: str, kinds: Sequence[str]) -> Aggregate:
-        """Return the rule of a derived amount with arguments of some classes."""
+        """Return the rule of a derived amount whose arguments have the given classes."""
         function, derived = self.word(iri, "aggregate", AGGREGATES), self.measured(iri)
         if not isinstance(derived, Amount):
             raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it an :Amount")
@@ -347,7 +348,7 @@ class Parts(NodeReader):
         return tuple(parameters), variables, conditions
 
     def terms_below(self, iri: str) -> set[str]:
-        """Return all terms of a behaviour, except those that a witness binds."""
+        """Return all terms in the parts of a behaviour or rule, except the terms that a witness binds."""
         found: set[str] = set()
         bound: set[str] = set()
         waiting, seen = [iri], {iri}

@@ -1,15 +1,15 @@
-"""From the knowledge graph to the values of `confab.reasoner.symbols`: objects, behaviours, facts and goals.
+"""Reading of planning problems from the knowledge graph.
 
-The graph is read in a few large queries; their rows become nodes (`confab.reasoner.reading.rows`), the nodes become conditions,
-effects and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`), and all of them a problem:
+A few large queries read the graph. Their rows become nodes (`confab.reasoner.reading.rows`). The nodes become conditions, effects
+and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`) of a problem:
 
 ============================  ==============================================
 in the ontology               in `confab.reasoner.symbols`
 ============================  ==============================================
 ``:SituationType``            `SituationType`
-``:Behavior``                 `Behavior`, its terms starting with ``?``
+``:Behavior``                 `Behavior`, whose variables start with ``?``
 ``:AbsenceCondition``         a negated `Witness`
-``x valueProperty v``         the value of `Symbol` in `Problem.initial`
+``x valueProperty v``         the value of a `Symbol` in `Problem.initial`
 ``:goal`` of the ``:Task``    `Problem.goal`
 ============================  ==============================================
 """
@@ -51,10 +51,10 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 
 @dataclass(frozen=True)
 class Reading:
-    """A scene as a problem, with the table from its names back to IRIs.
+    """A scene as a planning problem, with the mapping from its names to IRIs.
 
-    `whole` is True if the problem contains all individuals of the scene, and False if it contains only those that its task can
-    need (`confab.reasoner.reading.relevance`); `schema` has the rows common to all individuals.
+    `whole` states whether the problem contains all individuals of the scene, or only the individuals that its task can need
+    (`confab.reasoner.reading.relevance`). `schema` contains the part of the ontology that doesn't depend on individuals.
     """
 
     problem: Problem
@@ -64,18 +64,18 @@ class Reading:
 
 
 def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
-    """Read the planning problem of a knowledge graph, with all of its individuals.
+    """Return the planning problem of a knowledge graph, with all of its individuals.
 
     Parameters
     ----------
     graph : KnowledgeGraph
     schema : Schema, optional
-        If it was read already.
+        The result of `read_schema` if it is known already.
 
     Raises
     ------
     KnowledgeError
-        An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
+        The scene is invalid: for example, a symbol has no value or two values, or a condition lacks a part.
     """
     members = _members(graph)
     schema = read_schema(graph) if schema is None else schema
@@ -87,7 +87,7 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
 
 
 def read_names(graph: KnowledgeGraph) -> Names:
-    """Return the short names of a whole scene, as `read` does, without reading their facts."""
+    """Return the same short names for a whole scene as `read`, without reading facts."""
     return names_of(read_schema(graph), _members(graph))
 
 
@@ -100,7 +100,7 @@ def _members(graph: KnowledgeGraph) -> list[Member]:
 def reading_of(
     scene: str, known: Frame, facts: Iterable[Triple], tuples: Mapping[str, Node], whole: bool = True
 ) -> Reading:
-    """Return the planning problem of a frame's individuals.
+    """Return the planning problem of the individuals in a frame.
 
     Parameters
     ----------
@@ -109,8 +109,9 @@ def reading_of(
     facts : triples of IRIs
         Facts of value properties and relations between the individuals.
     tuples : mapping of IRI to node
-        Facts that are separate nodes.
+        Facts that are nodes.
     whole : bool
+        Whether the frame contains all individuals of the scene.
     """
     schema, names = known.schema, known.names
     relations, stated = facts_of(

@@ -1,10 +1,9 @@
-"""Quantification: a behaviour with free variables becomes a SPARQL query, and its rows the quantified behaviours.
+"""Quantification: a behaviour with parameters becomes a SPARQL query whose rows are the quantified behaviours.
 
-The query has one sub-select per parameter, which yields the individuals of its type in declared order; together they yield
-every assignment in the order that numbers them (PAPER.md section 4): behaviours in declared order, then parameters in theirs,
-then individuals in theirs. `quantify` numbers the rows itself and leaves the order out of its query: the store then yields rows
-one after the other, ten times as fast, and a time limit ends the query. Applicability isn't tested: M counts all quantified
-behaviours.
+The query has one sub-select per parameter, which yields the individuals of the parameter's class. The ID of a quantified behaviour
+follows from the declared order of behaviours, then of parameters, then of individuals (PAPER.md section 4). `quantify` calculates
+the IDs without an ORDER BY clause, which makes the query ten times as fast and lets a time limit stop it. Applicability isn't
+tested: M is the number of all quantified behaviours.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from confab.reasoner.symbols import Behavior, GroundBehavior, Parameter
 
 
 def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[GroundBehavior, ...]:
-    """Return the quantified behaviours of a level with their IDs, from the graph by SPARQL.
+    """Return all quantified behaviours of a level, sorted by ID.
 
     Examples
     --------
@@ -53,7 +52,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
 
 
 def behavior_named(reading: Reading, name: str) -> Behavior:
-    """Return a behaviour by its name; the error for an unknown name has the nearest known name."""
+    """Return the behaviour with a name; raise `KnowledgeError` with the most similar name if the name is unknown."""
     behaviors = reading.problem.domain.behaviors
     if name not in behaviors:
         raise KnowledgeError(f"unknown behaviour '{name}'{nearest(name, behaviors)} (known: {', '.join(behaviors)})")
@@ -63,15 +62,13 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
 def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str:
     """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
 
-    If `ordered`, the rows are in the order of IDs, except if individuals share an index, or have no index and lie in several
-    ontologies.
-
-    If the reading isn't of the whole scene, only its individuals are queried.
+    If `ordered`, the rows are sorted by ID unless individuals share an index, or lack an index and belong to several ontologies. If
+    the reading contains only a part of the scene, the query is restricted to its individuals.
 
     Raises
     ------
     KnowledgeError
-        The type of a parameter has no IRI, because it is the union of several classes.
+        The class of a parameter is a union of several classes, which has no IRI.
     """
     names = [parameter.name for parameter in behavior.parameters]
     order = " ".join(f"{name}_index STR({name})" for name in names) if ordered else ""
@@ -86,7 +83,7 @@ def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str
 
 
 def _select(reading: Reading, parameter: Parameter) -> str:
-    """Return the sub-select that yields the individuals of a parameter's type with their places in the declared order."""
+    """Return the sub-select for the individuals of a parameter's class and their positions in the declared order."""
     name = parameter.name
     return (
         f"  {{ SELECT DISTINCT {name} {name}_index WHERE {{\n"
@@ -97,7 +94,7 @@ def _select(reading: Reading, parameter: Parameter) -> str:
 
 
 def _typed(reading: Reading, term: str, kind: str) -> str:
-    """Return the pattern that a term is of a class; in a slice, that it is one of the individuals of the slice."""
+    """Return the pattern that a term is a member of a class, or one of the class's individuals in a part of a scene."""
     if not reading.whole:
         members = (reading.names.iri(member) for member in reading.problem.classes.get(kind, ()))
         return f"VALUES {term} {{ {' '.join(str(ox.NamedNode(iri)) for iri in members)} }}"

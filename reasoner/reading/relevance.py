@@ -1,15 +1,15 @@
-"""Task recognition: finds the individuals of a large world that a task can need, by few queries.
+"""Task recognition: selection of the individuals in a large world that a task can need, by few queries.
 
-The slice is closed: if a behaviour can change a situated object of the slice, the slice also contains all individuals in its
-conditions and its other effects. So planning in the slice and planning in the whole world have the same answer
-(the proof is in docs/quantification.md, the tests in tests/reasoner/test_recognition.py and test_closure.py). Two steps:
+The selected individuals (the slice) are closed: if a behaviour can change a symbol of the slice, the slice also contains all
+individuals in the behaviour's conditions and other effects. Planning in the slice therefore gives the same result as planning in
+the whole world (proof: docs/quantification.md; tests: test_recognition.py, test_closure.py). Recognition has two steps:
 
-1. `routes` examines the behaviours alone. For each behaviour that can change a situated object, it finds routes from that object
-   to the other terms of its preconditions and effects: forward over a value (the place of the object), over a static
-   relation (a hand that reaches the place), or backward from a value (other objects at the place). For a term without a
-   route, all individuals of its class are needed.
-2. `recognise` starts from the individuals of the goal and follows the routes in the graph, one round per query, until no new
-   individual is found: then no individual outside the slice can help, so a task without a plan in the slice has no plan.
+1. `routes` reads only the behaviours. For each behaviour that can change a symbol, it finds routes from the symbol's object to the
+   other terms of the behaviour: forward to a value (the place of the object), along a static relation (a hand that reaches the
+   place), or backward from a value (other objects at the place). If a term has no route, the slice contains all individuals of
+   the term's class.
+2. `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one step, until a
+   query finds no new individual. A task without a plan in the slice then has no plan in the world.
 """
 
 from __future__ import annotations
@@ -50,17 +50,18 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
-"""Maximum number of queries that follow routes by one step each; after them, one property path closes the slice."""
-FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps that reach a term is taken
+"""Maximum number of queries that follow routes by one step each, before one query with a property path completes the slice."""
+FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # costs of steps; the cheapest step to a term is chosen
 
 
 @dataclass
 class Routes:
-    """Routes from relevant individuals to others, as IRIs.
+    """Properties that lead from relevant individuals to further relevant individuals, as IRIs.
 
-    `forward` has the properties that are followed from subject to object. `backward` has the properties that are followed from
-    object to subject, each with the constants from which it is followed, too. (A constant is a value that a behaviour names,
-    such as "nothing"; many symbols may have it.) `classes` has the classes whose individuals are all relevant.
+    - `forward` contains the properties that are followed from subject to object.
+    - `backward` maps each property that is followed from object to subject to the constants from which it is followed, too.
+      A constant is a value that a behaviour names, such as "nothing"; many symbols may have this value.
+    - `classes` contains the classes whose individuals are all relevant.
     """
 
     forward: set[str] = field(default_factory=set)
@@ -69,23 +70,25 @@ class Routes:
 
 
 def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
-    """Read the individuals of a scene that its task can need; the number of queries doesn't depend on their number.
+    """Return the planning problem of the individuals that a scene's task can need.
+
+    The number of queries doesn't depend on the number of individuals.
 
     Parameters
     ----------
     graph : KnowledgeGraph
     goals : sequence of str
-        Goals that replace some of the task's, as in `confab.reasoner.reading.problem.with_goals`; their individuals are read, too.
+        Goals that replace goals of the task (`confab.reasoner.reading.goals.with_goals`); their individuals are included.
 
     Returns
     -------
     Reading
-        Like the result of `confab.reasoner.reading.problem.read`, with fewer individuals. IDs number these individuals.
+        The result of `confab.reasoner.reading.problem.read` with fewer individuals. Behaviour IDs depend on these individuals.
 
     Raises
     ------
     KnowledgeError
-        As `confab.reasoner.reading.problem.read`, for the individuals that matter.
+        The part of the scene that is read is invalid, as in `confab.reasoner.reading.problem.read`.
 
     Examples
     --------
@@ -95,7 +98,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     """
     schema = read_schema(graph)
     if derived_goals(schema):
-        reading = read(graph, schema)  # their alternatives may be about any individual
+        reading = read(graph, schema)  # derived goals may depend on any individual
         return replace(reading, problem=with_goals(reading.problem, goals))
     constants = constants_of(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)
@@ -115,22 +118,22 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     return replace(reading, problem=with_goals(reading.problem, goals))
 
 
-# ------------------------------------------------------------------------------------------------- 1. what leads to what
+# ------------------------------------------------------------------------------------------------- 1. routes
 
 
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
-    """Return the routes from the individuals of a goal to all individuals that relevant steps can involve or change.
+    """Return the routes from a goal's individuals to all individuals that relevant behaviours can involve or change.
 
-    A behaviour counts if it changes a situation type that counts; a rule counts if it defines one. All situation types in the
-    conditions and effects of a counting behaviour or rule count, too. If a fact is looked up from some of its terms, routes
-    also lead from these terms in effects to the other terms of the behaviour.
+    A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type. All
+    situation types in conditions and effects of relevant behaviours and rules are relevant. If a fact is looked up by some of its
+    terms, routes also lead from these terms in effects to the behaviour's other terms.
 
     Parameters
     ----------
     known : Frame
-        Of the constants alone.
+        The frame of the constants.
     more_situations : iterable of str
-        Situation types that count besides those of the task's goals.
+        Relevant situation types in addition to the situation types in the task's goals.
     """
     found = Routes(forward=set(known.properties) - known.schema.numbers, classes=_goal_classes(known.schema))
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
@@ -141,7 +144,7 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     for total in aggregates:
         total.follow(
             known, found, looked_up
-        )  # each total in the slice follows from all of its facts, also if no step counts
+        )  # a total in the slice depends on all of its facts, even if no behaviour is relevant
     changed = set[str]()
     before = -1
     while before != (before := len(counting) + len(changed) + len(looked_up) + sum(map(len, looked_up.values()))):
@@ -153,13 +156,13 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
         for aggregate in known.domain.aggregates.values():
             quantity = known.domain.situations[aggregate.situation].quantity
             if quantity is not None and quantity.bounded and read_by(aggregate) & changed:
-                counting.add(aggregate.situation)  # its bound may forbid a step
+                counting.add(aggregate.situation)  # its bounds restrict behaviours
                 _span_to_totals(aggregate, changed, known, found, looked_up)
     return found
 
 
 def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
-    """Add the routes from facts that relevant steps change to the individuals whose derived amounts follow from these facts."""
+    """Add the routes from changing facts to the individuals whose derived amounts depend on these facts."""
     kinds = {term.name: term.kind for term in (*aggregate.parameters, *aggregate.variables)}
     named, left = {parameter.name for parameter in aggregate.parameters}, read_by(aggregate) & changed
     for scope in _scopes(aggregate.conditions, kinds):
@@ -168,24 +171,24 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
                 start = {*condition.arguments, condition.value} - {TRUE, FALSE}
                 _span(scope, start, named, known, found, looked_up)
                 left -= {condition.situation}
-    if left:  # the facts are read in another way
+    if left:  # facts in nested conditions
         found.classes.update(known.names.iri(parameter.kind) for parameter in aggregate.parameters)
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
-"""Positions among the terms of situation types from which symbols are looked up, each with the constants that may occur there."""
+"""The (situation type, position of a term) by which facts are looked up, each with the constants that the term may denote."""
 
 
 class _Doing:
-    """A behaviour or rule as recognition follows it: from each effect to the whole step, and from the step to all of its changes.
+    """A behaviour or rule in task recognition, with the routes from each effect to all of its terms and changes.
 
     Attributes
     ----------
     situations : set of str
         The situation types in its conditions and effects.
     step : set of str
-        The parameters, the variables in positive conditions, and the variables that are `always` needed: a total also counts
-        the individuals of a variable without a condition.
+        The parameters, the variables in positive conditions, and the variables in `always`. (A total also depends on the
+        individuals of a variable that occurs in no condition.)
     """
 
     def __init__(self, behavior: Behavior, always: Collection[str] = ()) -> None:
@@ -204,7 +207,7 @@ class _Doing:
         self.spanned = set[tuple[int, frozenset[str]]]()
 
     def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
-        """Add the routes to all individuals of a behaviour that changes a relevant symbol, and to all symbols that it changes."""
+        """Add the routes from each effect to all individuals of the behaviour, and to all symbols that it changes."""
         if not self.spanned:
             for scope in self.asks[1:]:  # negated conditions, and alternatives
                 _span(scope, self.step, set(), known, found, looked_up)
@@ -220,13 +223,13 @@ class _Doing:
 
 
 def _terms_in(effect: Effect) -> set[str]:
-    """Return the terms of an effect: its arguments and its value."""
+    """Return the terms in the arguments and in the value of an effect."""
     given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
     return {*effect.arguments, *given} - {TRUE, FALSE}
 
 
 def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
-    """Yield each term of an effect from which its fact is looked up."""
+    """Yield each term of an effect by which its fact may be looked up."""
     if isinstance(effect, AmountEffect) or effect.value == FALSE:
         return
     for at, term in enumerate(effect.arguments if effect.value == TRUE else (*effect.arguments, effect.value)):
@@ -237,10 +240,7 @@ def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
 
 @dataclass(frozen=True)
 class _Scope:
-    """A conjunction with the classes of its terms.
-
-    The preconditions of a behaviour, or conditions that would prevent the behaviour.
-    """
+    """A conjunction with the classes of its terms: a behaviour's positive preconditions, possibly with a nested conjunction."""
 
     conditions: tuple[Condition, ...]
     kinds: Mapping[str, str]
@@ -249,7 +249,7 @@ class _Scope:
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
     """Return the conjunctions in nested conditions.
 
-    The positive conditions, and these with each alternative and each negated group.
+    The first conjunction contains the positive conditions. Each further one adds an alternative or a negated conjunction to them.
     """
     leaves: list[Condition] = []
     groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []
@@ -274,7 +274,7 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
 
 
 def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
-    """Add the cheapest steps by which all terms of a conjunction, and some further terms, are reached from given terms."""
+    """Add the cheapest routes from the terms in `start` to all terms of a conjunction and to the terms in `more`."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more
     reached = start | {t for t in in_use if not t.startswith("?")}
@@ -299,10 +299,10 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 
 @dataclass(frozen=True)
 class _Step:
-    """One route from a term to another: the properties to follow, and its cost.
+    """A route from one term of a condition to another: the properties to follow, and the cost.
 
-    `constants` may occur in place of the source; `looks_up` is the position of the source, unless the source alone determines
-    the symbol.
+    `constants` are the individuals that the source may denote. `looks_up` is the situation type and the source's position in it; it
+    is None if the source alone determines the symbol.
     """
 
     source: str
@@ -315,9 +315,9 @@ class _Step:
 
 
 def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
-    """Yield the steps that a positive condition allows: between any two of its terms, by stated facts.
+    """Yield the routes between any two terms of a positive condition along stated facts.
 
-    Facts that are nodes of their own are always followed from their first argument.
+    Facts that are nodes are always followed from their first argument.
     """
     arguments: tuple[str, ...]
     match condition:
@@ -327,7 +327,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
             situation, arguments = known.domain.situations[name], about if value == TRUE else (*about, value)
             properties = frozenset(p for p, (of, _) in known.properties.items() if of == name)
         case _:
-            return  # facts of rules aren't stated: the rules' conditions are followed
+            return  # derived facts aren't stated; the conditions of their rules are followed
     if len(arguments) != 2:
         properties = frozenset()
     nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
@@ -335,7 +335,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
         situation is not None
         and len(arguments) > len(situation.arguments)
         and (situation.default in _constants(arguments[-1], scope, known))
-    )  # a symbol that has the default may not be stated: none of its arguments can be found by it
+    )  # facts with a default value may be unstated, so they can't be used to find arguments
     for at, source in enumerate(arguments):
         kind = scope.kinds.get(source)
         constants = _constants(source, scope, known)
@@ -366,14 +366,17 @@ def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
     return frozenset({term} if kind is None else known.classes.get(kind, ()))
 
 
-# ------------------------------------------------------------------------------------------------- 2. following it
+# ------------------------------------------------------------------------------------------------- 2. search
 
 
 class _Search(Individuals):
-    """The individuals that recognition has read, and the routes from them."""
+    """The individuals that task recognition has read, and the search along routes."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes from the first individuals until no new ones are found, in rounds and then by one property path."""
+        """Follow the routes from the first individuals until no new individual is found.
+
+        The first `ROUNDS` queries follow the routes by one step each; then one query follows a property path.
+        """
         reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):
@@ -393,7 +396,7 @@ class _Search(Individuals):
             self._close_by_path(reached - asked, bounds)
 
     def _follow(self, triples: Sequence[Triple], bounds: Routes, reached: set[str]) -> None:
-        """Add the individuals to which some triples lead to `reached`."""
+        """Add to `reached` the individuals to which the routes lead along some triples."""
         kinds = self.below(bounds.classes)
         facts = set[str]()
         backward = bounds.backward.keys() - {*PLACES}
@@ -412,7 +415,10 @@ class _Search(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read everything that the routes reach from a frontier; a path doesn't distinguish constants, so it may reach more."""
+        """Read all individuals that the routes reach from a frontier.
+
+        A property path doesn't treat constants separately, so it may reach more individuals than necessary.
+        """
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
             node = "|".join(f"<{p}>" for p in PLACES)
@@ -427,10 +433,10 @@ class _Search(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return the namesakes of a part of the scene: individuals and classes with the same local name, in all known namespaces.
+    """Return the IRIs in known namespaces with the local name of a read individual or class.
 
-    Each possible IRI is looked up separately, so that no other row is read. As in the whole scene, an individual counts if it
-    has a class, and a class counts if it has individuals that aren't nodes of the schema.
+    Each candidate IRI is looked up by itself. As in a whole scene, an individual is included only if it has a class, and a class
+    only if it has individuals that aren't nodes of the schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -454,7 +460,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
 
 
 def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[str]:
-    """Return the namespaces of some terms, the namespaces for which files have prefixes, and those of other ontologies."""
+    """Return the namespaces of some terms, of the files' prefixes and of the loaded ontologies."""
     found = {iri.removesuffix(local_name(iri)) for iri in terms if ":" in iri}
     found |= {*graph.prefixes.values()} - ({*PREFIXES.values()} - {CORE})
     for ontology in schema.ontologies:
@@ -468,7 +474,7 @@ def _goal_situations(schema: Schema) -> set[str]:
 
 
 def _goal_individuals(schema: Schema) -> set[str]:
-    """Return the individuals in goals and in facts without arguments."""
+    """Return the individuals in goals and in facts that have no arguments."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
     named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}
@@ -476,7 +482,7 @@ def _goal_individuals(schema: Schema) -> set[str]:
 
 
 def _goal_classes(schema: Schema) -> set[str]:
-    """Return the classes in goals about all individuals of a class, and in goals that exclude a value."""
+    """Return the classes in goals about all individuals of a class, and the classes of values that goals exclude."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
     negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))
@@ -484,9 +490,9 @@ def _goal_classes(schema: Schema) -> set[str]:
 
 
 def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:
-    """Return the individuals that the words of goals can mean, by their short names.
+    """Return the individuals whose short names occur in the texts of goals.
 
-    They are looked up in the known namespaces; an individual that isn't found there is looked up among all individuals.
+    The names are looked up in the known namespaces first, and otherwise among all individuals.
     """
     words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split() if not BOUNDS.fullmatch(word)}
     if not words:

@@ -1,6 +1,6 @@
-"""A scene with other facts or goals: a copy of its graph in which a symbol has another value or another goal value.
+"""Copies of a scene's graph with other facts, other goals or additional refutations.
 
-Refutations (`confab.reasoner.refutations`) are also stated here, as preconditions.
+A refutation (`confab.reasoner.refutations`) becomes a precondition.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ Node = Mapping[str, str]
 
 
 def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph with some facts replaced.
+    """Return a copy of a graph in which the given facts replace the facts about the same symbols.
 
-    The caller has to infer consequences again.
+    The caller has to run inference on the copy.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 
 
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph with some goals replaced."""
+    """Return a copy of a graph in which the given goals replace the goals for the same symbols."""
     copy = _copied(graph)
     asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
     task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")
@@ -84,7 +84,7 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
 
 
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
-    """Return a copy of a graph with some refutations, stored with the scene's geometry."""
+    """Return a copy of a graph with additional refutations, stored in the graph of the scene's geometry."""
     copy, target = _copied(graph), ox.NamedNode(BASE + "reach")
     added = (triple for one in refutations for triple in refuted(graph, reading, one))
     copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in added)
@@ -92,7 +92,7 @@ def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[
 
 
 def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterator[ox.Triple]:
-    """Yield the triples of a refutation: the negated conjunction of these arguments and these facts."""
+    """Yield the triples of a refutation, a precondition that excludes the combination of its arguments and facts."""
     behavior = reading.names.iri(one.behavior)
     terms = [row[1] for row in graph.select(PARAMETERS, SCENE, behavior=behavior)]
     if len(terms) != len(one.arguments):
@@ -105,7 +105,7 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
     yield from _individual(every, "AllOf", "all of this", {})
     for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
         if not argument:
-            continue  # any value
+            continue  # refuted for all arguments
         part = ox.NamedNode(f"{node.value}.argument{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
         same = equality_properties(text(term), reading.names.iri(argument))
@@ -117,12 +117,12 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
 
 
 def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
-    """Return the property that states the values of a situation type, by the type's IRI."""
+    """Return the value property of each situation type that has one; keys and values are IRIs."""
     return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
 
 
 def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
-    """Yield the triples of a fact: by its value property if possible, otherwise as a node. False facts aren't stated."""
+    """Yield the triples of a fact: a statement of its value property if possible, otherwise a node. A false fact has no triples."""
     iri, symbol, value = reading.names.iri, fact.symbol, fact.value
     if value == FALSE:
         return
@@ -146,7 +146,7 @@ def _counted(reading: Reading, symbol: Symbol) -> bool:
 
 
 def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Triple]:
-    """Yield a value condition on individuals, or a comparison of an amount."""
+    """Yield the triples of the value condition or comparison that is equivalent to a fact."""
     iri, symbol, value = reading.names.iri, goal.symbol, goal.value
     situation, arguments = iri(symbol.situation), [*map(iri, symbol.arguments)]
     if _counted(reading, symbol):
@@ -164,14 +164,14 @@ def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Tri
 
 
 def _individual(node: ox.NamedNode, kind: str, label: str, properties: Properties) -> Iterator[ox.Triple]:
-    """Yield the type of a node, a class of the core, its label and its properties."""
+    """Yield the triples of a node: its core class, its label and its properties."""
     yield from triples(node, {TYPE: [INDIVIDUAL, CORE + kind]})
     yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(label, language="en"))
     yield from triples(node, properties)
 
 
 def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:
-    """Return the nodes of conditions or facts about a symbol."""
+    """Return the nodes of the conditions or facts about a symbol."""
     nodes: dict[ox.NamedNode | ox.BlankNode, dict[str, str]] = {}
     for node, prop, value in graph.select(query, SCENE):
         if isinstance(node, ox.NamedNode | ox.BlankNode):

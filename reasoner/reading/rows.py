@@ -1,4 +1,4 @@
-"""Converts the rows of queries to nodes (subject → property → values), and checks the kind of each value."""
+"""Conversion of query results to nodes (subject → property → values), with checks of the values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
-FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, by name
+FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, sorted by name
 DATA = frozenset(
     CORE + name
     for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct", "never", "always")
@@ -29,7 +29,7 @@ DATA = frozenset(
 DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
-"""The properties of the core whose values are numbers, signs, durations, truth values and text; all others lead to nodes."""
+"""Core properties whose values are literals; the values of all other core properties are nodes."""
 OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
@@ -37,18 +37,20 @@ HIGHEST_NUMBER = 10**9
 
 Triple = tuple[str, str, str]
 Member = tuple[str, str, int]
-"""An individual, a class of it, and its index."""
+"""An individual, one of its classes, and its index."""
 
 
 @dataclass(frozen=True)
 class Schema:
-    """The rows that are the same for every individual: those of `SCHEMA`, as IRIs.
+    """The part of an ontology that doesn't depend on individuals: the rows of `SCHEMA`, as IRIs.
 
-    `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
-    property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` is True if some facts
-    are separate nodes, and `facts` has the facts without arguments; `expressions` are the definitions of classes, `axioms` the
-    axioms about value properties, `swrl` the rules; `ontologies` the IRIs of the loaded files; `exclusive` are the situation
-    types whose values physics gives to one individual at a time.
+    - `nodes` contains situation types, behaviours with their parts, relations and tasks.
+    - `pairs` contains the situation types whose value property isn't functional.
+    - `whole` contains the amounts whose value property has the range of whole numbers.
+    - `tuples` states whether some facts are nodes; `facts` contains the facts without arguments.
+    - `expressions` contains the definitions of classes, `axioms` the axioms about value properties, `swrl` the SWRL rules.
+    - `ontologies` contains the IRIs of the loaded files.
+    - `exclusive` contains the situation types for which physics gives a value to only one individual at a time.
     """
 
     nodes: Mapping[str, Node]
@@ -67,7 +69,7 @@ class Schema:
 
     @cached_property
     def by_kind(self) -> Mapping[str, Sequence[str]]:
-        """The nodes of each class that they are stated to belong to, in the order of their IRIs."""
+        """The nodes of each class that a node is stated to belong to, sorted by IRI."""
         found: dict[str, list[str]] = defaultdict(list)
         for iri, node in self.nodes.items():
             for kind in node[TYPE]:
@@ -76,24 +78,24 @@ class Schema:
 
     @cached_property
     def numbers(self) -> frozenset[str]:
-        """The properties that lead to numbers: value properties of amounts, and relations that give one."""
+        """The properties whose values are numbers: value properties of amounts, and relations that are datatype properties."""
         amounts = {p for iri in self.of_kind("Amount") for p in self.nodes[iri].get(CORE + "valueProperty", ())}
         return frozenset(amounts.union(self.by_kind.get(OWL + "DatatypeProperty", ())))
 
     @cached_property
     def individuals_of(self) -> frozenset[str]:
-        """The classes of objects: in place of an individual, they denote all of their members."""
+        """The classes of objects, which stand for all of their members if they replace an individual in a condition or effect."""
         known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}
         known |= {iri for iri, node in self.expressions.items() if OWL + "equivalentClass" in node}
         return frozenset(known - self.nodes.keys())
 
     def of_kind(self, *kinds: str) -> list[str]:
-        """Return the nodes of some classes of the core."""
+        """Return the nodes of some core classes."""
         return [iri for kind in kinds for iri in self.by_kind.get(CORE + kind, ())]
 
 
 def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
-    """Return the statements about each subject: the subjects in order, and the values of each property."""
+    """Return the properties and values of each subject, sorted by subject and value."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for subject, predicate, value in triples:
         nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
@@ -105,7 +107,7 @@ def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, lis
 
 
 def core_triple(row: Sequence[Term]) -> Triple:
-    """Return a triple as text, after a check that no text stands in place of a name."""
+    """Return a triple as text; raise `KnowledgeError` if a literal is the value of a property whose values are nodes."""
     subject, predicate, value = row
     named = text(predicate)
     return (
@@ -114,12 +116,12 @@ def core_triple(row: Sequence[Term]) -> Triple:
 
 
 def link(row: Sequence[Term], blank: bool = False) -> Triple:
-    """Return a triple that leads from one individual to another, as text; only nodes of the core may have no name.
+    """Return a triple between two individuals as text; blank nodes are allowed only if `blank`.
 
     Raises
     ------
     KnowledgeError
-        A text, or something without a name, stands where an individual belongs.
+        The subject or the value is a literal, or a blank node that isn't allowed.
     """
     subject, predicate, value = row
     if text(predicate) in OF_ONTOLOGIES:
@@ -138,7 +140,7 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
 
 
 def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
-    """Return a fact as text: a link, or an amount if its property leads to numbers."""
+    """Return a fact as text; the value is a number if the property is one of `numbers`."""
     subject, predicate, value = row
     if text(predicate) not in numbers:
         return link(row)
@@ -149,12 +151,12 @@ def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
 
 
 def decimal(text: str, what: str) -> Fraction:
-    """Return a number that occurs in an ontology, exact.
+    """Return the exact value of a number in an ontology.
 
     Raises
     ------
     KnowledgeError
-        It is none.
+        The text isn't a number.
     """
     found = exact(text)
     if found is None:
@@ -163,19 +165,19 @@ def decimal(text: str, what: str) -> Fraction:
 
 
 def index_of(iri: str, index: str) -> int:
-    """Return the position of a node in the declared order; nodes without an index come last."""
+    """Return the position of a node in the declared order; a node without an index comes last."""
     if not index:
         return FIRST_INDEX_OF_NONE
     return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
 
 
 def whole_number(text: str, what: str, least: int, most: int) -> int:
-    """Return a number that occurs in an ontology.
+    """Return a whole number in an ontology.
 
     Raises
     ------
     KnowledgeError
-        It is none, or out of range.
+        The text isn't a whole number between `least` and `most`.
     """
     number = int(text) if re.fullmatch(r"[+-]?\d{1,18}", text) else None
     if number is None or not least <= number <= most:
@@ -184,13 +186,13 @@ def whole_number(text: str, what: str, least: int, most: int) -> int:
 
 
 def is_a(node: Node, *kinds: str) -> bool:
-    """Return whether a node is of one of some classes of the core."""
+    """Return whether a node is stated to belong to one of some core classes."""
     types = node[TYPE]
     return any(CORE + kind in types for kind in kinds)
 
 
 def ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> list[str]:
-    """Return nodes by their index, then by name."""
+    """Return nodes sorted by index, then by name."""
 
     def key(iri: str) -> tuple[int, str]:
         if iri not in nodes:
@@ -215,7 +217,7 @@ def superclasses(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
 def classes_of(
     instances: Sequence[Member], supers: Mapping[str, Sequence[str]], names: Names
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
-    """Return the individuals of each class in declared order, superclasses included, and each class's direct superclasses."""
+    """Return the individuals of each class and its subclasses in declared order, and each class's direct superclasses."""
     above: dict[str, frozenset[str]] = {}
 
     def closure(kind: str) -> frozenset[str]:
@@ -245,7 +247,7 @@ def classes_of(
 
 
 def derived_goals(schema: Schema) -> list[str]:
-    """Return the goals that aren't facts: alternatives, witnesses, and comparisons of more than an amount and a number."""
+    """Return the goals that aren't facts, for example alternatives, witnesses, and comparisons of two amounts."""
     extrema = {
         situation
         for iri in schema.of_kind("Rule")

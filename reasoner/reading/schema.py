@@ -1,4 +1,4 @@
-"""The part of an ontology without individuals, read in one query: behaviours, situation types, classes, definitions."""
+"""Reading of the part of an ontology that doesn't depend on individuals: behaviours, situation types, classes and definitions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nod
 from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
-"""Properties whose values are texts; endpoints return these texts in full."""
+"""Properties whose values are whole texts (updates and queries)."""
 KINDS = (
     "SituationType",
     "Behavior",
@@ -26,7 +26,7 @@ KINDS = (
     "Calculation",
     "Rule",
     "Window",
-)  # of the schema's nodes
+)  # core classes of the schema's nodes
 SCHEMA = f"""
 SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
@@ -51,22 +51,22 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
   UNION {{ {swrl.RULES} BIND("swrl" AS ?part) }}
 }}"""
-"""The rows that every planning call in a world needs, in one query; ``tuples`` says that some facts are nodes.
+"""Selects the rows that every planning call in a world needs; a row with the part ``tuples`` means that some facts are nodes.
 
-No query of this module orders its rows: a store takes longer to order rows than to find them, and results are
-ordered where the order matters (`nodes_of`, `classes_of`, `initial_state`).
+The query has no ORDER BY, because sorting takes a store longer than finding the rows. Results are sorted where the order matters
+(`nodes_of`, `classes_of`, `initial_state`).
 """
 
 
 def read_schema(graph: KnowledgeGraph) -> Schema:
-    """Read the rows that don't depend on the number of individuals, in one query."""
+    """Return the part of an ontology that doesn't depend on individuals, read by one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
     for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
         if not count % 4096:
             check("reading the scene")
         parts[text(part)].append(core_triple(row))
     written = [triple for triple in parts["node"] if graph.remote and triple[1] in TEXTS]
-    if written:  # a store elsewhere has the text alone
+    if written:  # a remote store contains only the texts of updates
         from confab.reasoner.updates.compiling import compiled
 
         found = compiled(lambda query: graph.select(query, SCENE), {}, graph.prefixes)

@@ -1,8 +1,7 @@
-"""A part of a scene that grows with the dependencies of a check, read without the routes of task recognition.
+"""A part of a scene that is extended by the lookups of a check, independently of the routes of task recognition.
 
-A checker states the individuals that it looks up: members of a class that initially satisfy conditions. One query asks the
-graph for all of them. The individuals found are read with their values. This is repeated until no individual that is looked up
-is missing.
+A checker states the individuals that it looks up as members of a class that initially satisfy conditions. One query finds all of
+them, and their values are read. This is repeated until the lookups find no new individual.
 """
 
 from __future__ import annotations
@@ -29,16 +28,18 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""Situation types or relations as IRIs, each with the positions of the sought individual."""
+"""Situation types or relations as IRIs, each with a flag per argument: whether it is the looked-up individual."""
 
 
 class Surroundings:
-    """Individuals of a scene with all their facts: initially those of a slice, of classes in goals, and constants.
+    """A growing set of a scene's individuals with all their facts.
+
+    Initially, it contains the individuals of a slice, the members of classes in goals, and the constants.
 
     Attributes
     ----------
     individuals : Individuals
-        The individuals read.
+        The individuals that have been read.
     """
 
     def __init__(self, graph: KnowledgeGraph, slice_: Reading) -> None:
@@ -54,14 +55,14 @@ class Surroundings:
         self._known: Frame | None = None
 
     def _classes_of_goals(self) -> set[str]:
-        """Return every class in a goal, and the classes of values that a goal excludes."""
+        """Return the classes in goals, and the classes of the values that goals exclude."""
         goals = [self.schema.nodes.get(iri, {}) for iri in goal_conditions(self.schema)]
         named = {v for node in goals for values in node.values() for v in values}
         values = {v for node in goals if CORE + "negated" in node for v in node.get(CORE + "situationType", ())}
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read some individuals, members of some classes, and all individuals in their values."""
+        """Read some individuals, the members of some classes, and all individuals that their values lead to."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)
@@ -71,28 +72,28 @@ class Surroundings:
 
     @property
     def frame(self) -> Frame:
-        """The behaviours and classes of the individuals read."""
+        """The domain and the classes of the individuals that have been read."""
         if self._known is None:
             self._known = frame(self.schema, self.individuals.members(), self.names.iris)
         return self._known
 
     @property
     def agree(self) -> bool:
-        """Whether everything in the slice has the same name here."""
+        """Whether the names of the slice have the same meaning here."""
         return self.names.agree(self.frame.names)
 
     @property
     def lifted(self) -> Mapping[str, Behavior]:
-        """The behaviours before effects on all of a class are expanded."""
+        """The behaviours in which an effect may be on all members of a class."""
         return self.frame.lifted
 
     def problem(self) -> Problem:
-        """Return the planning problem of the individuals read."""
+        """Return the planning problem of the individuals that have been read."""
         facts, tuples = self.individuals.facts(self.frame), self.individuals.tuples()
         return reading_of(self.graph.scene, self.frame, facts, tuples, whole=False).problem
 
     def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
-        """Read the individuals that some lookups find, for each row of known terms; return whether an individual is new."""
+        """Read the individuals that lookups find for each row of known terms; return whether an individual is new."""
         classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
         for (witness, known), rows in lookups.items():
             for row in rows:
@@ -119,7 +120,7 @@ class Surroundings:
         return bool(fresh)
 
     def _asked(self, variable: str, conditions: Iterable[Condition]) -> Iterator[tuple[str, tuple[str | None, ...]]]:
-        """Yield the conditions on stated facts, each by its IRI and terms, with None for the variable."""
+        """Yield each condition on stated facts as its IRI and terms; None stands for the variable."""
         iri, situations, rules = self.frame.names.iri, self.frame.domain.situations, self.frame.domain.rules
         for condition in conditions:
             match condition:
@@ -135,7 +136,7 @@ class Surroundings:
             yield name, tuple(None if t == variable else iri(t) for t in terms)
 
     def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
-        """Return a graph pattern that binds ``?x`` to all individuals with stated facts, with the known terms of each row."""
+        """Return a graph pattern that binds ``?x`` to the individuals with stated facts of a shape, for each row of known terms."""
         number, parts = 0, []
         at = "|".join(f"<{place}>" for place in PLACES)
         for i, (name, places) in enumerate(shape):

@@ -1,19 +1,20 @@
-"""SWRL rules, as Protégé writes them, compiled into rules of situation types.
+"""Compilation of SWRL rules, in the form that Protégé writes, into rules of situation types.
 
 ===========================================  ==================================================================
 in SWRL                                      in `confab.reasoner.symbols`
 ===========================================  ==================================================================
-head ``isInside(?x, ?z)``                    `Rule` of the situation type with that value property
+head ``isInside(?x, ?z)``                    `Rule` of the situation type with this value property
 head ``Heavy(?x)``                           `Rule` of the situation type that ``:holdsOf`` the class
-``Cup(?x)``, the first such of ``?x``        the class of the term; else a `ClassCondition`, or what defines it
+first class atom ``Cup(?x)`` of ``?x``       the class of the term ``?x``
+further class atoms of ``?x``                `ClassCondition`, or the conditions of the class's definition
 ``liesIn(?x, ?y)``                           `ValueCondition` or `RelationCondition`
 ``sameAs``, ``differentFrom``                `EqualityCondition`
 ``weight(?x, ?w)``                           ``?w`` denotes the amount
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
-A variable that occurs only in the body is determined by a functional value property; otherwise it becomes the variable of a
-`Witness`. Rules are DL-safe: variables denote the scene's individuals.
+A variable that occurs only in the body is determined by a functional value property, or becomes the variable of a `Witness`.
+Rules are DL-safe: variables denote only named individuals of the scene.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ RULES = f"""{{ ?rule a <{SWRL}Imp> .
       ?rule (<{SWRL}body>|<{SWRL}head>|rdf:first|rdf:rest|<{SWRL}arguments>|<{SWRL}classPredicate>|{INSIDE})* ?node .
       ?node ?property ?value . FILTER(isBlank(?node) || ?node = ?rule) }} UNION
     {{ ?node a <{SWRL}Variable> . BIND(rdf:type AS ?property) BIND(<{SWRL}Variable> AS ?value) }}"""
-"""The part of a SPARQL query that yields every SWRL rule with its parts, as (node, property, value)."""
+"""SPARQL pattern for all SWRL rules and their parts, as (node, property, value)."""
 
 COMPARES = {"lessThan": "<", "lessThanOrEqual": "<=", "equal": "=", "greaterThanOrEqual": ">=", "greaterThan": ">"}
 COMPUTES = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
@@ -54,11 +55,11 @@ _FIRST, _REST = RDF + "first", RDF + "rest"
 
 Node = Mapping[str, Sequence[str]]
 Atom = tuple[str, tuple[str, ...]]
-"""A predicate, and its arguments: IRIs of variables and individuals, or the text of numbers."""
+"""A predicate and its arguments: IRIs of variables and individuals, or numbers as text."""
 
 
 def heads(nodes: Mapping[str, Node]) -> set[str]:
-    """Return the classes that rules conclude."""
+    """Return the classes in the heads of the rules."""
     atoms = (node for node in nodes.values() if SWRL + "ClassAtom" in node.get(TYPE, ()))
     by_atom = {id(atom): atom.get(SWRL + "classPredicate", [""])[0] for atom in atoms}
     found = set()
@@ -70,7 +71,7 @@ def heads(nodes: Mapping[str, Node]) -> set[str]:
 
 
 def _rules(nodes: Mapping[str, Node]) -> list[str]:
-    """Return the enabled rules."""
+    """Return the rules that aren't disabled."""
     return [
         iri
         for iri, node in nodes.items()
@@ -88,7 +89,7 @@ def _cells(nodes: Mapping[str, Node], start: Sequence[str]) -> Iterator[str]:
 
 
 def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -> dict[str, list[Rule]]:
-    """Return the SWRL rules, by the IRI of their situation types.
+    """Return the rules that are equivalent to SWRL rules, by the IRI of their situation type.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -
     Raises
     ------
     KnowledgeError
-        A rule has atoms that planning doesn't evaluate; the message has the rule, and an alternative.
+        A rule contains an atom that planning doesn't support; the message names the rule and an alternative.
     """
     found: dict[str, list[Rule]] = {}
     for iri in _rules(definitions.nodes):
@@ -110,7 +111,7 @@ def compiled(definitions: Definitions, arguments: Mapping[str, Sequence[str]]) -
 
 @dataclass
 class _Imp:
-    """One SWRL rule: the meaning of its variables, and the conditions of its body."""
+    """The compilation of one SWRL rule: the classes and numbers of its variables, and the conditions of its body."""
 
     definitions: Definitions
     arguments: Mapping[str, Sequence[str]]
@@ -123,7 +124,7 @@ class _Imp:
         body = self._atoms("body")
         self._numbers(body)
         for atom in sorted(body, key=lambda atom: (len(atom[1]) != 1, self.definitions.changes(atom[0]))):
-            self._said(*atom)  # classes first: they determine the kind of a variable
+            self._said(*atom)  # class atoms first, because they determine variables' classes
         for predicate, said in self._atoms("head"):
             yield self._concluded(predicate, said)
 
@@ -167,7 +168,7 @@ class _Imp:
         return sorted(found)
 
     def _numbers(self, body: Sequence[Atom]) -> None:
-        """Determine the expressions of numeric variables."""
+        """Determine the numeric expressions that variables denote."""
         numbers = self.definitions.numbers
         for predicate, said in body:
             if predicate in numbers and len(said) == 2 and self.variable(said[1]):
@@ -203,7 +204,7 @@ class _Imp:
         return found
 
     def _said(self, predicate: str, said: tuple[str, ...]) -> None:
-        """Record the condition of an atom of the body."""
+        """Record the condition of an atom in the body."""
         definitions = self.definitions
         terms = tuple(map(self.term, said)) if not predicate.startswith(BUILT_IN) else ()
         if predicate in ("sameAs", "differentFrom"):
@@ -245,7 +246,7 @@ class _Imp:
     # -------------------------------------------------------------------------------------------------------- concluding
 
     def _concluded(self, predicate: str, said: tuple[str, ...]) -> tuple[str, Rule]:
-        """Return the situation type that an atom of the head concludes, and its rule."""
+        """Return the situation type that an atom of the head concludes, and the rule for it."""
         definitions = self.definitions
         if len(said) == 1 and predicate in definitions.concluded:
             situation = definitions.concluded[predicate][0]
@@ -290,7 +291,7 @@ class _Imp:
     def _nested(
         self, asked: Sequence[Condition], bound: set[str], sought: Sequence[str], variables: list[Parameter]
     ) -> tuple[Condition, ...]:
-        """Return conditions with witnesses for further variables, unless a value determines them."""
+        """Return conditions in which each further variable is determined by a value or bound by a nested witness."""
         here = tuple(condition for condition in asked if mentions(condition) <= bound)
         rest = [condition for condition in asked if condition not in here]
         if not sought:

@@ -1,4 +1,4 @@
-"""The times of a scene besides its behaviours: deadlines of goals, windows of individuals, and events at fixed times."""
+"""The times that a scene states: deadlines of goals, time windows of individuals, and behaviours at fixed times."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from confab.reasoner.symbols import Problem, Symbol, Times, ValueCondition
 
 
 def with_times(problem: Problem, parts: Parts, schema: Schema) -> Problem:
-    """Return a problem with the times that its scene states; the same problem if it states none.
+    """Return a problem with the times that its scene states; return the problem itself if the scene states no times.
 
     Raises
     ------
     KnowledgeError
-        A deadline belongs to a goal that is no fact, a window ends before it begins, or a window belongs to no individual.
+        A goal with a deadline isn't a fact that behaviours change, or a time window is empty.
     """
     times = Times(deadlines(problem, parts, schema), windows(problem, parts, schema), {}, happenings(parts, schema))
     return replace(problem, times=times) if times != Times() else problem
 
 
 def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fraction]:
-    """Return the deadline of each goal that has one."""
+    """Return the deadline in seconds of each goal that has a deadline."""
     found: dict[Symbol, Fraction] = {}
     for task in schema.of_kind("Task"):
         for iri in parts.values(task, "goal"):
@@ -46,12 +46,12 @@ def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fr
 
 
 def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[tuple[Fraction, Fraction | None], ...]]:
-    """Return the windows of time in which individuals are available."""
+    """Return the time windows, in seconds, in which individuals are available."""
     found: dict[str, list[tuple[Fraction, Fraction | None]]] = defaultdict(list)
     for iri in schema.of_kind("Window"):
         individual = parts.names.short(parts.one(iri, "ofIndividual"))
         if individual not in problem.individuals:
-            continue  # of a part of the scene that this task doesn't need
+            continue  # the individual isn't in the task's part of the scene
         low, high = parts.seconds(iri, "availableFrom") or Fraction(0), parts.seconds(iri, "availableUntil")
         if high is not None and high <= low:
             raise KnowledgeError(f"<{iri}>: the window of {individual} ends at {high} s and begins at {low} s")
@@ -60,7 +60,7 @@ def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[t
 
 
 def happenings(parts: Parts, schema: Schema) -> dict[str, Fraction]:
-    """Return the times of the behaviours that happen by themselves."""
+    """Return the time in seconds of each behaviour that happens at a fixed time."""
     found = {}
     for iri in schema.of_kind("Behavior"):
         at = parts.seconds(iri, "happensAt")
