@@ -1,1 +1,1 @@
-"""Validation of an ontology: faults with position, cause and remedy."""
+"""Validation of ontologies: faults with their position, cause and remedy."""

@@ -1,4 +1,4 @@
-"""Rules on behaviours: undetermined variables, unreachable values, effects without a refinement."""
+"""Validation rules on behaviours: undetermined variables, unreachable values, and effects without a refinement."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
 
 EVERY_OTHER = re.compile(r"\?each\d")
-"""Names for the members of a class that a condition refers to (`confab.reasoner.reading.parts`)."""
+"""Names of the variables for members of a class that a condition refers to (`confab.reasoner.reading.parts`)."""
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
-    """Find undetermined variables of effects and negated conditions."""
+    """Find variables of effects and negated conditions that no positive condition determines."""
     if case.reading is None:
         return
     domain = case.reading.problem.domain
@@ -57,7 +57,7 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
 
 
 def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
-    """Return the free variables of a conjunction; variables that it determines are added to `bound`."""
+    """Return the undetermined variables of a conjunction, and add the determined variables to `bound`."""
     waiting = list(conditions)
     progress = True
     while progress:
@@ -82,7 +82,7 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
-    """Find effects on all members of a class whose `when` refers to all members of an overlapping class."""
+    """Find effects on all members of a class whose `when` refers to all members of another class with common members."""
     if case.reading is None:
         return
     problem = case.reading.problem
@@ -102,10 +102,10 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
-    """Find values that behaviours or goals require and that are neither initial nor the effect of any behaviour.
+    """Find values that behaviours or goals require and that are neither initial values nor values of an effect.
 
-    A value that is unreachable only because of another unreachable value is reported with the other value. Behaviours without
-    objects in the scene belong to other scenes: these behaviours, and values that depend on them, aren't reported.
+    If a value is unreachable only because of another unreachable value, one finding reports both. Behaviours without objects in
+    the scene aren't reported, because they belong to other scenes.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -125,7 +125,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     wanted = {
         (symbol.situation, value): symbol
         for symbol, value in problem.goal.items()
-        if problem.domain.situations[symbol.situation].quantity is None  # planning calculates its values
+        if problem.domain.situations[symbol.situation].quantity is None  # amounts are checked by another rule
         and problem.initial.get(symbol, FALSE) != value
         and (symbol.situation, value) not in there
     }
@@ -155,7 +155,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         )
     for (situation, value), symbol in wanted.items():
         if any((situation, value) in given[name] for name in (*waiting, *contradictory)):
-            continue  # it follows from facts about these
+            continue  # the finding on the behaviour reports it
         yield (
             names.iri(symbol.arguments[0]),
             f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
@@ -165,12 +165,12 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
 
 
 def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
-    """Return the initial values, each with its situation type."""
+    """Return the (situation type, value) pairs that hold initially or may hold without a behaviour."""
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
     for situation in problem.domain.situations.values():
-        # Other sources may change symbols that no behaviour changes; situation types without objects are skipped.
+        # Symbols that no behaviour changes may be changed by something else; situation types without objects are ignored.
         present = all(problem.classes.get(kind) for kind in situation.arguments)
         if situation.name not in changed or not present:
             there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
@@ -179,7 +179,7 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
 
 
 def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
-    """Return the values that a behaviour can produce, temporarily or finally, each with its situation type."""
+    """Return the (situation type, value) pairs that a behaviour can make true at its start or end."""
     effects = [*behavior.effects, *(e for e in timing_of(behavior).made(Span.START) if isinstance(e, ValueEffect))]
     return {(e.situation, value) for e in effects for value in _individuals(e.value, behavior, problem)}
 
@@ -194,12 +194,12 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield groups of behaviours that depend only on each other: the causes of the other findings."""
+    """Yield each group of behaviours that need only each other; they are the cause of the other findings."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
         if name in seen or not reached <= needs.keys():
-            continue  # it needs a behaviour whose conditions exclude each other, reported by another rule
+            continue  # it needs a behaviour with contradictory conditions, which another rule reports
         if all(name in _reached(other, needs) for other in reached - {name}):
             seen |= reached
             yield reached
@@ -219,7 +219,7 @@ def _possible(condition: Condition, behavior: Behavior, problem: Problem, there:
 
 
 def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[str]:
-    """Return the individuals that a term can denote; none for a term that is bound inside a condition."""
+    """Return the individuals that a term can denote; return no individual for a variable bound inside a condition."""
     if not term.startswith("?"):
         return (term,)
     kinds = behavior.kinds
@@ -227,13 +227,13 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
 
 
 def _words(condition: Condition, behavior: Behavior) -> str:
-    """Return the requirement of a condition in words, with classes in place of its terms."""
+    """Return a condition in words, in which classes replace the variables."""
     kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
     return said(substituted(condition, kinds)).replace("?", "")
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects none of whose values is an effect on the next level."""
+    """Find effects whose values are never produced by a behaviour of the next level, although it changes the situation type."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -262,7 +262,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
-    asks: dict[tuple[str, str], set[str]] = {}  # for each given value, the classes of which no member may have it
+    asks: dict[tuple[str, str], set[str]] = {}  # for each value, the classes whose members must not have it
     for behavior in problem.domain.behaviors.values():
         for effect in behavior.effects:
             free = {kind for c in behavior.preconditions if (kind := _none_has(c, effect))}
@@ -290,7 +290,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
 
 
 def _none_has(condition: Condition, effect: ValueEffect) -> str:
-    """Return the class of which no member has the value of an effect, if a condition requires that."""
+    """Return the class if a condition requires that no member of the class has an effect's value; otherwise an empty text."""
     match condition:
         case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
             same = (situation, about, value) == (effect.situation, variable, effect.value)

@@ -1,4 +1,4 @@
-"""The input and output of validation rules."""
+"""Input and output types of validation rules."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from confab.reasoner.reading.problem import Reading
 from confab.reasoner.vocabulary import RDF
 
 Fault = tuple[str, str, str, str]
-"""A finding of a rule: the node, the fault, its effect, and the remedy."""
+"""A fault: the node at fault, a description, its consequence, and the remedy."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """The input of rules: the graph, and the problem read from it if it could be read."""
+    """Input of a validation rule: the graph, and the planning problem that was read from it (None if it is unreadable)."""
 
     graph: KnowledgeGraph
     reading: Reading | None
 
     @cached_property
     def triples(self) -> Sequence[ox.Triple]:
-        """All triples of the graphs that planning reads."""
+        """All triples in the named graphs that planning reads."""
         names = [ox.NamedNode(BASE + name) for name in SCENE]
         return [quad.triple for name in names for quad in self.graph.store.quads_for_pattern(None, None, None, name)]
 
@@ -45,6 +45,6 @@ class Case:
 
     @cached_property
     def relative(self) -> frozenset[str]:
-        """IRIs that were relative in their files; they begin with the folders of the files."""
+        """The IRIs that are relative in their file, and therefore depend on the file's folder."""
         parts = (part for triple in self.triples for part in (triple.subject, triple.predicate, triple.object))
         return frozenset(p.value for p in parts if isinstance(p, ox.NamedNode) and p.value.startswith("file:"))

@@ -1,4 +1,4 @@
-"""Rules on conditions that exclude each other or never change, and on states that physics does not allow."""
+"""Validation rules on contradictory or redundant conditions, and on states that are physically impossible."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ Clash = tuple[Condition, Condition]
 
 
 def contradictions(case: Case) -> Iterator[Fault]:
-    """Find behaviours, effects and rules whose conditions exclude each other.
+    """Find behaviours, effects and rules with contradictory conditions.
 
-    Behaviours that inherit them aren't reported again.
+    A contradiction that several behaviours inherit is reported once.
     """
     if case.reading is None:
         return
@@ -59,14 +59,14 @@ def contradictions(case: Case) -> Iterator[Fault]:
 
 
 def dead(problem: Problem) -> frozenset[str]:
-    """Return the behaviours whose preconditions exclude each other."""
+    """Return the behaviours with contradictory preconditions."""
     return frozenset(
         name for name, b in problem.domain.behaviors.items() if any(not where for _, where in _clashes(b, problem))
     )
 
 
 def _clashes(behavior: Behavior, problem: Problem) -> Iterator[tuple[Clash, str]]:
-    """Yield conditions that exclude each other, with their place unless they are preconditions."""
+    """Yield contradictory pairs of conditions, each with its position as words (an empty text for preconditions)."""
     if clash := clashing(behavior.preconditions, problem, behavior.kinds):
         yield clash, ""
         return
@@ -90,7 +90,7 @@ def _witnesses(condition: Condition) -> Iterator[Witness]:
 
 
 def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[str, str]) -> Clash | None:
-    """Return two conditions of a conjunction that no state satisfies together; None if every two of them can hold.
+    """Return two conditions of a conjunction that no state satisfies together; return None if every pair is satisfiable.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[s
 
 
 def _conjuncts(conditions: Sequence[Condition], problem: Problem) -> Iterator[Condition]:
-    """Yield the requirements of a conjunction, each in its simplest form."""
+    """Yield the conjuncts of a conjunction, in which nested conjunctions and negations are resolved."""
     for condition in conditions:
         match condition:
             case AnyOf(((only,),), True):
@@ -160,7 +160,7 @@ def _may_be_one(one: str, other: str, problem: Problem, kinds: Mapping[str, str]
 
 
 def _apart(one: Comparison, other: Comparison) -> bool:
-    """Return whether two comparisons of one amount with numbers exclude each other."""
+    """Return whether two comparisons of the same amount with numbers contradict each other."""
     if one.left != other.left or not isinstance(one.left, Amount):
         return False
     if not isinstance(one.right, Fraction) or not isinstance(other.right, Fraction):
@@ -177,19 +177,19 @@ def _plain(condition: Condition) -> str:
     return said(condition).replace("?", "")
 
 
-# ------------------------------------------------------------------------------------------- what is so, or isn't, anyway
+# ------------------------------------------------------------------------------------------- redundant conditions
 
 
 @dataclass(frozen=True)
 class _Inner:
-    """A class condition inside a negated condition, about a term from outside."""
+    """A class condition in a negated condition on a term that is bound outside."""
 
     term: str
     kind: str
 
 
 def repeated_names(case: Case) -> Iterator[Fault]:
-    """Find negated conditions that restate the class of an outer term: probably one name for two individuals."""
+    """Find negated conditions with a class condition on an outer term; the author probably meant two different individuals."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -201,7 +201,7 @@ def repeated_names(case: Case) -> Iterator[Fault]:
             for one in _inside_negated(condition, False):
                 outer = behavior.kinds.get(one.term)
                 if outer is None or one in told or one.kind in maxima:
-                    continue  # a condition on a maximum or minimum restates the class that has it
+                    continue  # conditions on a maximum or minimum contain such class conditions
                 told.add(one)
                 term, anyway = one.term[1:], _below(outer, one.kind, problem)
                 if not anyway and both(case, outer, one.kind):
@@ -238,7 +238,7 @@ def _below(kind: str, other: str, problem: Problem) -> bool:
 
 
 def impossible_situations(case: Case) -> Iterator[Fault]:
-    """Find impossible initial situations, and goals that can't hold together."""
+    """Find physically impossible initial states, and goals that are physically impossible together."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -1,4 +1,4 @@
-"""Rules on defined situation types, and on axioms that planning doesn't evaluate."""
+"""Validation rules on derived situation types, and on axioms that planning ignores."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOT_EVALUATED = {
 
 
 def definitions_without_effect(case: Case) -> Iterator[Fault]:
-    """Find axioms about situations that planning doesn't evaluate, and facts about defined situation types."""
+    """Find axioms about situation types that planning ignores, and stated facts about derived situation types."""
     if case.reading is None:
         return
     schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules
@@ -87,7 +87,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
 
 
 def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
-    """Return the reason that planning doesn't evaluate an axiom about a value property, unless effects are the cause."""
+    """Return the reason why planning ignores an axiom about a value property; return None if effects are the reason."""
     name, what = local_name(prop), f"planning doesn't evaluate that {said}, since "
     nodes = {**schema.axioms, **schema.expressions}
     into = any(
@@ -118,7 +118,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
 
 
 def defined(case: Case) -> Iterator[Fault]:
-    """Report for each defined situation type whether it is static; otherwise report the types on which its value depends."""
+    """Report whether each derived situation type is static, or the situation types on which it depends."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -145,7 +145,7 @@ def defined(case: Case) -> Iterator[Fault]:
 
 
 def conclusions_outside_class(case: Case) -> Iterator[Fault]:
-    """Find rules whose conclusion is about an individual that can't have the situation, for example with swapped arguments."""
+    """Find rules whose conclusion is about an individual of a wrong class, for example because of swapped arguments."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -166,7 +166,7 @@ def conclusions_outside_class(case: Case) -> Iterator[Fault]:
 
 
 def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
-    """Yield the classes that the conditions of a rule require of a parameter."""
+    """Yield the classes that a rule's parameter must belong to according to the rule's conditions."""
     yield parameter.kind
     for condition in rule.conditions:
         match condition:
@@ -181,7 +181,7 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
 
 
 def both(case: Case, one: str, other: str) -> bool:
-    """Return whether an individual is, or could be, in two sets of classes: whether some class is below both."""
+    """Return whether an individual may belong to two classes (or unions): a common member or a common subclass exists."""
     assert case.reading is not None
     problem = case.reading.problem
     if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
@@ -203,7 +203,7 @@ NOT_ENFORCED = {
 
 
 def axioms_not_watched(case: Case) -> Iterator[Fault]:
-    """Find axioms that restrict every state, or that classify without a definition: planning doesn't evaluate these."""
+    """Find axioms that planning ignores because they restrict every state, or classify individuals without a definition."""
     if case.reading is None:
         return
     known = case.reading.schema.expressions
@@ -249,7 +249,7 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
 
 
 def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -> set[str]:
-    """Return the properties in a class expression."""
+    """Return the properties in the restrictions of a class expression."""
     found, waiting, seen = set[str](), [node], set[object]()
     while waiting:
         if not isinstance(one := waiting.pop(), ox.BlankNode) or one in seen:
@@ -263,7 +263,7 @@ def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -
 
 
 def _above(case: Case, iri: str) -> set[str]:
-    """Return the classes in a definition, with their superclasses."""
+    """Return the classes that contain every member of a defined class: the conjuncts of its definition and their superclasses."""
     assert case.reading is not None
     schema, found = case.reading.schema, {OWL + "Thing"}
     waiting = [iri]
@@ -283,7 +283,7 @@ def _above(case: Case, iri: str) -> set[str]:
 
 
 def _items(expressions: Mapping[str, Node], node: str) -> Iterator[str]:
-    """Yield the members of an intersection."""
+    """Yield the conjuncts of an intersection."""
     cells, seen = list(expressions.get(node, {}).get(OWL + "intersectionOf", ())), set[str]()
     while cells:
         cell = cells.pop()

@@ -1,12 +1,13 @@
-"""The rule of exclusive values: behaviours must not give a value to two individuals if in physics only one can have it.
+"""Validation rule on exclusive values: no behaviour may give a value to a second individual if only one can physically have it.
 
-The ontology declares such values (``e:exclusive`` of a perceiver): at most one hand holds an object. A behaviour that gives an
-exclusive value keeps it exclusive in one of three ways, on each level separately:
+The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an object. A
+behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other individual has it. Each
+level is checked separately.
 
-- *free*: its preconditions require that no individual has the value;
-- *handed over*: the individual that has the value loses it by the same behaviour;
-- *taken*: the value itself leaves a state in which no individual has it. (Example: a cup at a place is in no hand. Picking it
-  up takes the cup from the place, and each behaviour that brings a cup to a place takes it from a hand.)
+- *free*: The preconditions require that no individual has the value.
+- *handed over*: The same behaviour takes the value from the individual that has it.
+- *taken*: The value itself changes from a state in which no individual has it. (Example: A cup at a place is in no hand. Picking
+  it up takes the cup from the place, and each behaviour that brings a cup to a place takes the cup from a hand.)
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state in which no individual has a value: ``situation(value)`` is in a class, or has a given value."""
+    """A state of a value in which no individual has it: a symbol of the value is in the class `kind`, or equals `value`."""
 
     situation: str
     kind: str
@@ -62,7 +63,7 @@ class _Taken:
 
 @dataclass(frozen=True)
 class _Exclusive:
-    """A situation type whose values at most one individual of `kind` has, except the values in `shared`."""
+    """A situation type whose values belong to at most one individual of `kind` at a time, except the values in `shared`."""
 
     problem: Problem
     situation: str
@@ -70,7 +71,7 @@ class _Exclusive:
     shared: frozenset[str]
 
     def broken(self, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str, str]]:
-        """Yield the behaviours of a level that may give a value to a second individual, with the effect and the remedy."""
+        """Yield the behaviours of a level that may give a value to a second individual, each with the effect and a remedy."""
         open_: list[tuple[Behavior, ValueEffect]] = [
             (behavior, effect)
             for behavior in behaviors
@@ -100,13 +101,13 @@ class _Exclusive:
             )
 
     def given(self, behavior: Behavior) -> Iterator[ValueEffect]:
-        """Yield the effects that give an unshared value."""
+        """Yield the effects of a behaviour that give an exclusive value."""
         for effect in behavior.effects:
             if effect.situation == self.situation and effect.value not in self.shared:
                 yield effect
 
     def free(self, behavior: Behavior, when: Sequence[Condition], value: str, own: str = "") -> bool:
-        """Return whether conditions require that no individual has a value; `own` may be excepted."""
+        """Return whether the conditions require that no individual, except possibly `own`, has a value."""
         return any(self._none_has(c, value, own) for c in (*behavior.preconditions, *when))
 
     def _none_has(self, condition: Condition, value: str, own: str) -> bool:
@@ -134,7 +135,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the holder of an effect's value loses the value, or is the individual that gets it."""
+        """Return whether the individual with an effect's value loses it by the same behaviour, or is the one that receives it."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)
@@ -142,7 +143,7 @@ class _Exclusive:
         )
 
     def holders(self, behavior: Behavior, when: Sequence[Condition], value: str) -> Iterator[str]:
-        """Yield the terms that have a value before the behaviour."""
+        """Yield the terms that have a value according to the conditions."""
         for condition in (*behavior.preconditions, *when):
             match condition:
                 case ValueCondition(self.situation, (holder,), of, False) if of == value:
@@ -151,7 +152,7 @@ class _Exclusive:
                     pass
 
     def releases(self, behavior: Behavior, when: Sequence[Condition], holder: str, value: str) -> bool:
-        """Return whether a behaviour gives the holder of a value another value whenever some conditions hold."""
+        """Return whether a behaviour gives `holder` a value other than `value` whenever the conditions `when` hold."""
         return any(
             (effect.situation, effect.arguments) == (self.situation, (holder,))
             and effect.value != value
@@ -160,7 +161,7 @@ class _Exclusive:
         )
 
     def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
-        """Yield the states that the value of an effect leaves by the same behaviour."""
+        """Yield the states that an effect's value leaves by the same behaviour."""
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
@@ -171,7 +172,7 @@ class _Exclusive:
                     pass
 
     def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the value of an effect is in some state before and not after."""
+        """Return whether an effect's value is in a state before the behaviour and not after it."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)
@@ -187,7 +188,7 @@ class _Exclusive:
         )
 
     def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours, with the effect, that may give an individual a value in such a state."""
+        """Yield the behaviours, with their effect in words, after which an individual may have a value that is in the state."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):
@@ -213,13 +214,13 @@ class _Exclusive:
                     yield behavior, f"gives {said}"
 
     def inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term certainly denotes a value of a state."""
+        """Return whether a term certainly denotes one of the values that define a state."""
         if term[:1] == "?":
             return bool(way.kind) and self.below(behavior.kinds.get(term, ""), way.kind)
         return term == way.value or term in self.problem.classes.get(way.kind, ())
 
     def may_be_inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term may denote a value of a state."""
+        """Return whether a term may denote one of the values that define a state."""
         if term[:1] != "?":
             return self.inside(way, term, behavior)
         kind = behavior.kinds.get(term, "")
@@ -230,7 +231,7 @@ class _Exclusive:
         return both or not members.isdisjoint(self.problem.classes.get(way.kind, ()))
 
     def below(self, kind: str, other: str) -> bool:
-        """Return whether each individual of a class, which may be a union, is in another class."""
+        """Return whether every individual of a class or union of classes belongs to another class or union."""
         above = {*other.split("|"), other}
         for part in kind.split("|"):
             found, waiting = {part}, [part]

@@ -1,4 +1,4 @@
-"""Findings of validation: frozen values with file, node, fault, cause, and remedy."""
+"""Findings of validation, with the file, the line, a description of the fault, its consequence and the remedy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from confab.reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")
-"""Rules whose findings are listed first, since others may follow from them."""
+"""Rules whose findings are listed first because other findings may be their consequences."""
 
 LABEL = ox.NamedNode(RDFS + "label")
 TEXTS = tuple(ox.NamedNode(CORE + name) for name in ("update", "construct"))
@@ -26,22 +26,22 @@ TEXTS = tuple(ox.NamedNode(CORE + name) for name in ("update", "construct"))
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """A finding in an ontology.
+    """A fault, or a fact worth knowing, in an ontology.
 
     Attributes
     ----------
     file : str
-        The file that contains it.
+        Path of the file that contains the node.
     line : int
-        The line of the first occurrence of the node in the file, counted from 1; 0 if unknown.
+        The line of the node's first occurrence in the file, counted from 1; 0 if unknown.
     node, label : str
-        IRI of the term at fault and its label, or its short name if it has none; empty if the whole file is meant.
+        IRI and label (or local name) of the term at fault; empty if the finding is about the whole file.
     rule : str
-        Name of the rule that was broken.
+        Name of the violated rule.
     what, why, remedy : str
-        The fault, its effect, and its remedy.
+        The fault, its consequence, and its remedy.
     severity : str
-        ``error``; ``warning`` for a fault that doesn't prevent planning; ``remark`` for a choice to be aware of.
+        ``error``; ``warning`` for a fault that doesn't prevent planning; ``remark`` for information.
     """
 
     file: str
@@ -56,7 +56,7 @@ class Finding:
 
     @property
     def serious(self) -> bool:
-        """Whether it is an error."""
+        """Whether the finding is an error."""
         return self.severity == ERROR
 
     def __str__(self) -> str:
@@ -65,23 +65,23 @@ class Finding:
 
     @property
     def headline(self) -> str:
-        """Place and fault, in one line."""
+        """The position, the fault and the rule, in one line."""
         place = f"{self.file}:{self.line}" if self.line else self.file
         place += "" if self.serious else f": {self.severity}"
         return f"{place}: {self.what} [{self.rule}]"
 
     @property
     def advice(self) -> str:
-        """Reason and remedy, in two lines."""
+        """The consequence and the remedy, in two lines."""
         return f"    why: {self.why}\n    do:  {self.remedy}"
 
     def as_dict(self) -> dict[str, str | int]:
-        """Return the finding as JSON data."""
+        """Return the finding as a dictionary that can be written as JSON."""
         return asdict(self)
 
 
 def listing(findings: Sequence[Finding]) -> str:
-    """Return findings for a terminal: errors come last, and advice is given once for each kind of finding."""
+    """Return the text of findings for a terminal; errors come last, and common advice is printed once per group of findings."""
     parts = []
     for severity in (REMARK, WARNING, ERROR):
         own = [finding for finding in findings if finding.severity == severity]
@@ -94,20 +94,20 @@ def listing(findings: Sequence[Finding]) -> str:
 
 
 class Places:
-    """The origin of the nodes of a loaded graph: file, line and label. Files are parsed again only when a finding needs them."""
+    """File, line and label of the nodes in a loaded graph; the files are parsed when the first finding needs them."""
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a node with file, line and label; a finding in an update has the place in the update."""
+        """Return a finding on a node; if the node was compiled from an update, the position is that in the update."""
         if node in self.graph.written:
             return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
         file = self._files.get(node) or self._naming(node) or self.graph.path
         return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
 
     def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a part of an update: the node is the behaviour, the line that of the part."""
+        """Return a finding on a part of an update, whose node is the behaviour and whose line is that of the part."""
         node = place.behavior
         file = self._files.get(node) or self.graph.path
         line = _line(file, node)
@@ -120,7 +120,7 @@ class Places:
         return Finding(str(file or ""), line, node, self.label(node), rule, f"{what} ({place})", why, remedy, severity)
 
     def label(self, node: str) -> str:
-        """Return a node's label, English before others; its short name if it has none."""
+        """Return the label of a node, preferably in English; return its local name if it has no label."""
         try:
             quads = self.graph.store.quads_for_pattern(ox.NamedNode(node), LABEL, None, None)
         except ValueError:  # a blank node has no IRI
@@ -130,7 +130,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that names a node without statements about it in any file."""
+        """Return a file that mentions a node about which no file contains statements."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
@@ -152,7 +152,7 @@ class Places:
 
 
 def fill(template: str, words: Mapping[str, str]) -> str:
-    """Insert words for ``{name}`` in a template; a name without a word stays as it is.
+    """Replace each ``{name}`` in a template by the word for this name; names without a word are kept.
 
     >>> fill("{node} has no {what}", {"node": "cup1"})
     'cup1 has no {what}'
@@ -161,12 +161,12 @@ def fill(template: str, words: Mapping[str, str]) -> str:
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings without duplicates, by file and line; causes first."""
+    """Return the findings without duplicates; findings that may be causes come first, then findings are sorted by file and line."""
     return sorted(set(findings), key=lambda finding: (finding.rule not in CAUSES, finding))
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:
-    """Return the IRIs for which a file states a class, and the other subjects of its statements."""
+    """Return the subjects of a file's statements: those with a stated class (``typed``), and all others (``other``)."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
     with readable(file) as (content, form):
         for quad in ox.parse(content, format=form, base_iri=file.as_uri()):
@@ -176,7 +176,7 @@ def _subjects(file: Path) -> dict[str, list[str]]:
 
 
 def relative(node: str, file: Path) -> str:
-    """Return an IRI as its file writes it, if it is relative there.
+    """Return an IRI relative to the IRI of a file.
 
     >>> relative("file:///tmp/a.ttl#x", Path("/tmp/a.ttl")), relative("file:///tmp/x", Path("/tmp/a.ttl"))
     ('#x', 'x')
@@ -186,7 +186,7 @@ def relative(node: str, file: Path) -> str:
 
 
 def _line(file: Path | None, node: str) -> int:
-    """Return the first line of a Turtle file that has the node as its subject; without one, the first line that mentions it."""
+    """Return the first line of a Turtle file with a statement about a node, or else the first line that mentions the node."""
     if file is None or file.suffix != ".ttl":
         return 0
     text, short = file.read_text(encoding="utf-8"), local_name(node)

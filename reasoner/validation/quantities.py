@@ -1,4 +1,4 @@
-"""Rules of amounts: their units, their products, and the numbers that behaviours read."""
+"""Validation rules on amounts: their units, products of amounts, and the numbers that behaviours read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from confab.reasoner.vocabulary import CORE
 
 
 def unlike_units(case: Case) -> Iterator[Fault]:
-    """Find amounts of different units that are compared, added or assigned to one another."""
+    """Find amounts with different units that are compared, added or assigned to each other."""
     if case.reading is None:
         return
     reading = case.reading
@@ -34,7 +34,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     }
 
     def unit(expression: Expression) -> tuple[str, str]:
-        """Return the unit of an amount (None if it has no unit, or every unit fits), and a pair of units that don't match."""
+        """Return the unit of an expression (empty if it has none or fits every unit), and a mismatch inside the expression."""
         match expression:
             case Amount(situation):
                 return units.get(situation, ""), ""
@@ -45,14 +45,14 @@ def unlike_units(case: Case) -> Iterator[Fault]:
                 if sign in "+-" and one and other and one != other:
                     return one, f"{one} and {other}"
                 if sign in "*/" and one and other:
-                    return "", wrong or also  # servings by the hour
+                    return "", wrong or also  # a derived unit
                 return one or (other if sign != "/" else ""), wrong or also
             case Fraction():
                 return "", ""
 
     causes: dict[tuple[str, str], dict[str, str]] = defaultdict(
         dict
-    )  # by incompatible units: behaviours, their operations
+    )  # by mismatch: the behaviours and their operations
     totals = {name: one.behavior for name, one in reading.problem.domain.aggregates.items()}
     for name, behavior in (*totals.items(), *reading.problem.domain.behaviors.items()):
         for left, right, does in _together(behavior):
@@ -75,19 +75,19 @@ def unlike_units(case: Case) -> Iterator[Fault]:
 
 
 def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]]:
-    """Yield the pairs of amounts that a behaviour compares or combines, and the operation."""
+    """Yield the pairs of expressions that a behaviour compares or combines, with the operation in words."""
     for one in (inner for condition in behavior.conditions for inner in walk(condition)):
         if isinstance(one, Comparison):
             yield one.left, one.right, "compares"
     for effect in behavior.amounts:
         by: Expression = effect.amount
-        if effect.operation == "scale":  # by a number without a unit
+        if effect.operation == "scale":  # the factor has no unit
             by = Calculation("*", Amount(effect.situation, effect.arguments), effect.amount)
         yield Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"
 
 
 def multiplied_amounts(case: Case) -> Iterator[Fault]:
-    """Find products and quotients of changing amounts: flat search of a level doesn't support them."""
+    """Find products and quotients of changing amounts, which the search for plans of a whole level doesn't support."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -112,7 +112,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals that lack a number which a behaviour requires of their class: the behaviour can't use them."""
+    """Find individuals without a number that a behaviour reads for all members of their class; it isn't applicable to them."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -143,7 +143,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
 def _measured(
     conditions: Sequence[Condition], among: Mapping[str, tuple[str, frozenset[str]]], problem: Problem
 ) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Yield each relation that gives a number of one term, with the class of the term and its individuals."""
+    """Yield each relation that gives a number of a single term, with the term's class and the individuals it can denote."""
     among = dict(among)
     for condition in conditions:
         if isinstance(condition, ClassCondition) and not condition.negated and condition.term in among:
@@ -164,17 +164,17 @@ def _measured(
                     yield from _measured(group, among, problem)
 
 
-# --------------------------------------------------------------------------------------------------- what amounts come to
+# --------------------------------------------------------------------------------------------------- reachable ranges of amounts
 
 Range = tuple[Fraction | float, Fraction | float]
 """Minimum and maximum of an amount."""
 ANY: Range = (-inf, inf)
 ROUNDS = 4
-"""Number of rounds after which a growing range counts as unbounded."""
+"""Number of rounds after which a range that is still growing is treated as unbounded."""
 
 
 def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
-    """Find behaviours that are never applicable, since their conditions or effects need amounts out of reach."""
+    """Find behaviours that are never applicable because their conditions or effects require unreachable amounts."""
     if case.reading is None or not case.reading.problem.initial:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -205,7 +205,7 @@ def _compares(behavior: Behavior) -> bool:
 
 
 class _Ranges:
-    """The range of amounts of each situation type, over all individuals and all sequences of behaviours."""
+    """For each situation type, the range of its amounts over all individuals and all sequences of behaviours."""
 
     def __init__(self, problem: Problem) -> None:
         self.quantities = {name: s.quantity for name, s in problem.domain.situations.items() if s.quantity is not None}
@@ -220,7 +220,7 @@ class _Ranges:
         }
 
     def widen(self, situation: str, more: Range, endlessly: bool = False) -> bool:
-        """Add amounts to those of a situation type; return whether the range grew."""
+        """Extend the range of a situation type, to infinity if `endlessly`; return whether it changed."""
         old = self.known.get(situation)
         low, high = more if old is None else (min(old[0], more[0]), max(old[1], more[1]))
         if endlessly and old is not None:
@@ -232,7 +232,7 @@ class _Ranges:
         return self.known[situation] != old
 
     def of(self, expression: Expression, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return the range of an expression; None if it has no value."""
+        """Return the range of a numeric expression; return None if it has no value."""
         if expression in narrowed:
             return narrowed[expression]
         match expression:
@@ -247,14 +247,14 @@ class _Ranges:
                 return expression, expression
 
     def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
-        """Return why a behaviour is not applicable, with the ranges of its amounts; None if it is."""
+        """Return why a behaviour is never applicable, and the ranges of the amounts concerned; return None if it is applicable."""
         narrowed: dict[Expression, Range] = {}
         for condition in behavior.preconditions:
             if not isinstance(condition, Comparison) or condition.negated:
                 continue
             left, right = self.of(condition.left, narrowed), self.of(condition.right, narrowed)
             if left is None or right is None:
-                continue  # another rule reports missing numbers
+                continue  # missing numbers are reported by another rule
             if not _possible(condition.operator, left, right):
                 return f"it requires that {_plain(condition)}", self.about(condition)
             if isinstance(condition.left, Amount):
@@ -277,7 +277,7 @@ class _Ranges:
         return None
 
     def about(self, part: Comparison | AmountEffect) -> str:
-        """Return the ranges of the amounts in a condition or effect, as a sentence."""
+        """Return a clause that states the ranges of the amounts in a condition or effect."""
         found = (
             situations_in(part.left) | situations_in(part.right)
             if isinstance(part, Comparison)
@@ -298,7 +298,7 @@ class _Ranges:
         return " and ".join(said) or "that is never so"
 
     def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return the range of an amount after an effect."""
+        """Return the range of an amount after an effect; return None if it is unknown."""
         now, by = self.of(Amount(effect.situation, effect.arguments), narrowed), self.of(effect.amount, narrowed)
         if now is None or by is None:
             return None
@@ -306,7 +306,7 @@ class _Ranges:
         return by if sign is None else _calculated(sign, now, by)
 
     def extend(self, behavior: Behavior, endlessly: bool) -> bool:
-        """Add the amounts that a behaviour produces; return whether a range grew."""
+        """Extend the ranges by the effects of a behaviour; return whether a range changed."""
         found = [(effect.situation, self.after(effect, {})) for effect in behavior.amounts]
         new = [self.widen(situation, after, endlessly) for situation, after in found if after is not None]
         return any(new)
@@ -316,7 +316,7 @@ CONVERSE = {"<": ">", "<=": ">=", "=": "=", ">=": "<=", ">": "<"}
 
 
 def _possible(sign: str, left: Range, right: Range) -> bool:
-    """Return whether a comparison holds for some amounts of two ranges."""
+    """Return whether a comparison is true for some numbers of two ranges."""
     match sign:
         case "<":
             return left[0] < right[1]
@@ -331,7 +331,7 @@ def _possible(sign: str, left: Range, right: Range) -> bool:
 
 
 def _narrowed(sign: str, left: Range, right: Range) -> Range:
-    """Return the part of a range for which a comparison with some amount of another range holds."""
+    """Return the part of the left range in which the comparison with some number of the right range is true."""
     low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
     high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
     return low, high
@@ -361,6 +361,6 @@ def _plain_amount(amount: Amount) -> str:
 
 
 def some(names: Sequence[str], most: int = 5) -> str:
-    """Return some names as a list in a sentence."""
+    """Return an enumeration of names for a sentence; after `most` names, it ends with "others"."""
     shown = [*names[:most], *(["others"] if len(names) > most else [])]
     return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))

@@ -1,6 +1,6 @@
-"""The table of validation rules that are implemented in Python, for checks that SPARQL can't express well.
+"""Table of the validation rules in Python, which check properties that SPARQL can't express well.
 
-Each rule is a function from a `Case` to findings, written as (node, what, why, remedy).
+A rule is a function that yields the faults of a `Case`.
 """
 
 from __future__ import annotations
@@ -39,4 +39,4 @@ WARNINGS = frozenset(
 )
 """Rules whose findings don't prevent planning."""
 REMARKS = frozenset({"defined"})
-"""Rules that report facts which aren't faults."""
+"""Rules whose findings are information about the ontology and not faults."""

@@ -1,4 +1,4 @@
-"""Rules on names: undeclared terms, individuals that may be identical, names of files."""
+"""Validation rules on names: undeclared terms, individuals that may be identical, and names of files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
 
 
 def relative_iris(case: Case) -> Iterator[Fault]:
-    """Find relative IRIs, which depend on the folder of the file."""
+    """Find relative IRIs, whose meaning depends on the folder of the file."""
     for node in sorted(case.relative):
         name = local_name(node)
         yield (
@@ -62,7 +62,7 @@ def relative_iris(case: Case) -> Iterator[Fault]:
 
 
 def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
-    """Yield each use of an undeclared term: the subject, the term, and its expected kind, in words and as classes."""
+    """Yield each use of an undeclared term: the subject, the term, and the expected kind of term in words and as classes."""
     for triple in case.triples:
         for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
             types = case.types.get(iri, set())
@@ -71,7 +71,10 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return the nodes that name an undeclared term, and the nodes that name these: their other faults may be consequences."""
+    """Return the nodes that mention undeclared terms or relative IRIs, and the nodes that mention these nodes.
+
+    Other faults of these nodes may be consequences of the undeclared term.
+    """
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value
@@ -83,7 +86,7 @@ def misread(case: Case) -> set[str]:
 
 
 def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str, str, set[str]]]:
-    """Yield the IRIs of a triple with their expected kinds."""
+    """Yield each IRI in a triple with the kind of term that is expected in its place."""
     predicate, value = triple.predicate.value, triple.object
     yield predicate, "a property", PROPERTIES
     if not isinstance(value, ox.NamedNode):
@@ -110,7 +113,7 @@ SELECT DISTINCT ?individual ?class WHERE {
 
 
 def individuals_not_different(case: Case) -> Iterator[Fault]:
-    """Find individuals or values of one class that no statement declares different."""
+    """Find individuals of one class that aren't declared to be different."""
     groups = _all_different(case)
     apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
     members: dict[str, set[str]] = defaultdict(set)
@@ -153,7 +156,7 @@ def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
 
 
 def files_and_iris(case: Case) -> Iterator[Fault]:
-    """Find files whose name isn't the last part of their IRI, and catalog entries that don't match."""
+    """Find files whose name isn't the last part of their ontology's IRI, and catalog entries that lead to another file."""
     for iri, file in case.graph.files.items():
         wanted = unquote(local_name(iri))
         if file.stem != wanted:

@@ -1,15 +1,15 @@
-"""Validation of ontologies while they are written: faults with position, cause and remedy.
+"""Validation of ontologies during their development, with the position, cause and remedy of each fault.
 
 ==================  ========================================================================
-what checks         documented in
+checked property    location of the checks
 ==================  ========================================================================
 form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
-our own rules       `confab.reasoner.validation.rules.RULES`, for checks that a query can't express well
-measures of bodies  `confab.reasoner.embodiment.measures.RULES`, where there is a robot
-joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, likewise
-skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, likewise
-solids              `confab.reasoner.embodiment.solid_checks`, likewise: one through another, overlapping at first
+rules in Python     `confab.reasoner.validation.rules.RULES`
+measures of bodies  `confab.reasoner.embodiment.measures.RULES`, if the scene has a robot
+joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, if the scene has a robot
+skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, if the scene has a robot
+overlapping solids  `confab.reasoner.embodiment.solid_checks`, if the scene has a robot
 logic (`deep`)      HermiT: consistency, empty classes, unsatisfiable preconditions
 ==================  ========================================================================
 """
@@ -60,68 +60,65 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""Rules that are skipped for a node with an undeclared term, and for nodes that name it.
-
-After the correction there may be no finding.
-"""
+"""Rules that are skipped for a node that mentions an undeclared term, because their faults may be consequences of it."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
-"""Checks that are skipped for a node with a finding of another check, because the other remedy comes first."""
+"""Maps a check to another check; a node with a finding of the other check is skipped."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
-"""Checks that report facts or bounds, as `impossible-situation` does."""
+"""Checks whose findings are about initial facts or bounds, like those of ``impossible-situation``."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
-"""Rules that depend on the initial situation; they are skipped until its facts are correct."""
+"""Rules that depend on the initial state; they are skipped if the initial facts are faulty."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach", "no-value"}
-"""Rules that are skipped as long as the text of some behaviour or rule can't be read."""
+"""Rules that are skipped if the text of a behaviour or rule can't be compiled."""
 
 MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_checks.RULES
-"""Rules on an embodiment."""
+"""Rules on a scene's robots and bodies."""
 
 STAGES = 4
-"""Rules on a file."""
+"""Number of stages of the validation of a file without HermiT."""
 QUICK = 100_000
 """Maximum number of triples of a graph that is checked for errors during planning."""
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
-"""Namespaces of the properties in shapes, which exclude the many facts of scenes."""
+"""Namespaces of the properties in shapes; the many facts of scenes have properties in other namespaces."""
 LISTS = (RDF + "first", RDF + "rest")
 
 
 def validate(
     files: Sequence[str | Path], *, deep: bool = False, done: Callable[[str], object] | None = None
 ) -> list[Finding]:
-    """Return the findings in some ontology files and their imports.
+    """Return the findings in ontology files and their imports.
 
     Parameters
     ----------
     files : sequence of str or Path
-        Files, or names of shipped scenes. Each is checked together with its imports.
+        Paths of files, or names of shipped scenes. Each file is checked together with its imports.
     deep : bool
-        Run HermiT as well, which needs Java.
+        Whether to run HermiT, too, which needs Java.
     done : callable, optional
-        Is notified of the current stage, `STAGES` times for each file.
+        Is called with a description at the beginning of each stage: `STAGES` times per file, and once more if `deep`.
 
     Returns
     -------
     list of Finding
-        In order of file and line, undeclared terms first; empty if the ontology has no faults. Findings that aren't `serious`
-        are warnings or remarks.
+        Sorted by file and line, undeclared terms first. Empty if there are no faults. Findings that aren't `serious` are warnings
+        or remarks.
 
     Raises
     ------
     KnowledgeError
-        There is no such file.
+        A file doesn't exist.
     confab.reasoner.validation.hermit.NoJavaError
-        `deep` is requested and there is no Java; the message states how to install it.
+        `deep` is set and no Java was found; the message states how to install it.
     """
     return unique(finding for file in files for finding in _validate_one(file, deep, done or (lambda _: None)))
 
 
 def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
-    """Return the errors that are found quickly in a graph with its conclusions: without shapes, bodies and HermiT.
+    """Return the errors in a graph with inferred facts that can be found quickly, without shapes, bodies and HermiT.
 
-    A very large graph isn't checked.
+    Return no errors for a graph with more than `QUICK` triples.
     """
     if len(graph.store) > QUICK:
         return []
@@ -136,13 +133,13 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
 
 
 def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
-    """Yield findings, except those that may only follow from an undeclared term."""
+    """Yield findings, except those that may be consequences of an undeclared term."""
     unsure = misread(case)
     yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
 
 
 def _by_rules(case: Case, places: Places, found: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the findings of our own rules, except those that may only follow from wrong facts."""
+    """Yield the findings of the rules in Python, except those that may be consequences of faulty initial facts."""
     wrong_facts = any(finding.rule in WRONG_FACTS for finding in found)
     for rule, faults in RULES.items():
         if rule in FROM_FACTS and (wrong_facts or next(impossible_situations(case), None) is not None):
@@ -181,7 +178,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     found = [*_sure(found, case)]
     yield from found
     if faults:
-        parts = tuple(f"<{behavior}." for behavior in unread)  # an update that can't be read declares no parameters
+        parts = tuple(f"<{behavior}." for behavior in unread)  # the parameters in a faulty update are unknown
         undeclared = (finding for finding in _by_rules(case, places, found) if finding.rule == "undeclared-term")
         yield from (finding for finding in undeclared if not any(part in finding.remedy for part in parts))
         return
@@ -199,7 +196,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
 
 def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
-    """Return some behaviours and the behaviours that extend them; the updates of the latter can't be read without the former."""
+    """Return the given behaviours and all behaviours that extend them, directly or indirectly."""
     pairs = [(text(one), text(other)) for one, other in graph.select("SELECT ?one ?other { ?one :extends ?other }")]
     found = set(behaviors)
     while more := {one for one, other in pairs if other in found} - found:
@@ -208,7 +205,7 @@ def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
 
 
 def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    """Add the conclusions of OWL 2 RL, so that the other checks see them."""
+    """Add the inferences of OWL 2 RL to the graph; yield a finding if they identify two individuals."""
     try:
         infer(graph)
     except KnowledgeError as error:
@@ -217,7 +214,7 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
 
 
 def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) -> Iterator[Finding]:
-    """Check the measures of bodies, if the scene has a robot for them."""
+    """Yield the findings on robots and bodies if the scene has a robot."""
     if reading is None or not graph.select(ROBOTS):
         return
     try:
@@ -243,7 +240,7 @@ def _read(graph: KnowledgeGraph) -> tuple[Reading | None, KnowledgeError | None]
 
 
 def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) -> Finding:
-    """Return the planner's message about an unreadable file, at the node that it names."""
+    """Return a finding with the error message about an unreadable file, at the node that the message mentions."""
     why, said = "the planner reads the file in the same way", str(problem)
     named = [problem.node, *re.findall(r"<([^<>\s]+:[^<>\s]+)>", said)]
     what, mark, remedy = said.rpartition("; ")
@@ -262,7 +259,7 @@ def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) 
 
 @dataclass(frozen=True)
 class Check:
-    """A query that must have no rows, with the sentences for each row."""
+    """A query that must have no rows, and templates of the sentences for each row."""
 
     rule: str
     what: str
@@ -274,7 +271,7 @@ class Check:
 
 @cache
 def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
-    """Return the violation checks of a folder: each file's head has ``# What:``, ``# Why:``, ``# Do:``, maybe ``# Severity:``."""
+    """Return the checks in a folder; ``# What:``, ``# Why:``, ``# Do:`` and optionally ``# Severity:`` begin each file."""
     found = []
     for path in sorted(folder.glob("*.rq")):
         text = path.read_text(encoding="utf-8")
@@ -316,7 +313,7 @@ def _word(term: object) -> str:
 
 
 def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    """Run pySHACL and turn its report into findings; the shapes carry the sentences."""
+    """Yield the findings of pySHACL; the sentences are annotations of the shapes."""
     from pyshacl import validate as shacl
     from rdflib import BNode, Graph, Namespace
     from rdflib.namespace import RDFS
@@ -324,7 +321,7 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     sh = Namespace(SHACL)
     shapes = _shapes()
     data = Graph()
-    with silent_about_numbers():  # that are none: the shapes look for them
+    with silent_about_numbers():  # invalid numbers, which the shapes report
         for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
             if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
                 data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
@@ -369,7 +366,7 @@ def _shapes() -> rdflib.Graph:
 
 
 def _short(text: str) -> str:
-    """Return a text with IRIs cut down to their last part."""
+    """Return a text in which local names replace IRIs."""
     words = (
         local_name(word.strip("<>,")) + ("," if word.endswith(",") else "") if "://" in word else word
         for word in text.split(" ")
