@@ -1,4 +1,4 @@
-"""A domain without aggregates: its behaviours keep sums and counts, and no condition reads a maximum or minimum."""
+"""Compilation of a domain with aggregates: behaviours update sums and counts, and conditions no longer read maxima or minima."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from confab.reasoner.symbols import AnyOf, Behavior, Condition, Domain, Effect, 
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
-    """Return a domain whose behaviours keep sums and counts up to date, and name no maximum, no minimum and no class in an effect.
+    """Return an equivalent domain in which no condition reads a maximum or minimum and behaviours update sums and counts.
+
+    Effects on all members of a class become one effect per member.
 
     Raises
     ------
     DomainError
-        An effect or a price reads a maximum or minimum, or too many effects change one number at once.
+        An effect or a price reads a maximum or minimum, or too many effects change the same total.
     """
     domain = extrema_replaced(domain)
     aggregates = domain.aggregates.values()
@@ -40,10 +42,11 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
 
 
 def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour that isn't applicable where it would make an exception to a constraint.
+    """Return a behaviour with preconditions that prevent violations of constraints.
 
-    No state before it has an exception, so it removes none. What would add one becomes a negated precondition. A behaviour with
-    times keeps its effects on the count of exceptions, since the schedule observes the bound of this count.
+    The state before the behaviour has no violation, so the behaviour can only add violations. The condition for adding one becomes
+    a negated precondition. A durative behaviour keeps its effects on the number of violations instead, because the schedule checks
+    the bound of this number.
     """
     if behavior.timing is not None or not behavior.changes & domain.constraints.keys():
         return behavior
@@ -68,7 +71,10 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
 
 
 def _folded(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour whose effects on derived amounts are decided as far as no state is needed."""
+    """Return a behaviour in which the conditions of effects on derived amounts are simplified.
+
+    Parts of conditions that don't depend on the state are evaluated.
+    """
     if not behavior.changes & domain.aggregates.keys():
         return behavior
     known = frozenset(behavior.preconditions) if behavior.timing is None else frozenset[Condition]()

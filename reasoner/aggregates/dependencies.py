@@ -1,4 +1,4 @@
-"""The dependencies of aggregates, and the level from which their numbers exist."""
+"""Dependencies between aggregates, and expansion of derived situation types in their conditions."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from confab.reasoner.symbols import (
 
 
 def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
-    """Return aggregates in order of dependency.
+    """Return aggregates in order of dependency: each one follows the aggregates that it reads.
 
     Raises
     ------
     DomainError
-        One depends on itself. The message names it.
+        An aggregate depends on itself; the message names it.
     """
     found: dict[str, Aggregate] = {}
     waiting = dict(aggregates)
@@ -47,13 +47,13 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
 
 
 def read_by(aggregate: Aggregate) -> frozenset[str]:
-    """Return the situation types from which an aggregate is calculated."""
+    """Return the situation types that an aggregate depends on directly."""
     asked = (s for c in aggregate.conditions for inner in walk(c) for s in situations_of(inner))
     return situations_in(aggregate.amount).union(asked)
 
 
 def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -> set[str]:
-    """Return situation types together with all types that their definitions name, directly or indirectly."""
+    """Return situation types together with all types that their definitions depend on."""
     found, waiting = set[str](), [*situations]
     while waiting:
         name = waiting.pop()
@@ -65,12 +65,12 @@ def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -
 
 
 def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
-    """Return an aggregate whose conditions name no defined situation type, but the conditions of its rules.
+    """Return an aggregate in whose conditions the definitions replace derived situation types.
 
     Raises
     ------
     DomainError
-        A situation type that it names is defined by itself. The message names both.
+        The definition of such a situation type is recursive; the message names both.
     """
     if not read_by(aggregate) & rules.keys():
         return aggregate
@@ -107,12 +107,12 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
 
 
 def existing(aggregate: Aggregate) -> tuple[Condition, ...]:
-    """Return the condition that the number of an aggregate is defined; none if it is always defined."""
+    """Return the condition that the number of an aggregate is defined; return no condition if it always is."""
     whole = aggregate.amount
     amounts = [part for part in inside(whole) if isinstance(part, Amount | Measure)]
     return (Comparison(whole, "=", whole),) if amounts or divides(whole) else ()
 
 
 def divides(expression: Expression) -> bool:
-    """Return whether a number is divided in an expression."""
+    """Return whether an expression contains a division."""
     return any(isinstance(part, Calculation) and part.operator == "/" for part in inside(expression))

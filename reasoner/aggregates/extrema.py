@@ -1,4 +1,4 @@
-"""A comparison with a maximum or minimum as a witness: the individual that none exceeds."""
+"""Replacement of maxima and minima in conditions by a witness that no other individual exceeds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from confab.reasoner.symbols import (
 
 
 def with_extrema(conditions: Sequence[Condition], aggregates: Mapping[str, Aggregate]) -> tuple[Condition, ...]:
-    """Return conditions in which each comparison with a maximum or minimum is a witness that none exceeds."""
+    """Return conditions in which a witness that no individual exceeds replaces each comparison with a maximum or minimum."""
     return tuple(_with_extremum(condition, aggregates) for condition in conditions)
 
 
@@ -47,13 +47,13 @@ def _with_extremum(condition: Condition, aggregates: Mapping[str, Aggregate]) ->
 
 
 def _extrema(expression: Expression, aggregates: Mapping[str, Aggregate]) -> list[Amount]:
-    """Return the maxima and minima in an expression."""
+    """Return the maxima and minima that an expression reads."""
     amounts = [part for part in inside(expression) if isinstance(part, Amount)]
     return [part for part in amounts if part.situation in aggregates and not aggregates[part.situation].kept]
 
 
 def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, Aggregate]) -> Condition:
-    """Return a comparison in which the number of an unexceeded individual replaces a maximum or a minimum."""
+    """Return a comparison in which the number of an individual that no other exceeds replaces a maximum or minimum."""
     aggregate = aggregates[read.situation]
     taken = {*mentions(condition), *read.arguments}
     best, other = (_solution(aggregate, read.arguments, suffix, taken) for suffix in ("", "_other"))
@@ -72,7 +72,7 @@ def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, A
 def _solution(
     aggregate: Aggregate, arguments: Sequence[str], suffix: str, taken: set[str]
 ) -> tuple[tuple[Condition, ...], Expression, tuple[Parameter, ...]]:
-    """Return the conditions, the number and the variables of an aggregate for some arguments, with unique names."""
+    """Return the conditions, the number and the variables of an aggregate for given arguments; new variables have unused names."""
     terms = dict(zip((p.name for p in aggregate.parameters), arguments, strict=True))
     variables = []
     for one in aggregate.variables:
@@ -81,14 +81,14 @@ def _solution(
             name += "_"
         terms[one.name] = name
         variables.append(Parameter(name, one.kind))
-    members = (ClassCondition(p.name, p.kind) for p in aggregate.parameters)  # of others there is no such amount
+    members = (ClassCondition(p.name, p.kind) for p in aggregate.parameters)  # only members have the amount
     asked = (*members, *aggregate.conditions, *existing(aggregate))
     conditions = tuple(substituted(condition, terms) for condition in asked)
     return conditions, put_in(aggregate.amount, terms), tuple(variables)
 
 
 def _sought(variables: Sequence[Parameter], conditions: tuple[Condition, ...], negated: bool) -> Condition:
-    """Return the condition that some individuals, or none, satisfy conditions."""
+    """Return the condition that some individuals satisfy the conditions, or that no individuals do if `negated`."""
     found: Condition | None = None
     for variable in reversed(variables):
         found = Witness(variable.name, variable.kind, conditions if found is None else (found,))
@@ -107,12 +107,12 @@ def _in_place(expression: Expression, old: Expression, new: Expression) -> Expre
 
 
 def extrema_replaced(domain: Domain) -> Domain:
-    """Return a domain in which no condition reads a maximum or a minimum.
+    """Return a domain in which no condition reads a maximum or minimum.
 
     Raises
     ------
     DomainError
-        An effect, a price, a duration or a sum reads one. The message names both.
+        An effect, a price, a duration or a sum reads a maximum or minimum; the message names both.
     """
     aggregates = domain.aggregates
     if all(one.kept for one in aggregates.values()):

@@ -1,17 +1,16 @@
-"""The effects of a behaviour that keep a sum or a count up to date.
+"""Effects by which a behaviour updates a sum or a count.
 
-Soundness: a tuple of individuals adds to a total as long as it satisfies the aggregate's conditions. It can begin or cease to
-satisfy them, or add another number, only if an effect changes a symbol that these conditions or the number name. So every such
-tuple is a *candidate* of an effect and a symbol that the aggregate names: it agrees with the effect in the arguments, and in
-the value before or after the effect. A candidate's number is added if the conditions hold afterwards and not before
-(`confab.reasoner.afterwards`), and subtracted if they hold before and not afterwards. A tuple of several candidates is counted
-for the first one only.
+Soundness: A tuple of individuals contributes to a total if it satisfies the aggregate's conditions. Its contribution can change
+only if an effect changes a symbol in these conditions or in the aggregated number. Therefore, each such tuple is a *candidate* of
+a pair of an effect and a symbol in the aggregate: it agrees with the effect in the arguments, and in the value before or after
+the effect. The number of a candidate is added if the conditions hold only after the behaviour (`confab.reasoner.afterwards`), and
+subtracted if they hold only before it. A tuple that is a candidate of several pairs is counted for the first pair only.
 
-A number that is linear in the amounts that change, by additions and subtractions only, is treated separately: each change of
-such an amount is added to the total for every tuple that satisfies the conditions afterwards. These changes are independent.
+If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount is added to
+the total for every tuple that satisfies the conditions after the behaviour. These changes are independent of each other.
 
-Before a behaviour no tuple adds to a count whose maximum is 0, and one tuple afterwards is one too many. So nothing is
-subtracted from such a count, and a tuple of several candidates may be counted for each.
+If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound. So
+nothing is subtracted from such a count, and a tuple may be counted for several pairs.
 """
 
 from __future__ import annotations
@@ -50,9 +49,9 @@ from confab.reasoner.symbols import (
 )
 
 MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, including nested ones, of a behaviour that keeps derived amounts.
+"""Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts.
 
-Compiling them takes about a second.
+This number of conditions takes about a second to compile.
 """
 
 
@@ -62,21 +61,21 @@ def kept(
     situations: Mapping[str, SituationType],
     classes: Mapping[str, Sequence[str]],
 ) -> Behavior:
-    """Return a behaviour with the effects that keep sums and counts up to date.
+    """Return a behaviour with additional effects that update sums and counts.
 
     Parameters
     ----------
     behavior : Behavior
-        As it is written, with its effects on all of a class.
+        The behaviour before effects on all members of a class are expanded.
     aggregates : iterable of Aggregate
-        In the order of `in_order`.
+        Aggregates in the order of `in_order`.
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
 
     Raises
     ------
     DomainError
-        Too many of the behaviour's effects change one number at once.
+        Too many effects of the behaviour change the same total.
     """
     for aggregate in aggregates:
         if aggregate.kept and read_by(aggregate) & behavior.changes:
@@ -92,11 +91,11 @@ def kept(
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Tuples that may start or stop contributing to a total: those consistent with an effect on some symbol.
+    """Tuples whose contribution to a total may change, because they agree with an effect on a symbol of the aggregate.
 
-    `effect` has its variables renamed apart; `named` are the arguments of the symbol in the aggregate, `value` the
-    value (None for an amount); `before` says whether a tuple is consistent with the value before or after the effect.
-    `term` is the term of a linear number that the effect changes; the tuple then neither starts nor stops contributing.
+    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None for
+    an amount). `before` states whether the tuples agree with the value before or after the effect. `term` is the term of a linear
+    number that the effect changes; such an effect doesn't start or end a contribution.
     """
 
     effect: Effect
@@ -107,7 +106,7 @@ class _Candidate:
 
 
 class _Keeping:
-    """The effects of one behaviour on one total."""
+    """Derivation of the effects of one behaviour on one total."""
 
     def __init__(
         self,
@@ -134,7 +133,7 @@ class _Keeping:
         self.candidates = list(self._candidates())
 
     def behavior(self) -> Behavior:
-        """Return the behaviour with these effects."""
+        """Return the behaviour with the effects on the total."""
         effects, many = list[AmountEffect](), 0
         for effect in (effect for i in range(len(self.candidates)) for effect in self.effects(i)):
             effects.append(effect)
@@ -152,7 +151,7 @@ class _Keeping:
         return replace(self.own, variables=variables, amounts=amounts, timing=self._timed(effects))
 
     def _timed(self, effects: Sequence[AmountEffect]) -> Timing | None:
-        """Return the timing of the behaviour: the total changes at the same time as the facts that determine it."""
+        """Return the timing of the behaviour, in which the total changes together with the facts that it depends on."""
         timing = self.own.timing
         if timing is None or not effects:
             return timing
@@ -166,7 +165,7 @@ class _Keeping:
         return replace(timing, effects=(*timing.effects, *((span, effect) for span in spans for effect in effects)))
 
     def _candidates(self) -> Iterator[_Candidate]:
-        """Yield all pairs of an effect that may change the total and a symbol in the conditions or the number of the aggregate."""
+        """Yield a candidate for each pair of an effect and a symbol in the aggregate that the effect may change."""
         for condition in (inner for c in self.conditions for inner in walk(c)):
             if isinstance(condition, ValueCondition):
                 for effect in (e for e in self.own.effects if e.situation == condition.situation):
@@ -188,7 +187,11 @@ class _Keeping:
                     yield self._candidate(effect, part.arguments, None, False)
 
     def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
-        """Return a candidate. For an effect on all of a class whose individuals a witness seeks, terms for these are left out."""
+        """Return the candidate of an effect and a symbol.
+
+        If the effect is on all members of a class and a witness binds the symbol's argument, the candidate isn't restricted to a
+        member.
+        """
         effect = self.after.apart(effect)
         if effect.each is None:
             return _Candidate(effect, named, value, before)
@@ -198,7 +201,7 @@ class _Keeping:
         own = zip(effect.arguments, named, strict=True)
         named = tuple(name if self.after.fixed(argument) else sought for argument, name in own)
         if before or (isinstance(effect, ValueEffect) and not self.after.fixed(effect.value)):
-            value = None  # it depends on the individual that the effect is about
+            value = None  # the value is different for each member
         return _Candidate(replace(effect, each=None, when=()), named, value, before)
 
     def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:
@@ -223,7 +226,7 @@ class _Keeping:
         return both(found)
 
     def effects(self, number: int) -> Iterator[AmountEffect]:
-        """Yield the effects on the total for the tuples of one candidate, without those of earlier candidates."""
+        """Yield the effects on the total for the tuples of a candidate that don't belong to an earlier candidate."""
         candidate = self.candidates[number]
         effect = candidate.effect
         tuple_: dict[str, str] = {}
@@ -250,7 +253,7 @@ class _Keeping:
                 yield from self._differences(whole, each, [*guard, *more, *others])
 
     def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
-        """Substitute a term for a variable of the aggregate; return the conditions that this implies."""
+        """Replace a variable of the aggregate by a term in `tuple_`, and return the conditions that this requires."""
         if name in tuple_:
             return self.after.equal(tuple_[name], term)
         tuple_[name] = term
@@ -259,7 +262,7 @@ class _Keeping:
     def _completed(
         self, tuple_: Mapping[str, str], each: Parameter | None
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
-        """Yield a tuple with terms for all variables: determined by a condition, members of a class, or all individuals."""
+        """Yield tuples with a term for every variable: determined by a condition, a member of a class, or each individual."""
         found, more = dict(tuple_), list[Formula]()
         determined = True
         while determined:
@@ -289,7 +292,7 @@ class _Keeping:
     def _changes(
         self, effect: Effect, term: Term, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
     ) -> Iterator[AmountEffect]:
-        """Yield the effect on the total of a change of one amount, for the tuples that contribute afterwards."""
+        """Yield the effect on the total of a change of one amount, for the tuples that contribute after the behaviour."""
         assert isinstance(effect, AmountEffect)
         amount, operation, scaled = term
         arguments = tuple(tuple_.get(argument, argument) for argument in amount.arguments)
@@ -303,7 +306,7 @@ class _Keeping:
     def _differences(
         self, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
     ) -> Iterator[AmountEffect]:
-        """Yield the effects for the tuples that a guard admits: added, no longer added, or added with another number."""
+        """Yield the effects for tuples that begin to contribute, cease to contribute, or contribute another number."""
         always, before, after = self._contributing(tuple_)
         always = [*guard, *always]
         amount = put_in(self.amount, tuple_)
@@ -316,7 +319,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return when a tuple contributes: the conditions that don't change, and the others before and after the behaviour."""
+        """Return the conditions of a contribution: those that don't change, and the others before and after the behaviour."""
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]
@@ -327,7 +330,7 @@ class _Keeping:
     def _effects(
         self, tuple_: Mapping[str, str], each: Parameter | None, found: Iterable[tuple[str, Expression, list[Formula]]]
     ) -> Iterator[AmountEffect]:
-        """Yield the effects on the total of a tuple, without effects whose conditions contradict each other."""
+        """Yield the effects of a tuple on the total, except effects with contradictory conditions."""
         arguments = tuple(tuple_[name] for name in self.arguments)
         for operation, by, formulas in found:
             asked = both(formulas)
@@ -340,7 +343,7 @@ def _parts(conjunction: Conjunction) -> Sequence[Formula]:
 
 
 def _difference(after: Expression, before: Expression) -> tuple[str, Expression]:
-    """Return the operation and the number that lead from an amount to another one."""
+    """Return the operation and the number that change one amount into another."""
     if isinstance(after, Calculation) and after.left == before and after.operator in ("+", "-"):
         return ("increase" if after.operator == "+" else "decrease"), after.right
     return "increase", Calculation("-", after, before)

@@ -1,4 +1,4 @@
-"""Sums and counts that follow from a state."""
+"""Calculation of sums and counts in a state."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def with_totals(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return a state with the sums and counts that follow from it.
+    """Return a state together with the sums and counts that it implies.
 
-    The count of the exceptions to a constraint belongs to the state only if effects change it.
+    The number of violations of a constraint is included only if effects change it.
     """
     found = dict(state)
     changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}
@@ -61,7 +61,7 @@ def exceptions(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return the counts of the exceptions to constraints in a state."""
+    """Return the number of violations of each constraint in a state."""
     found: dict[Symbol, str] = {}
     for name in domain.constraints:
         found |= totals(domain.aggregates[name], classes, relations, state, domain.situations)
@@ -69,7 +69,7 @@ def exceptions(
 
 
 def following(problem: Problem, state: Mapping[Symbol, str]) -> dict[Symbol, str]:
-    """Return a state that observations or interventions have changed, with the sums and counts that follow from it."""
+    """Return a state, after changes by observations or interventions, with updated sums and counts."""
     return with_totals(problem.domain, problem.classes, problem.relations, state)
 
 
@@ -80,7 +80,7 @@ def totals(
     state: Mapping[Symbol, str],
     situations: Mapping[str, SituationType],
 ) -> dict[Symbol, str]:
-    """Return a sum or count for all of its arguments in a state, as texts of exact numbers."""
+    """Return the values of a sum or count for all of its arguments in a state, as texts of exact numbers."""
     world = _World(classes, relations, state, situations)
     kinds = [classes.get(p.kind, ()) for p in aggregate.parameters]
     found = {row: Fraction(0) for row in product(*kinds)}
@@ -96,7 +96,7 @@ def totals(
 
 
 class _World:
-    """A state in which conditions are tested by trying individuals."""
+    """A state in which conditions are evaluated by enumeration of individuals."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class _World:
         self.numbers: dict[str, dict[tuple[str, ...], Number]] = {}
 
     def value(self, situation: str, arguments: tuple[str, ...]) -> str | None:
-        """Return the value of a symbol, None if there is no such symbol."""
+        """Return the value of a symbol; return None if the symbol doesn't exist."""
         found = self.state.get(Symbol(situation, arguments))
         kind = self.situations[situation]
         if found is None and kind.boolean:
@@ -119,7 +119,7 @@ class _World:
         return found
 
     def worth(self, expression: Expression, terms: Mapping[str, str]) -> Number:
-        """Return the number that an expression has."""
+        """Return the number that an expression denotes."""
         match expression:
             case Amount(situation, arguments):
                 return number(self.value(situation, tuple(terms.get(a, a) for a in arguments)))
@@ -139,7 +139,7 @@ class _World:
     def solutions(
         self, conditions: Sequence[Condition], terms: dict[str, str], kinds: Mapping[str, str], names: Sequence[str]
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals for some terms that make conditions true; variables that a value determines aren't enumerated."""
+        """Yield the variable bindings that satisfy conditions; variables that a value determines aren't enumerated."""
         if any(not self.holds(c, terms, kinds) for c in conditions if not mentions(c) - terms.keys()):
             return
         waiting = [c for c in conditions if mentions(c) - terms.keys()]
@@ -162,7 +162,7 @@ class _World:
             yield from self.solutions(conditions, {**terms, left[0]: individual}, kinds, names)
 
     def holds(self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str]) -> bool:
-        """Return whether a condition whose terms are bound holds."""
+        """Return whether a condition with bound variables is true."""
         of = terms.get
         match condition:
             case ValueCondition(situation, arguments, value, negated):

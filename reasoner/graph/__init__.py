@@ -1,1 +1,1 @@
-"""The knowledge graph: files and stores behind one door, inference, the owlready2 view."""
+"""The knowledge graph: loading of files, connections to stores, inference, and the view as an owlready2 world."""

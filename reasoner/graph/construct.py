@@ -1,4 +1,4 @@
-"""The result of a CONSTRUCT query, written as an ontology that imports the queried scene."""
+"""Storage of a CONSTRUCT query's result as an ontology that imports the queried scene."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from confab.reasoner.vocabulary import OWL, RDF
 
 
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
-    """Write the triples of a CONSTRUCT query into a Turtle file and return their number.
+    """Write the triples that a CONSTRUCT query returns to a Turtle file, and return their number.
 
-    The file is an ontology that imports the scene, so that it can be planned in. Its IRI has the name of the file in place of
-    the scene's name.
+    The file is an ontology that imports the scene and can itself be planned in. Its IRI is the scene's IRI with the file's name as
+    the last part.
 
     Raises
     ------
     KnowledgeError
-        The query isn't SPARQL, or its result isn't triples, or is empty.
+        The query isn't SPARQL, or its result isn't triples or is empty.
     LimitError
-        As `confab.reasoner.graph.query_process.ask`.
+        The query exceeds its limits, as in `confab.reasoner.graph.query_process.ask`.
     """
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     kind, _, answer = ask(graph, query, limits)

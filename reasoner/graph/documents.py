@@ -1,8 +1,7 @@
-"""Documents as a parser receives them: RDF/XML without the parts of a DTD that read other files or grow.
+"""Safe reading of RDF documents: RDF/XML is passed to the parser without external or recursive entities.
 
-The XML parser expat reads the document type, which is then replaced by a document type with plain entities only. (Protégé 4
-uses plain entities to abbreviate namespaces.) The RDF parser sees no other comments, instructions and declarations before the
-first element.
+The XML parser expat reads the document type, which is then replaced by a document type with only plain entities. (Protégé 4
+abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are removed.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ FORMATS = {
     ".nq": ox.RdfFormat.N_QUADS,
 }
 SYNTAXES = {".ofn": "functional syntax", ".omn": "Manchester syntax", ".owx": "OWL/XML", ".obo": "OBO"}
-"""Formats that no library here reads correctly."""
+"""Formats that aren't supported because no library in use reads them correctly."""
 SIGNS = (
     (rb"(@prefix|@base|PREFIX|BASE)\s", ox.RdfFormat.TURTLE),
     (rb"[{\[]", ox.RdfFormat.JSON_LD),
@@ -42,12 +41,12 @@ SIGNS = (
     (rb"(<\?xml[^>]*>\s*)?(<!DOCTYPE\s+Ontology|<Ontology\s)", SYNTAXES[".owx"]),
     (rb"format-version:", SYNTAXES[".obo"]),
 )
-"""First bytes of files named .owl or .rdf that have another format."""
+"""Patterns for the beginning of files with the suffix .owl or .rdf that have another format than RDF/XML."""
 REMOTE = re.compile(rb'"@context"\s*:\s*(\[\s*)?"')
 SECONDS, MEGABYTES = 60.0, 1_000
-"""Maximum CPU seconds and megabytes for parsing a document in a process of its own."""
+"""Maximum CPU seconds and megabytes of memory for the parser process of one document."""
 MOST_EXPANDED = 50_000_000
-"""Maximum number of bytes that all entity references of a document may expand to."""
+"""Maximum number of bytes to which all entity references of a document may expand."""
 PLAIN = re.compile(r"[^\s<>&%\"']*")
 REFERENCE = re.compile(rb"&([^\s&;#]+);")
 DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
@@ -55,17 +54,16 @@ ADVICE = "save the ontology again without a document type (Protégé 5 writes no
 
 
 class DocumentError(ValueError):
-    """A document is refused; the message says why, and what to do."""
+    """Raised if a document is rejected; the message states the reason and a remedy."""
 
 
 def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
-    """Return the content of an RDF file for its parser, and its format.
+    """Return the content of an RDF file that can be passed to its parser, and its format.
 
     Raises
     ------
     DocumentError
-        The file is of another kind (the message names the suffix for it), is invalid XML, or has entities that read other files
-        or grow.
+        The file has an unsupported format, is invalid XML, or contains external or recursive entities.
     OSError
         The file can't be read.
     """
@@ -92,15 +90,15 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
 def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFormat]:
     """Return a document, and its format, that a parser reads in time and memory proportional to its size.
 
-    Deep nesting is refused in every format. JSON-LD, in which each level may repeat its context, is parsed in a separate
-    process and returned as TriG.
+    Deep nesting is rejected in every format. JSON-LD, in which each level may repeat its context, is parsed in a separate process
+    and returned as TriG.
 
     Raises
     ------
     DocumentError
-        It is nested too deeply, or takes too much time or memory.
+        The document is nested too deeply, or its parsing takes too much time or memory.
     SyntaxError
-        It isn't in its format.
+        The document is invalid in its format.
     """
     json = form == ox.RdfFormat.JSON_LD
     xml = form == ox.RdfFormat.RDF_XML
@@ -133,7 +131,7 @@ def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
 
 
 def as_trig(content: bytes, media_type: str, base: str) -> bytes:
-    """Return a document as TriG."""
+    """Return a document converted to TriG."""
     form = ox.RdfFormat.from_media_type(media_type)
     assert form is not None
     quads = ox.parse(content, format=form, base_iri=base)
@@ -142,7 +140,9 @@ def as_trig(content: bytes, media_type: str, base: str) -> bytes:
 
 
 def plain_xml(content: bytes) -> bytes:
-    """Return an XML document with a new prolog; a document without a document type is unchanged.
+    """Return an XML document whose document type contains only plain entities.
+
+    A document without a document type is returned unchanged.
 
     >>> plain_xml(b'<!--<a>--><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
     b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
@@ -150,7 +150,7 @@ def plain_xml(content: bytes) -> bytes:
     Raises
     ------
     DocumentError
-        It is no XML; its entities read other files or parameters, or would expand to more than `MOST_EXPANDED`.
+        The document isn't XML, contains external or parameter entities, or would expand to more than `MOST_EXPANDED` bytes.
     """
     prolog = _Prolog()
     prolog.read(content)
@@ -169,7 +169,7 @@ def plain_xml(content: bytes) -> bytes:
 
 
 class _Prolog:
-    """Reads the prolog before the first element: the name of the document type, and its entities."""
+    """The part of an XML document before its first element: the name of the document type and the entities."""
 
     def __init__(self) -> None:
         self.name: bytes | None = None
@@ -177,7 +177,7 @@ class _Prolog:
         self.end = -1
 
     def read(self, content: bytes) -> None:
-        """Read up to the first element. The document is read as UTF-8, as the RDF parser reads it."""
+        """Read a document, as UTF-8, up to its first element."""
         parser = expat.ParserCreate("utf-8")
         parser.StartDoctypeDeclHandler = self._doctype
         parser.EntityDeclHandler = self._entity
@@ -208,4 +208,4 @@ class _Prolog:
 
 
 class _PrologIsReadError(Exception):
-    """The prolog is complete."""
+    """Raised at the first element to end the reading of the prolog."""

@@ -1,7 +1,7 @@
-"""Fetching an ontology from the web, on request only. The ontology becomes a file that the catalog names.
+"""Download of ontologies from the web on request; each ontology becomes a local file that the catalog maps its IRI to.
 
-Loading stays offline. A document is checked before it is kept: plain RDF of a bounded size, without entities that read other files
-or grow, without imports by file path, and an ontology with the requested IRI.
+Loading itself never uses the network. A downloaded document is stored only if it is RDF of bounded size, has no external or
+recursive entities, imports no file paths, and is an ontology with the requested IRI.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from confab.reasoner.vocabulary import OWL
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0
-"""Seconds for the whole document; the connection has to be established within a fifth of them."""
+"""Maximum number of seconds for a download; a fifth of it is the limit for the connection."""
 REDIRECTS = 5
 ACCEPT = "text/turtle, application/n-triples;q=0.9, application/rdf+xml;q=0.8, */*;q=0.1"
 SUFFIX = {
@@ -46,7 +46,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 
 @dataclass(frozen=True)
 class Fetched:
-    """A fetched ontology: its file, the catalog that names it, and its own imports."""
+    """A downloaded ontology: its file, the catalog with its IRI, and the IRIs that it imports."""
 
     file: Path
     catalog: Path
@@ -54,19 +54,19 @@ class Fetched:
 
 
 def fetch(url: str, folder: Path) -> Fetched:
-    """Fetch an ontology by its IRI into a folder, and name it in the catalog there.
+    """Download an ontology into a folder, and add its IRI to the folder's catalog.
 
     Parameters
     ----------
     url : str
-        ``http`` or ``https``; also the IRI, or version IRI, of the ontology.
+        ``http`` or ``https`` URL, which is also the IRI or version IRI of the ontology.
     folder : Path
         The folder of the importing ontology.
 
     Raises
     ------
     KnowledgeError
-        It can't be reached or read, is too large, is suspicious, or is another ontology; no file is written then.
+        The URL can't be reached, or the document is invalid, too large, unsafe or another ontology. No file is then written.
     """
     try:
         parts = urlsplit(url)
@@ -99,7 +99,7 @@ def fetch(url: str, folder: Path) -> Fetched:
 
 
 def _download(url: str) -> tuple[bytes, str]:
-    """Return a document and its media type."""
+    """Return the content and the media type of the document at a URL."""
     end = monotonic() + SECONDS
     pool = urllib3.PoolManager(
         retries=urllib3.Retry(total=REDIRECTS, connect=0, read=0, redirect=REDIRECTS, status=0, other=0),
@@ -130,7 +130,7 @@ def _download(url: str) -> tuple[bytes, str]:
 
 
 def _guessed(url: str, content: bytes) -> str:
-    """Return the kind of a document whose media type is ambiguous."""
+    """Return the file suffix for a document whose media type is unknown."""
     suffix = Path(urlsplit(url).path).suffix.lower()
     if suffix in FORM:
         return suffix
@@ -138,7 +138,7 @@ def _guessed(url: str, content: bytes) -> str:
 
 
 def _declared(url: str, said: str, triples: Sequence[ox.Triple]) -> str:
-    """Return the IRI of the ontology, if it is the requested one."""
+    """Return the IRI of the ontology in a document; raise `KnowledgeError` if it isn't the requested ontology."""
     kind = ox.NamedNode(OWL + "Ontology")
     found = [t.subject.value for t in triples if t.object == kind and isinstance(t.subject, ox.NamedNode)]
     if len(found) != 1:
@@ -164,7 +164,7 @@ def _imported(url: str, iri: str, triples: Sequence[ox.Triple]) -> tuple[str, ..
 
 
 def _name(iri: str) -> str:
-    """Return the last part of an IRI as a file name without folders."""
+    """Return a file name that is the last part of an IRI."""
     name = iri.rstrip("#/").rsplit("/", 1)[-1]
     for suffix in FORM:
         name = name.removesuffix(suffix)
@@ -174,7 +174,7 @@ def _name(iri: str) -> str:
 
 
 def _catalog_with(path: Path, entries: dict[str, str]) -> str:
-    """Return the text of a catalog with some entries added."""
+    """Return the text of a catalog with additional entries."""
     text = path.read_text(encoding="utf-8") if path.is_file() else CATALOG
     try:
         known = ontology.catalog(path) if path.is_file() else {}

@@ -1,11 +1,11 @@
-"""OWL 2 RL inference: conclusions from the ontology are written to the graph `inferred` before planning.
+"""OWL 2 RL inference before planning, which adds inferred triples to the graph `inferred`.
 
-Only static facts are concluded. Facts of situation types are left out, since behaviours change them; they only show that their
-subject and object belong to the domain and the range of the property. A class that is defined by situations is compiled into
-conditions instead, see `confab.reasoner.reading.definitions`.
+Only static facts are inferred. Facts of situation types are excluded because behaviours change them; only the domain and the range
+of their properties are applied. A class that is defined by situations is compiled into conditions instead
+(`confab.reasoner.reading.definitions`).
 
-The reasoner runs only if the ontology has axioms with consequences beyond subclasses, which the reader follows by itself:
-`needed` tests this. docs/inference.md lists the limits of RL.
+The reasoner runs only if `needed` finds axioms with consequences beyond subclasses, which are read without inference. The limits
+of RL are listed in docs/inference.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
 GIVEN = ("asserted", "reach")
 WORLD = {CORE + name for name in ("Object", "Robot", "Hand")}
-"""The core's classes of physical things; its other classes describe behaviours, which are exempt from inference."""
+"""Core classes of physical objects; the other core classes describe behaviours and are excluded from inference."""
 
 NEEDED = """
 ASK {
@@ -51,26 +51,26 @@ SELECT DISTINCT ?individual ?class WHERE {
 
 
 def needed(graph: KnowledgeGraph) -> bool:
-    """Return whether the ontology implies more than its subclass axioms do."""
+    """Return whether the ontology has axioms that imply more than its subclass axioms."""
     return bool(graph.query(NEEDED, GIVEN))
 
 
 def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
-    """Write the conclusions of OWL 2 RL into the graph `inferred`, and return the number of triples.
+    """Write the inferences of OWL 2 RL into the graph `inferred`, and return the number of new triples.
 
-    Only new types, subclasses and tuples of static relations are kept.
+    Only types, subclasses and rows of static relations are inferred.
 
     Parameters
     ----------
     graph : KnowledgeGraph
-        Its graph `inferred` is emptied first.
+        Its graph `inferred` is cleared first.
     always : bool
-        Run the reasoner even if it isn't `needed`.
+        Whether to run the reasoner even if it isn't `needed`.
 
     Raises
     ------
     KnowledgeError
-        Two individuals turn out to be one, because a functional property has both as its value.
+        Two individuals would be identical, because both are values of a functional property.
     """
     graph.store.clear_graph(ox.NamedNode(BASE + "inferred"))
     if not always and not needed(graph):
@@ -94,7 +94,7 @@ def _iris(graph: KnowledgeGraph, query: str) -> set[str]:
 
 
 def _static(graph: KnowledgeGraph, changing: set[str]) -> Iterator[ox.Triple]:
-    """Yield the triples for the reasoner: without texts, behaviours, and facts that may change."""
+    """Yield the triples for the reasoner: all triples except literals, behaviours, and facts that may change."""
     for name in GIVEN:
         for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name)):
             predicate = quad.predicate.value
@@ -112,7 +112,7 @@ def _of_behaviors(iri: str) -> bool:
 
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
-    """Yield the triples of IRIs in the closure of some triples."""
+    """Yield the triples in the OWL 2 RL closure of some triples that consist only of IRIs."""
     import tempfile
 
     import reasonable

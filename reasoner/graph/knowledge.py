@@ -1,8 +1,8 @@
-"""The knowledge graph: ontology files with all their imports, in one SPARQL store.
+"""The knowledge graph: ontology files with all their imports in one SPARQL store.
 
-Each kind of triples has its own named graph (`GRAPHS`); a query sees their union. Files are read and never written here.
-Nothing is fetched from the network (`confab.reasoner.graph.fetching` does that on request): an import is looked up in the
-catalog beside the file, then in the shipped one.
+Each kind of triples has its own named graph (`GRAPHS`); a query is evaluated on their union. Files are only read. Nothing is
+downloaded (`confab.reasoner.graph.fetching` does this on request): imports are looked up in the catalog in the file's folder,
+then in the shipped catalog.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 DERIVED = "derived"
-"""Graph of the facts that follow from definitions in the initial state. For queries only; planning derives them in each state."""
+"""Graph of the facts that are derived in the initial state. It is for users' queries; planning derives the facts in each state."""
 SCENE = ("asserted", "inferred", "reach")
-"""Graphs that a planning call reads."""
+"""Graphs that planning reads."""
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
-"""Marks of triples about triples in a file, in one of the three notations."""
+"""The three notations of triple terms (triples as subjects or objects) in files."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
 NO_ROWS = "wanted a SELECT query, whose answer is rows"
 
@@ -49,19 +49,19 @@ Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
 
 
 class Remote(Protocol):
-    """A remote store that answers SPARQL 1.1, such as `confab.reasoner.graph.stores.Endpoint`."""
+    """A remote store that answers SPARQL 1.1 queries, such as `confab.reasoner.graph.stores.Endpoint`."""
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
-        """Return the result of a query; with `confirm`, the query is recorded and repeated later."""
+        """Return the result of a query; if `noted`, `confirm` repeats the query later."""
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if the answer of a recorded query has changed."""
+        """Raise `KnowledgeError` if the result of a noted query has changed."""
 
 
 class KnowledgeError(ValueError):
-    """The given knowledge can't be used; the message states the fault, its position, and the remedy.
+    """Raised if the given knowledge can't be used; the message states the fault, its position and the remedy.
 
-    `node` is the IRI of the faulty node, if the message names it otherwise.
+    `node` is the IRI of the faulty node, or an empty text.
     """
 
     def __init__(self, message: str = "", node: str = "") -> None:
@@ -70,32 +70,32 @@ class KnowledgeError(ValueError):
 
 
 def text(term: Term) -> str:
-    """Return the IRI or literal of a term as text; nothing for an unbound variable."""
+    """Return the IRI or literal of a term as text; return an empty text for an unbound variable."""
     return term.value if term is not None else ""
 
 
 @dataclass
 class KnowledgeGraph:
-    """One scene with everything that it imports.
+    """A scene and all ontologies that it imports.
 
     Attributes
     ----------
     scene : str
         IRI of the scene's ontology.
     store : pyoxigraph.Store
-        Named graphs as in `GRAPHS`.
+        Store with the named graphs in `GRAPHS`.
     files : mapping of ontology IRI to file
-        The files read into the graph `asserted`, the scene first.
+        The files in the graph `asserted`; the scene's file is the first.
     prefixes : mapping of prefix to namespace
-        The prefixes of our own queries: `PREFIXES`, and others that the files declare.
+        The prefixes of internal queries: `PREFIXES` and prefixes that files declare.
     declared : mapping of prefix to namespace
-        The prefixes that the files declare, the scene's own first; the empty prefix is that of the scene's own file.
+        The prefixes that files declare, those of the scene first. The empty prefix is the one in the scene's file.
     faults : list of str
-        The reason why the scene can be queried but not planned in, if it was loaded in spite of faults.
+        The reasons why the scene can't be planned in, if it was loaded with `tolerant`.
     written : mapping of individual to place
-        The position in a SPARQL update of each individual that was made from the update.
+        The position in a SPARQL update of each individual that was compiled from the update.
     remote : Remote, optional
-        The store that answers instead of `store`; it is only read.
+        A remote store that is queried instead of `store`; it is never changed.
     round_trips : int
         Number of queries so far.
     """
@@ -111,32 +111,32 @@ class KnowledgeGraph:
     round_trips: int = 0
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying: the store as N-Quads."""
+        """Return the state for pickling and copying, with the store as N-Quads."""
         return {**self.__dict__, "store": self.store.dump(format=ox.RdfFormat.N_QUADS) or b""}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Fill a new store, keeping the names of blank nodes."""
+        """Restore a pickled state with a new store, in which blank nodes have the same names."""
         store = ox.Store()
         store.bulk_extend(ox.parse(state["store"], format=ox.RdfFormat.N_QUADS, rename_blank_nodes=False))
         self.__dict__.update(state, store=store)
 
     @property
     def spoken(self) -> dict[str, str]:
-        """The prefixes of users' queries: those of the scene's file, then ours."""
+        """The prefixes for users' queries: ``confab:``, those of the scene's file, and those of internal queries."""
         return {"confab": CORE, **self.prefixes, **self.declared}
 
     def require_whole(self) -> None:
-        """Raise `KnowledgeError` if something that planning needs is missing."""
+        """Raise `KnowledgeError` if the scene can't be planned in."""
         if self.faults:
             raise KnowledgeError(self.faults[0])
 
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
-        """Return the rows of a SELECT query on the union of some graphs; `bindings` replaces selected variables by IRIs.
+        """Return the rows of a SELECT query on the union of some graphs; `bindings` maps selected variables to IRIs.
 
         Raises
         ------
         KnowledgeError
-            The query is no SPARQL; the message has line and column.
+            The query isn't SPARQL; the message states line and column.
         """
         rows: list[Row] = []
         for row in self.solutions(query, graphs, **bindings):
@@ -146,14 +146,14 @@ class KnowledgeGraph:
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
-        """Yield the rows of `select` one by one, for callers that read many rows. Errors are the same."""
+        """Return an iterator over the rows of a SELECT query, with the same errors as `select`; it needs less memory."""
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError(NO_ROWS)
         return answer
 
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
-        """Return the triples of some graphs as N-Triples; of a remote store, all visible triples."""
+        """Return the triples of some graphs as N-Triples; for a remote store, all triples of its dataset."""
         if self.remote:
             answer = self.query("CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }")
             return (
@@ -167,7 +167,7 @@ class KnowledgeGraph:
         return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
-        """Return the answer to any SPARQL 1.1 query on the union of some graphs; a remote store chooses its own dataset."""
+        """Return the result of any SPARQL 1.1 query on the union of some graphs; for a remote store, on its own dataset."""
         check("asking the knowledge graph")
         self.round_trips += 1
         if self.remote:
@@ -183,13 +183,13 @@ class KnowledgeGraph:
             raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if the data of a remote store have changed since they were read."""
+        """Raise `KnowledgeError` if the data in a remote store have changed since they were read."""
         if self.remote:
             check("asking the knowledge graph again")
             self.remote.confirm()
 
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
-        """Add triples of IRIs to one of the named graphs."""
+        """Add triples of IRIs to a named graph."""
         if self.remote:
             raise KnowledgeError(f"{self.scene}: a remote store is only read; add to it with its own tools")
         name = ox.NamedNode(BASE + graph)
@@ -197,15 +197,12 @@ class KnowledgeGraph:
 
     @cached_property
     def path(self) -> Path | None:
-        """The scene's own file, if it came from one."""
+        """The scene's file; None if the scene wasn't read from a file."""
         return self.files.get(self.scene)
 
     @property
     def folders(self) -> list[Path]:
-        """Folders in which other files of the ontologies are sought.
-
-        The shipped folders, and the folder of each file that was read.
-        """
+        """Folders in which files that ontologies refer to are searched: the shipped folder and the folder of each loaded file."""
         own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
@@ -216,24 +213,24 @@ def load(
     tolerant: bool = False,
     faults: list[Fault] | None = None,
 ) -> KnowledgeGraph:
-    """Load a scene with all that it imports, and its reach file if there is one.
+    """Load a scene with all its imports, and its file of reachability facts if it exists.
 
     Parameters
     ----------
     source : str, Path or sequence of them
-        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads. If there are several, all
-        are read, and the scene is the first one that no other imports.
+        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads. If several files are given, all
+        are loaded, and the scene is the first file that no other file imports.
     store : pyoxigraph.Store, optional
-        An empty store to load into; one in memory if left out.
+        An empty store for the triples; by default a new store in memory.
     tolerant : bool
-        Load any RDF file, and record in `faults` why it is no scene: imports that aren't found, or a missing ontology.
+        Whether to load any RDF file, and to store the reasons why it isn't a complete scene in `faults` of the graph.
     faults : list of Fault, optional
-        Receives the faults of behaviours that are written as updates; without this list, such faults are errors.
+        Receives the faults in behaviours that are written as updates; without the list, such faults raise an error.
 
     Raises
     ------
     KnowledgeError
-        No such scene or file; syntax error with line and column; an import that no catalog knows.
+        The scene or file doesn't exist, a file has a syntax error, or no catalog contains an import.
     """
     given = [source] if isinstance(source, str | Path) else source
     path, *others = _scene_first([scene_file(one) for one in given])
@@ -250,7 +247,7 @@ def load(
 
 
 def write_out(graph: KnowledgeGraph) -> list[Fault]:
-    """Add the individuals that behaviours and rules written in SPARQL stand for; return the SPARQL texts that can't be parsed."""
+    """Compile the updates and queries of behaviours and rules into individuals, and return the faults in these texts."""
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends", "construct")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []
@@ -264,7 +261,7 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
 
 
 def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
-    """Return for each behaviour or rule that is written in SPARQL the prefixes of its file."""
+    """Return the prefixes in the file of each behaviour or rule that is written in SPARQL."""
     prefixes: dict[str, dict[str, str]] = {}
     for file in graph.files.values():
         with readable(file) as (content, form):
@@ -279,7 +276,7 @@ def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
 
 
 def _scene_first(files: Sequence[Path]) -> list[Path]:
-    """Return files with the scene first: the first file that no other one imports."""
+    """Return files in an order that begins with the scene, the first file that no other file imports."""
     if not files:
         raise KnowledgeError("no file is given; wanted the name of a shipped scene, or files of RDF")
     if len(files) == 1:
@@ -297,7 +294,7 @@ def _scene_first(files: Sequence[Path]) -> list[Path]:
 
 
 def _said(file: Path, what: str) -> set[str]:
-    """Return the IRIs of the ontologies that a file declares or imports."""
+    """Return the IRIs of the ontologies that a file declares (`what` is ``Ontology``) or imports (``imports``)."""
     with readable(file) as (content, form):
         quads = list(ox.parse(content, format=form, base_iri=file.resolve().as_uri()))
     if what == "imports":
@@ -343,7 +340,7 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
 
 
 def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
-    """Remove from a scene's reach the refutations about things that the scene no longer has (`confab.reasoner.refutations`)."""
+    """Remove refutations about individuals that the scene no longer contains (`confab.reasoner.refutations`)."""
     store, reach, asserted = graph.store, ox.NamedNode(BASE + "reach"), ox.NamedNode(BASE + "asserted")
     refuted = list(store.quads_for_pattern(None, ox.NamedNode(CORE + "precondition"), None, reach))
     quads = list(store.quads_for_pattern(None, None, None, reach)) if refuted else []
@@ -359,7 +356,7 @@ def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
 
 
 def scene_file(source: str | Path) -> Path:
-    """Return the file of a scene, given by name or path."""
+    """Return the file of a scene that is given by its name or path."""
     shipped = ontology.scenes()
     if str(source) in shipped:
         return shipped[str(source)]
@@ -377,12 +374,12 @@ def scene_file(source: str | Path) -> Path:
 
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
-    """Read one file into a named graph of the store, and its prefixes into the graph."""
+    """Load a file into a named graph, and add its prefixes."""
     check(f"reading {file}")
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
         timed = _Timed(content, f"reading {file}")
-        if form.supports_datasets:  # all its graphs are in one file
+        if form.supports_datasets:  # all graphs of the file become one
             quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
             graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
         else:
@@ -393,21 +390,21 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
 
 
 class _Timed(BytesIO):
-    """A byte source that a parser reads in pieces, so that reading stops at a deadline."""
+    """A byte stream that raises `LimitError` at the deadline, so that a parser stops reading."""
 
     def __init__(self, content: bytes, doing: str) -> None:
         super().__init__(content)
         self.doing = doing
 
     def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes, or raise `LimitError`."""
+        """Return the next bytes, or raise `LimitError` after the deadline."""
         check(self.doing)
         return super().read(size)
 
 
 @contextmanager
 def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
-    """Provide the content of an RDF file for its parser, and its format; errors become a `KnowledgeError`."""
+    """Provide the content and the format of an RDF file; convert errors inside the context to `KnowledgeError`."""
     try:
         yield document(file)
     except SyntaxError as error:
@@ -419,7 +416,7 @@ def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
 
 
 def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
-    """Read the prefixes at the top of a file; the empty prefix is that of the first file."""
+    """Add the prefixes that a file declares; an empty prefix is added only from the first file."""
     first = not graph.declared
     with readable(file) as (content, form):
         parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
@@ -447,7 +444,11 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
 
 
 def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
-    """Return the file of an imported ontology: by the catalog beside the importer, by the shipped one, or beside it by name."""
+    """Return the file of an imported ontology.
+
+    It is looked up in the catalog beside the importing file, then in the shipped catalog, then by its name beside the importing
+    file.
+    """
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):
         if catalog not in read:

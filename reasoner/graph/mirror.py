@@ -1,7 +1,7 @@
-"""An owlready2 world that is synchronised with a knowledge graph, for users who think in classes.
+"""An owlready2 world that is synchronised with a knowledge graph, for access to the ontology as Python classes.
 
-The world is made from the scene's triples. `pull` transfers statements that were added to it or removed from it to the graph; it
-is called before every query. The world isn't written to files: Turtle files belong to their authors.
+The world is created from the scene's triples. `Mirror.pull` transfers added and removed statements to the graph before each query.
+The world is never written to files.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from confab.reasoner.validation.hermit import world_of
 
 
 class Mirror:
-    """An owlready2 world, and those of its statements that the graph contains.
+    """An owlready2 world of a knowledge graph's scene.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Mirror:
         self._seen = self._lines()
 
     def pull(self) -> int:
-        """Transfer changes of the world to the graph `asserted`; return their number."""
+        """Transfer the changes of the world since the last call to the graph `asserted`, and return their number."""
         now = self._lines()
         added, removed = now - self._seen, self._seen - now
         name = ox.NamedNode(BASE + "asserted")
@@ -43,7 +43,7 @@ class Mirror:
         return len(added) + len(removed)
 
     def _lines(self) -> set[bytes]:
-        """Return the world as N-Triples, one line each."""
+        """Return the statements of the world as lines of N-Triples."""
         file = io.BytesIO()
         self.world.save(file, format="ntriples")
         return set(file.getvalue().splitlines())

@@ -1,7 +1,7 @@
-"""Users' queries, answered in a separate process, so that their costs and failures don't affect this process.
+"""Execution of users' queries in a separate process, so that their costs and failures don't affect this process.
 
-A query can produce more rows than memory holds, and a deeply nested one crashes the SPARQL parser. The planner's own queries go to
-the store directly.
+A query may have more rows than fit into memory, and a deeply nested query crashes the SPARQL parser. The planner's own queries are
+executed in this process.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ TEXTS = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'(?:[^\\]|\\.)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""Tokens that may contain any word: texts, IRIs and comments."""
+"""Tokens in which words have no meaning: literals, IRIs and comments."""
 WORDS = re.compile(
     rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
 )
-"""A text, in which names don't count, or a prefixed name."""
+"""A token without meaningful words, or a prefixed name."""
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
-"""Maximum number of suggestions."""
+"""The list of expected tokens in an error message of the parser."""
 NAMESPACES = re.compile(r"\bPREFIX\s+([\w-]*):\s*<([^<>]*)>", re.IGNORECASE)
 PLACE = re.compile(r"error at (\d+):(\d+): ")
 FROM = re.compile(
@@ -54,18 +54,18 @@ FROM = re.compile(
     r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
     re.DOTALL | re.IGNORECASE,
 )
-"""Matches a text, whose content isn't read as a clause, or a clause that names a graph of the query's dataset."""
+"""A token without meaningful words, or a ``FROM`` clause."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
-"""The graphs whose union is the default graph, and the graphs that ``GRAPH`` can match; None means all graphs."""
+"""The graphs whose union is the default graph, and the graphs that ``GRAPH`` can match (None: all graphs)."""
 Answer: TypeAlias = "tuple[str, list[str], Any]"
-"""An answer: ``rows``, ``triples`` or ``truth``; the columns; the content."""
+"""The kind of result (``rows``, ``triples`` or ``truth``), the column names, and the content."""
 
 
 @dataclass(frozen=True)
 class QueryLimits:
-    """Limits of a query; with `service` it may ask other endpoints."""
+    """Limits of a query: seconds, rows, megabytes of memory; `service` permits queries to other endpoints."""
 
     seconds: float = SECONDS
     rows: int = ROWS
@@ -74,14 +74,14 @@ class QueryLimits:
 
 
 def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> Answer:
-    """Return the answer to a query on the union of the graphs.
+    """Return the result of a query on the union of a knowledge graph's graphs.
 
     Raises
     ------
     KnowledgeError
-        The query isn't SPARQL 1.1, asks another endpoint without permission, or is nested too deeply.
+        The query isn't SPARQL 1.1, is nested too deeply, or queries another endpoint without permission.
     LimitError
-        The query takes more time or memory, or has more rows, than the limits allow.
+        The query exceeds the limits of time, memory or rows.
     """
     limits = limits or QueryLimits()
     if graph.remote:
@@ -91,10 +91,10 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
 
 
 class _Checked(BytesIO):
-    """A byte sink that a store is written to in pieces, so that writing stops at a deadline."""
+    """A byte stream that raises `LimitError` at the deadline, so that a store stops writing."""
 
     def write(self, content: Buffer, /) -> int:
-        """Take the next bytes, or raise `LimitError`."""
+        """Store the next bytes, or raise `LimitError` after the deadline."""
         check("handing the scene to a query")
         return super().write(content)
 
@@ -106,10 +106,10 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 
 
 class QueryWorker:
-    """A process that answers queries, one after another, about a graph as it was when the process started.
+    """A process that executes queries on a copy of a graph.
 
-    It starts with the first query. It ends with the ``with`` block or with this process, even if this process is killed. An
-    interrupted query, or one that exceeds its limits, doesn't end the process.
+    The process starts, and copies the graph, at the first query. It ends with the ``with`` block or with this process. An
+    interrupted query, or a query that exceeds its limits, doesn't end the process.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class QueryWorker:
     limits : QueryLimits
         Limits of each query.
     nice : int
-        The niceness of the process.
+        Niceness (low scheduling priority) of the process.
     """
 
     def __init__(self, graph: KnowledgeGraph, limits: QueryLimits, nice: int = 0) -> None:
@@ -126,7 +126,7 @@ class QueryWorker:
         self._sending = Lock()
 
     def __enter__(self) -> QueryWorker:
-        """Return this object."""
+        """Return the worker itself."""
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
@@ -134,32 +134,32 @@ class QueryWorker:
         self.close()
 
     def close(self) -> None:
-        """End the process if it has started, and with it a running query."""
+        """End the process and its running query, if it has started."""
         if self._process is not None:
             end(self._process)
             self._process = None
 
     def start(self) -> None:
-        """Start the process if it doesn't run, and wait until it has read the graph."""
+        """Start the process unless it is running, and wait until it has read the graph."""
         if self._process is None:
             self.ask("ASK {}")
 
     def interrupt(self) -> None:
-        """End the running query of another thread, whose `ask` raises `LimitError`; do nothing while the process starts."""
+        """Stop the running query of another thread, whose `ask` raises `LimitError`; do nothing while the process starts."""
         if self._sending.acquire(blocking=False):
             self._send(None)
             self._sending.release()
 
     def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
-        """Return the answer to a query on a dataset; by default the query's own (``FROM``), or the union of all graphs.
+        """Return the result of a query on a dataset: by default the dataset of its ``FROM`` clauses, or the union of all graphs.
 
-        Errors are those of the function `ask`; a missing graph is also an error.
+        The errors are those of the function `ask`, and `KnowledgeError` for a graph that doesn't exist.
         """
         self.graph.round_trips += 1
         dataset = _existing(self.graph, dataset or clauses(self.graph, query) or (UNION, None))
         found = self._answer(core_names(self.graph, allowed(query, self.limits)), dataset)
         if found[0] == "error":
-            found = self._answer(query, dataset)  # unchanged, for the right position in errors
+            found = self._answer(query, dataset)  # the original query, for correct positions in messages
         return _checked(self.graph, query, self.limits, found)
 
     def _answer(self, query: str, dataset: Dataset) -> Answer:
@@ -167,14 +167,14 @@ class QueryWorker:
 
         def interrupt() -> None:
             late.set()
-            if starting and deadline.left == 0:  # it reads the graph, and no query yet
+            if starting and deadline.left == 0:  # the process is still reading the graph
                 kill(process)
             self.interrupt()
 
         with self._sending:
             if self._process is None:
                 command = [sys.executable, str(PROCESS)]
-                self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # it limits each query
+                self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # limited per query
                 self._send(self._setup())
             self._send((query, *dataset))
         left, process = deadline.left, self._process
@@ -213,12 +213,12 @@ class QueryWorker:
     def _send(self, message: object) -> None:
         if self._process is not None and self._process.stdin is not None:
             content = pickle.dumps(message)
-            with suppress(OSError):  # it has ended, which is noticed where its answer is read
+            with suppress(OSError):  # the process has ended; reading its answer raises the error
                 self._process.stdin.write(len(content).to_bytes(8, "big") + content)
                 self._process.stdin.flush()
 
     def _why(self, status: int, said: str, late: bool) -> Exception:
-        """Return the error for a query that ended without an answer."""
+        """Return the error for a query that ended without a result."""
         if late or status == -signal.SIGXCPU:
             return LimitError(
                 f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
@@ -235,7 +235,7 @@ class QueryWorker:
 
 
 def allowed(query: str, limits: QueryLimits) -> str:
-    """Return a query; raise `KnowledgeError` if it asks other endpoints without permission."""
+    """Return a query unchanged; raise `KnowledgeError` if it queries other endpoints without permission."""
     if not limits.service and SERVICE.search(TEXTS.sub(" ", query)):
         raise KnowledgeError(
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"
@@ -244,7 +244,7 @@ def allowed(query: str, limits: QueryLimits) -> str:
 
 
 def clauses(graph: KnowledgeGraph, query: str) -> Dataset | None:
-    """Return the dataset that a query's ``FROM`` clauses describe; None if it has none."""
+    """Return the dataset that the ``FROM`` clauses of a query describe; return None if there are no such clauses."""
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
     found = [match for match in FROM.finditer(query) if match["text"] is None]
     names = [
@@ -258,7 +258,7 @@ def clauses(graph: KnowledgeGraph, query: str) -> Dataset | None:
 
 
 def _existing(graph: KnowledgeGraph, dataset: Dataset) -> Dataset:
-    """Return a dataset; raise `KnowledgeError` if it names a graph that doesn't exist."""
+    """Return a dataset unchanged; raise `KnowledgeError` if one of its graphs doesn't exist."""
     known = {*UNION, *(name.value for name in graph.store.named_graphs() if isinstance(name, ox.NamedNode))}
     for name in (*dataset[0], *(dataset[1] or ())):
         if name not in known:
@@ -268,7 +268,7 @@ def _existing(graph: KnowledgeGraph, dataset: Dataset) -> Dataset:
 
 
 def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answer) -> Answer:
-    """Return an answer; raise the error that it reports."""
+    """Return the result of a query; raise the exception for an error that the process reports."""
     if found[0] == "too many":
         raise LimitError(
             f"gave up: more than {limits.rows:,} rows, or very long ones; add a LIMIT to the query, or allow more (--rows)"
@@ -279,7 +279,7 @@ def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answ
 
 
 def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
-    """Return the error of a query in one line, with the text at its position and the name of an unknown prefix."""
+    """Return the error message of a query in one line, with the text at the position or the name of an unknown prefix."""
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
     if unknown := next(iter(unknown_prefixes(graph, query)), None):
@@ -294,7 +294,7 @@ def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
 
 
 def unknown_prefixes(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the prefixes in a query that neither it nor the scene declares."""
+    """Return the prefixes in a query that neither the query nor the scene declares."""
     known = {*graph.spoken, *DECLARED.findall(query), "_"}
     used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]
     return [prefix for prefix in used if prefix not in known]
@@ -317,7 +317,7 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
 
 
 def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the prefixed names in a query that the graph doesn't contain, each with its first position."""
+    """Return the prefixed names in a query that don't occur in the graph, each with the most probable correction."""
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
     found = []
     for match in WORDS.finditer(core_names(graph, query)):
@@ -339,7 +339,7 @@ def _speaks_of(graph: KnowledgeGraph, iri: str) -> bool:
 
 
 def standing_alone(graph: KnowledgeGraph, query: str) -> str:
-    """Return one of our queries with PREFIX lines for its prefixes, for endpoints that don't know them."""
+    """Return an internal query preceded by PREFIX declarations, for endpoints that don't know the prefixes."""
     used = {m["prefix"] or "" for m in WORDS.finditer(query) if m["text"] is None and "?" not in m[0]}
     lines = [f"PREFIX {prefix}: <{graph.prefixes[prefix]}>" for prefix in sorted(used) if prefix in graph.prefixes]
     return "\n".join([*lines, query])

@@ -1,7 +1,8 @@
-"""The process that answers queries for `confab.reasoner.graph.query_process`. It imports nothing else of this project.
+"""Main program of the process that executes queries for `confab.reasoner.graph.query_process`.
 
-The process keeps a graph and forks for each query. The fork limits its own memory, time and files (and thereby connections),
-and ends after its answer. The next message, or the end of the parent process, ends the fork early.
+The process imports no other module of this project. It stores a graph and forks for each query. The fork limits its own memory,
+time and number of files (which also prevents connections), and ends after its answer. The next message, or the end of the parent
+process, stops the fork.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import pyoxigraph as ox
 
 
 def main() -> None:
-    """Answer each query by ``(kind, columns, rows)`` with the kinds of `answer`, or by ``("ended", status, output)``."""
+    """Answer each query by ``(kind, columns, rows)`` as returned by `answer`, or by ``("ended", status, output)``."""
     setup = received()
     os.nice(setup["nice"])
     limit(resource.RLIMIT_CORE, 0)
@@ -28,19 +29,19 @@ def main() -> None:
     store.bulk_extend(ox.parse(setup["quads"], format=ox.RdfFormat.N_QUADS))
     while True:
         question = received()
-        if question is not None:  # None interrupts a query that has just been answered
+        if question is not None:  # None is a late interruption of the last query
             sys.stdout.buffer.write(forked(store, question, setup))
             sys.stdout.buffer.flush()
 
 
 def received() -> Any:
-    """Return the next message; end this process if the parent process has ended."""
+    """Return the next message; exit if the parent process has ended."""
     size = int.from_bytes(read(8), "big")
     return pickle.loads(read(size))
 
 
 def read(size: int) -> bytes:
-    """Return exactly this number of bytes from stdin, so that `select` reports the next message."""
+    """Return exactly `size` bytes from standard input, without buffering, so that `select` detects the next message."""
     found = bytearray()
     while len(found) < size:
         part = os.read(0, min(size - len(found), 1 << 20))
@@ -51,7 +52,7 @@ def read(size: int) -> bytes:
 
 
 def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) -> bytes:
-    """Return the pickled answer of a fork, or how the fork ended without one."""
+    """Return the pickled answer of a forked process, or its exit status if it ended without an answer."""
     ours, theirs = os.pipe()
     child = os.fork()
     if child == 0:
@@ -62,7 +63,7 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
                 os.dup2(theirs, number)
             limit(resource.RLIMIT_CPU, int(min(setup["seconds"], 1e9)) + 2)
             if not setup["service"]:
-                limit(resource.RLIMIT_NOFILE, 3)  # no further one
+                limit(resource.RLIMIT_NOFILE, 3)  # no files besides standard streams
             query, default, named = question
             said = pickle.dumps(answer(store, query, default, named, setup))
             if len(said) > setup["memory"] // 10:  # the reader needs several times as much memory
@@ -84,24 +85,23 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
         found += part
     os.close(ours)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if part:  # it was interrupted, be it behind its answer
+    if part:  # interrupted, possibly after its answer
         return pickle.dumps(("ended", -signal.SIGKILL, ""))
     return bytes(found) if status == 0 else pickle.dumps(("ended", status, found.decode("utf-8", "replace")))
 
 
 def limit(what: int, value: int) -> None:
-    """Set a limit of this process permanently."""
+    """Set a resource limit of this process permanently."""
     resource.setrlimit(what, (value, value))
 
 
 def answer(
     store: ox.Store, query: str, default: Sequence[str], named: Sequence[str] | None, setup: dict[str, Any]
 ) -> tuple[str, object, object]:
-    """Return the result of one query.
+    """Return the result of a query: its kind, the column names and the content.
 
-    ``rows``, ``triples``, ``truth``, ``too many`` or ``error``, the columns, and the content.
-
-    The query sees the union of some graphs and, in ``GRAPH``, some or all of the named ones.
+    The kind is ``rows``, ``triples``, ``truth``, ``too many`` or ``error``. The default graph is the union of the graphs `default`;
+    ``GRAPH`` matches the graphs `named` (None: all graphs).
     """
     try:
         found = store.query(

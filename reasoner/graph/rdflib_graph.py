@@ -1,4 +1,4 @@
-"""A knowledge graph as an rdflib graph: additions and removals apply to both at once."""
+"""An rdflib view of a knowledge graph; additions and removals change both graphs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, Knowle
 
 
 def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Graph:
-    """Return the triples of a knowledge graph as an rdflib graph; `edited` is called after each change.
+    """Return a knowledge graph as an rdflib graph that forwards its changes; `edited` is called after each change.
 
-    Added triples go into the graph `asserted`; removed ones are removed from every graph. Conclusions aren't updated.
+    New triples are added to the graph `asserted`; removed triples are removed from all graphs. Inferences aren't updated.
     """
     store = _WriteThrough(graph, edited)
     found = rdflib.Graph(store)
@@ -27,7 +27,7 @@ def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Gr
 
 
 class _SameNames(dict[str, str]):
-    """Keeps the names of the knowledge graph's blank nodes."""
+    """Mapping of blank node names to themselves, so that rdflib keeps the names of the knowledge graph."""
 
     def get(self, name: str, default: object = None) -> str:
         """Return the name itself."""
@@ -35,14 +35,14 @@ class _SameNames(dict[str, str]):
 
 
 class _WriteThrough(Memory):
-    """rdflib's store in memory, which forwards every change."""
+    """rdflib's store in memory, which forwards every change to the knowledge graph."""
 
     def __init__(self, graph: KnowledgeGraph, edited: Callable[[], None]) -> None:
         super().__init__()
         self.graph, self.edited, self.writes = graph, edited, False
 
     def add(self, triple: Any, context: Any, quoted: bool = False) -> None:
-        """Add a triple here and in the knowledge graph; raise `KnowledgeError` if that can't hold it."""
+        """Add a triple to both graphs; raise `KnowledgeError` if the triple isn't valid RDF."""
         if self.writes:
             quad = _quad(self.graph, triple, "asserted")
             self.graph.store.add(quad)
@@ -50,7 +50,7 @@ class _WriteThrough(Memory):
         super().add(triple, context, quoted)
 
     def remove(self, triple_pattern: Any, context: Any = None) -> None:
-        """Remove the triples that match a pattern, here and in the knowledge graph."""
+        """Remove the triples that match a pattern from both graphs."""
         gone = [triple for triple, _ in self.triples(triple_pattern, context)] if self.writes else []
         for triple in gone:
             for name in GRAPHS:

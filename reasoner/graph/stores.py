@@ -1,7 +1,7 @@
-"""Stores of a scene's triples outside of memory: Oxigraph on disk, and any SPARQL 1.1 endpoint.
+"""Stores for a scene's triples besides memory: an Oxigraph store on disk, and any SPARQL 1.1 endpoint.
 
-Files are loaded into a store on disk once, and again after one of them has changed. An endpoint is only read, by few large
-queries. It has either one default graph with all triples, or a named graph for each ontology, named by the ontology's IRI.
+A store on disk is filled from the files once, and again after a file has changed. An endpoint is only read, by a few large
+queries. It contains all triples in one default graph, or has a named graph for each ontology with the ontology's IRI.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from confab.reasoner.graph.knowledge import (
 )
 
 AUTHORIZATION = "CONFAB_SPARQL_AUTHORIZATION"
-"""Environment variable with the value of the Authorization header, e.g. ``Bearer …``."""
+"""Environment variable with the value of the HTTP Authorization header, e.g. ``Bearer …``."""
 TIMEOUT = 60.0
 RETRIES = 3
 BACKOFF = 0.2
 BUSY = (429, 502, 503, 504)
 RESULTS = "application/sparql-results+json"
 LARGEST = 2_000_000_000
-"""Maximum number of bytes of an answer; a whole scene of 20,000 objects has 20 million."""
+"""Maximum number of bytes in an HTTP response; a scene of 20,000 objects has 20 million bytes."""
 CHUNK = 1 << 16
 FORM = re.compile(r"\b(SELECT|ASK|CONSTRUCT|DESCRIBE)\b", re.IGNORECASE)
 PROLOGUE = re.compile(r"#[^\n]*|\bPREFIX\s+\S*\s*<[^>]*>|\bBASE\s*<[^>]*>", re.IGNORECASE)
@@ -61,25 +61,25 @@ SELECT DISTINCT ?graph ?ontology ?import WHERE {
 
 @dataclass
 class Endpoint:
-    """A SPARQL 1.1 endpoint, queried by POST.
+    """A SPARQL 1.1 endpoint that is queried by POST requests.
 
     Parameters
     ----------
     url : str
-        A user name and password in it are sent as basic authentication, and not shown.
+        A user name and password in the URL are sent as basic authentication, and removed from the URL.
     authorization : str, optional
         Value of the Authorization header.
     timeout : float
-        Seconds to wait for an answer.
+        Maximum number of seconds to wait for a response.
     retries : int
-        Number of retries after a lost connection or a busy server; the pause before each retry doubles.
+        Number of retries after a lost connection or for a busy server; the pause doubles with each retry.
     graphs : tuple of str
         IRIs of the named graphs whose union is queried; the endpoint's default graph if empty.
 
     Attributes
     ----------
-    noted : mapping of query, as it is sent, to digest of its result
-        The results so far; `confirm` repeats the queries.
+    noted : mapping of request to digest of its result
+        The requests that `confirm` repeats.
     """
 
     url: str
@@ -104,10 +104,10 @@ class Endpoint:
     def _pool(self) -> urllib3.PoolManager:
         retry = urllib3.Retry(
             total=self.retries,
-            read=min(1, self.retries),  # a query that timed out isn't repeated for ever
+            read=min(1, self.retries),  # repeat a query that timed out only once
             backoff_factor=BACKOFF,
             status_forcelist=BUSY,
-            allowed_methods=None,  # a query changes nothing, so a POST may be repeated
+            allowed_methods=None,  # queries change nothing, so POST requests can be repeated
             raise_on_status=False,
             respect_retry_after_header=False,
         )
@@ -123,15 +123,15 @@ class Endpoint:
         query : str
         prefixes : mapping of prefix to namespace
         bindings : mapping of variable to IRI
-            Of variables that the query selects.
+            Values of selected variables.
         noted : bool
-            Whether `confirm` repeats it.
+            Whether `confirm` repeats the query.
 
         Raises
         ------
         KnowledgeError
-            There is no response, or it is too slow or too large; authentication is required; the URL is no endpoint; the query
-            isn't SPARQL.
+            The server doesn't respond, is too slow, requires authentication or isn't an endpoint; the response is too large; or the
+            query isn't SPARQL.
         """
         form = FORM.search(PROLOGUE.sub(" ", query))
         rows = form is None or form.group().upper() in ("SELECT", "ASK")
@@ -158,25 +158,25 @@ class Endpoint:
         return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
 
     def confirm(self) -> None:
-        """Repeat all recorded queries, so that one plan is never made from two versions of the data.
+        """Repeat all noted queries, to detect changes of the data during planning.
 
         Raises
         ------
         KnowledgeError
-            An answer has changed; and the errors of `query`.
+            A result has changed, or `query` fails.
         """
         for (body, accept), digest in self.noted.items():
             if _digest(self._post(body, accept)[0]) != digest:
                 raise KnowledgeError(f"{self.url}: the data changed since it was read; open the scene anew")
 
     def _post(self, body: bytes, accept: str) -> tuple[bytes, str]:
-        """Return an answer and its media type."""
+        """Return the content and the media type of the response to a request."""
         headers = {"Accept": accept, "Content-Type": "application/x-www-form-urlencoded"}
         if self.authorization:
             headers["Authorization"] = self.authorization
         slow = f"{self.url}: no answer within {self.timeout:g} s; the store is too slow for this, or the limit too low"
         for again in reversed(range(self.retries + 1)):
-            end = time.monotonic() + 2 * self.timeout  # the first byte may take one timeout, all others another
+            end = time.monotonic() + 2 * self.timeout  # one timeout for the first byte, one for the rest
             try:
                 response = self._pool.request("POST", self.url, body=body, headers=headers, preload_content=False)
                 answer = bytearray()
@@ -205,7 +205,7 @@ class Endpoint:
 
 
 def _digest(answer: bytes) -> bytes:
-    """Return a canonical form of an answer: without the order of rows and the names of blank nodes."""
+    """Return a hash of a result that doesn't depend on the order of rows or the names of blank nodes."""
     try:
         said = json.loads(answer)
         rows = said["results"]["bindings"]
@@ -221,21 +221,21 @@ def _digest(answer: bytes) -> bytes:
 
 
 def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, retries: int = RETRIES) -> KnowledgeGraph:
-    """Return the scene at a SPARQL 1.1 endpoint, with all its imports there.
+    """Return the knowledge graph of a scene at a SPARQL 1.1 endpoint, with all its imports that the endpoint contains.
 
     Parameters
     ----------
     url : str
-        Of the endpoint, e.g. ``http://localhost:7878/query``.
+        URL of the endpoint, e.g. ``http://localhost:7878/query``.
     scene : str, optional
-        IRI of the scene; needed if the endpoint holds several.
+        IRI of the scene; required if the endpoint contains several scenes.
     timeout, retries
-        As in `Endpoint`. The Authorization header is taken from the environment (`AUTHORIZATION`).
+        See `Endpoint`. The Authorization header is read from the environment variable `AUTHORIZATION`.
 
     Raises
     ------
     KnowledgeError
-        As `Endpoint.query`; or there is no such scene, no scene at all, or several to choose from.
+        A query fails as in `Endpoint.query`, or the endpoint contains no such scene, no scene, or several scenes.
     """
     endpoint = Endpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)
     graph = KnowledgeGraph("", remote=endpoint)
@@ -255,7 +255,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
 
 
 def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
-    """Return the requested scene, or the only ontology that no other imports."""
+    """Return the requested scene; by default, the only ontology with imports that no other ontology imports."""
     if scene is not None:
         if scene not in imports:
             raise KnowledgeError(
@@ -272,7 +272,7 @@ def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
 
 
 def _complete(query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> str:
-    """Return a self-contained query: its prefixes precede it, and its bindings follow it."""
+    """Return a query preceded by PREFIX declarations and followed by its bindings as VALUES."""
     head = "\n".join(f"PREFIX {prefix}: {ox.NamedNode(namespace)}" for prefix, namespace in prefixes.items())
     values = f"\nVALUES ({' '.join(f'?{name}' for name in bindings)}) {{ ({_iris(bindings)}) }}" if bindings else ""
     return f"{head}\n{query}{values}"
@@ -303,19 +303,19 @@ def _short(error: object) -> str:
 
 
 def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
-    """Load a scene into an Oxigraph store on disk, unless the store has it and no file has changed.
+    """Return a scene in an Oxigraph store on disk, which is filled unless it contains the current version of all files.
 
     Parameters
     ----------
     source : str or Path
-        As in `confab.reasoner.graph.knowledge.load`.
+        Name or file of the scene, as in `confab.reasoner.graph.knowledge.load`.
     folder : Path
-        Of the store; made if missing. One process at a time can use it.
+        Folder of the store, created if missing. Only one process at a time can use it.
 
     Raises
     ------
     KnowledgeError
-        As `confab.reasoner.graph.knowledge.load`; or the folder is in use or is no store.
+        Loading fails as in `confab.reasoner.graph.knowledge.load`, or the folder is in use or isn't a store.
     """
     try:
         store = ox.Store(str(folder))
@@ -347,7 +347,7 @@ def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
 
 
 def _stamp(file: Path) -> str:
-    """Return path, size and time of change of a file, which identify its version."""
+    """Return the path, size and modification time of a file, which together identify its version."""
     if not file.is_file():
         return f"{file}\t0\t0"
     state = file.stat()

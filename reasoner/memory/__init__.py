@@ -1,1 +1,1 @@
-"""The memory: knowledge links, counts and episodes, as values and as files."""
+"""The planner's memory: knowledge links, learned experience and episodes, as dataclasses and as files."""

@@ -1,19 +1,18 @@
-"""Learned experience as readable values: rules, orders of goals, methods, and the tallies of their use.
+"""Learned experience: rules, orders of goals and methods, with tallies of their use.
 
 ==========  ===================================================================================================
 Rule        a behaviour that achieves a kind of goal under some conditions
-Order       a kind of goal that is achieved before another kind, where both share individuals
-Method      steps that refine a behaviour, over its roles and further ones
+Order       a kind of goal that is achieved before another kind, if their goals share individuals
+Method      steps that refine a behaviour, with roles as arguments
 GoalKind    the goals of one situation type about individuals of one class
-Tally       numbers of times that an item was chosen and worked, was passed over, and failed
-Experience  the learned items, with tallies by replica and epoch: grow-only, so that memories merge
+Tally       numbers of times that an item was chosen successfully, was passed over, and failed
+Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content: equal items of two replicas have equal names,
-and merging them is a union. The tallies of an item are kept by lifted facts (`Fact`): the empty fact counts the item itself;
-other facts count situations of the individuals in its roles. Epoch 0 has the tallies that never age. The later epochs, one for
-each episode of a replica, have preferences between individuals (this hand, not that one), whose weight decays with the number
-of later episodes.
+Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
+names, and their union merges them. An item has one tally per lifted fact (`Fact`): the empty fact counts the item itself, other
+facts count situations of the individuals in its roles. Tallies of epoch 0 never age. Each further epoch belongs to one episode of
+a replica, and contains preferences between individuals (for example between two hands), whose weight decays with later episodes.
 """
 
 from __future__ import annotations
@@ -27,33 +26,33 @@ from confab.reasoner.symbols import Condition, ValueCondition
 from confab.reasoner.symbols import Fact as Goal
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
-"""A behaviour and its terms."""
+"""A behaviour and its arguments."""
 Fact: TypeAlias = "tuple[str, str]"
-"""A question about the individuals in the roles of an item, and the answer; both empty for the item itself."""
+"""A question about the individuals in the roles of an item, and its answer; both are empty for the item itself."""
 ITSELF: Fact = ("", "")
 
 
 class LearningError(ValueError):
-    """The plan isn't applicable in the scene's situation, so nothing can be learned from it."""
+    """Raised if a plan isn't applicable in the scene's initial state, so that nothing can be learned from it."""
 
 
 def _named(kind: str, said: object) -> str:
-    import hashlib  # imported on use: planning without memory needs no names
+    import hashlib  # imported only for learning, to start faster
 
     return f"{kind}_{hashlib.sha1(repr(said).encode(), usedforsecurity=False).hexdigest()[:16]}"
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A behaviour that achieves a goal, over roles; different roles denote different individuals.
+    """A behaviour that achieves a goal, with roles as arguments; different roles denote different individuals.
 
     Attributes
     ----------
     goal : ValueCondition
         Its terms are roles (``?cup``) or individuals of the domain.
     asks : tuple of Condition
-        Conditions under which the rule applies.
-    does : behaviour and terms
+        Conditions under which the rule is applicable.
+    does : behaviour and arguments
     kinds : tuple of (role, class)
     """
 
@@ -64,7 +63,7 @@ class Rule:
 
     @cached_property
     def name(self) -> str:
-        """The rule's name."""
+        """The hash-based name of the rule."""
         return _named("rule", (self.goal, self.asks, self.does, self.kinds))
 
     @property
@@ -76,10 +75,10 @@ class Rule:
 
 @dataclass(frozen=True)
 class Order:
-    """An order between two kinds of goals.
+    """A learned order: goals of one situation type are achieved before goals of another.
 
-    `first` and `then` are situation types. `shared` has the pairs of positions (0 for the first argument, …, last for the value) at
-    which both goals have the same individual.
+    `first` and `then` are the situation types. `shared` contains the pairs of positions at which the two goals have the same
+    individual; positions count the arguments from 0, and the value is last.
     """
 
     first: str
@@ -88,12 +87,12 @@ class Order:
 
     @cached_property
     def name(self) -> str:
-        """The order's name."""
+        """The hash-based name of the order."""
         return _named("order", (self.first, self.then, self.shared))
 
     @classmethod
     def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
-        """Return the order of two goals, with the positions of shared individuals that are no constants."""
+        """Return the order of two goals, with the positions of shared individuals except `constants`."""
         one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
         shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
         return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
@@ -106,11 +105,11 @@ class Order:
 
 @dataclass(frozen=True)
 class OpenRole:
-    """A role of a method that is no parameter of the refined behaviour.
+    """A role of a method that isn't a parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that it filled. `source` is the symbol whose value it is at its first use: situation
-    type and positions of the arguments. `becomes` is the situation type whose value the individual becomes; a free individual
-    is preferred.
+    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value the role is at its first use: its
+    situation type, and the roles that are its arguments. `becomes` is the situation type whose value the individual becomes; an
+    individual that no symbol has as its value is then preferred.
     """
 
     kind: str
@@ -120,7 +119,7 @@ class OpenRole:
 
 @dataclass(frozen=True)
 class Method:
-    """Steps that refine a behaviour, over numbered roles: first the `roles` of the behaviour itself, then the `open` ones."""
+    """Steps that refine a behaviour; their arguments are numbered roles: the behaviour's parameters, then the `open` roles."""
 
     behavior: str
     roles: int
@@ -129,20 +128,20 @@ class Method:
 
     @cached_property
     def name(self) -> str:
-        """The method's name."""
+        """The hash-based name of the method."""
         return _named("method", (self.behavior, self.roles, self.steps, self.open))
 
 
 @dataclass(frozen=True)
 class GoalKind:
-    """The goals of a situation type about individuals of some classes."""
+    """All goals of a situation type about individuals of some classes."""
 
     situation: str
     classes: tuple[str, ...]
 
     @cached_property
     def name(self) -> str:
-        """The kind's name."""
+        """The hash-based name of the kind of goal."""
         return _named("goals", (self.situation, self.classes))
 
 
@@ -158,11 +157,11 @@ class Tally:
     failed: int = 0
 
     def __add__(self, other: Tally) -> Tally:
-        """Return the sum, for different events."""
+        """Return the sums of the numbers, for tallies of different events."""
         return Tally(self.chosen + other.chosen, self.passed_over + other.passed_over, self.failed + other.failed)
 
     def __or__(self, other: Tally) -> Tally:
-        """Return the maximum of each number, for two copies of one counter."""
+        """Return the maxima of the numbers, for two copies of one tally."""
         return Tally(
             max(self.chosen, other.chosen), max(self.passed_over, other.passed_over), max(self.failed, other.failed)
         )
@@ -170,7 +169,7 @@ class Tally:
 
 @dataclass
 class Lesson:
-    """The lesson of one episode: learned items, and tallies to add; `personal` has the preferences between individuals."""
+    """What was learned in one episode: items and their tallies; `personal` contains preferences between individuals."""
 
     said: list[Said] = field(default_factory=list)
     counted: list[tuple[Said, Fact, Tally]] = field(default_factory=list)
@@ -189,12 +188,12 @@ Counts: TypeAlias = "dict[str, dict[Fact, Tally]]"
 
 @dataclass
 class Experience:
-    """Learned items, with grow-only counters for each replica.
+    """Learned items, with grow-only tallies for each replica.
 
     Parameters
     ----------
     replica : str
-        ID of the replica that counts in this memory, unique to one writer.
+        ID of the replica that learns in this memory; only one writer may use it.
     episodes : mapping of replica to number
         Number of episodes of each replica.
     said : mapping of name to rule, order, method or kind of goal
@@ -202,7 +201,7 @@ class Experience:
     trusts : set of replica
         Other replicas whose experience is used for planning.
     disabled : set of name
-        Learned items that are not used for planning.
+        Learned items that aren't used for planning.
 
     Examples
     --------
@@ -232,7 +231,7 @@ class Experience:
                 table[fact] = table.get(fact, Tally()) + tally
 
     def merge(self, other: Experience) -> None:
-        """Merge another memory, with the maximum of common counters; the result does not depend on order or repetition."""
+        """Merge another memory by the maximum of common tallies; the result doesn't depend on the order or repetition of merges."""
         self.said.update(other.said)
         for replica, number in other.episodes.items():
             self.episodes[replica] = max(self.episodes.get(replica, 0), number)
@@ -250,7 +249,7 @@ class Experience:
         return found
 
     def preferences(self, decay: float) -> dict[str, dict[Fact, tuple[float, float]]]:
-        """Return the numbers of choices and rejections by name and fact; each later episode multiplies them by `decay`."""
+        """Return the weighted numbers of choices and rejections by name and fact; each later episode multiplies them by `decay`."""
         found: dict[str, dict[Fact, tuple[float, float]]] = {}
         for (replica, epoch), name, fact, tally in self:
             if epoch:
@@ -261,12 +260,12 @@ class Experience:
         return found
 
     def __iter__(self) -> Iterator[tuple[tuple[str, int], str, Fact, Tally]]:
-        """Yield every counter: replica and epoch, name of the item, fact, and tally."""
+        """Yield each tally with its replica and epoch, the name of its item, and its fact."""
         for who, counts in self.counts.items():
             for name, facts in counts.items():
                 for fact, tally in facts.items():
                     yield who, name, fact, tally
 
     def __len__(self) -> int:
-        """Return the number of counters."""
+        """Return the number of tallies."""
         return sum(len(facts) for counts in self.counts.values() for facts in counts.values())

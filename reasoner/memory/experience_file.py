@@ -1,12 +1,12 @@
-"""Experience on disk and in stores: rules and methods as triples, counts as annotated axioms, in Turtle that Protégé opens.
+"""Files and stores of experience: learned items as triples and tallies as annotated axioms, in Turtle that Protégé can open.
 
-`confab.reasoner.memory.rules_file` writes each learned item once. There is a counter for each replica, epoch and item
-(`:countsFor`), which is `:associatedWith` the item itself and the lifted facts that held. An ``owl:Axiom`` on each of these
-links has `:chosen`, `:passedOver`, `:failed` and the resulting `:probability`. Writers never share a counter, and all other
-items are named by their content. So the union of two files is a file of both memories. An edited rule keeps its counts.
+Each learned item is written once (`confab.reasoner.memory.rules_file`). There is a counter for each replica, epoch and item
+(`:countsFor`). It is `:associatedWith` the item itself and with the lifted facts that held. An ``owl:Axiom`` on each of these links
+has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never share a counter, and other
+items are named by their content, so that the union of two files contains both memories. An edited rule keeps its tallies.
 
-Each link is written on one line, and such lines are read by a regular expression. Files in another layout, such as Protégé's, are
-read by the Turtle parser.
+Each link is written as one line, which is read by a regular expression. Files in another layout, such as that of Protégé, are read
+by the Turtle parser.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
 
 FORMAT = 5
 TALLY = ("chosen", "passedOver", "failed")
-PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
+PRIOR = 1.0  # pseudo-counts in every probability: half a choice and half a pass
 
 HEAD = """@prefix : <{core}> .
 @prefix owl: <{owl}> .
@@ -45,7 +45,7 @@ LINK = (
     "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
     ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
 )
-MOST = 2**53  # counts up to here are exact as floating-point numbers
+MOST = 2**53  # larger counts aren't exact as floating-point numbers
 COUNTS = re.compile(
     r"^m:(?:(fact_\w+) a owl:NamedIndividual, :LiftedFact ; :asks \"([^\"\\\n]*)\" ; :answer \"([^\"\\\n]*)\" ; "
     r"rdfs:label [^\n]* \.\n|"
@@ -54,16 +54,16 @@ COUNTS = re.compile(
     r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
     re.MULTILINE,
 )
-"""Lines of lifted facts and of counts, which make up most of a file. The Turtle parser reads all other lines, in any layout."""
+"""Lines of lifted facts and of tallies, which make up most of a file; the Turtle parser reads all other lines."""
 
 
 PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+)", re.MULTILINE)
-"""Lines of the paper's links. Only the paper's mode reads them, and they can make up nearly all of a file."""
+"""Lines of knowledge links, which only the paper's planner reads, and which can make up most of a file."""
 
 
 @dataclass(frozen=True)
 class Lines:
-    """The parts of a memory file: links with counts, lifted facts by name, the paper's links, and the rest as Turtle."""
+    """The parts of a memory file: links with tallies, lifted facts by name, knowledge links, and the rest as Turtle."""
 
     links: list[tuple[str, str, Tally]] = field(default_factory=list)
     facts: dict[str, Fact] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class Lines:
 
     @cached_property
     def triples(self) -> list[ox.Triple]:
-        """The triples of `rest`; raises `SyntaxError`."""
+        """The triples of `rest`; raises `SyntaxError` for invalid Turtle."""
         return [q.triple for q in ox.parse(self.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
 
 
@@ -100,12 +100,12 @@ def lines(text: str) -> Lines:
 
 
 def new_replica() -> str:
-    """Return a unique ID for a new memory."""
+    """Return a unique ID for the replica of a new memory."""
     return str(uuid.uuid4())
 
 
 def probability(tally: Tally) -> float:
-    """Return the probability that a candidate is chosen and succeeds, with half a choice and half a pass as prior.
+    """Return the probability that a candidate is chosen and succeeds, with a prior of half a choice and half a pass.
 
     >>> probability(Tally(chosen=3, passed_over=0))
     0.875
@@ -125,9 +125,9 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
     path : Path
     experience : Experience
     names : Names
-        Give the IRIs of behaviours and classes.
+        Mapping from the names of behaviours and classes to IRIs.
     domain : str
-        IRI of the ontology that the file imports, for Protégé.
+        IRI of the ontology that the file imports.
     """
     write_whole(path, turtle(experience, names, domain))
 
@@ -135,7 +135,7 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 def turtle(
     experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
 ) -> Iterator[str]:
-    """Yield a memory as Turtle, item by item; with `only`, the counts of one replica. `words` returns an item's label."""
+    """Yield a memory as Turtle, item by item; `only` restricts it to one replica's tallies, `words` returns an item's label."""
     iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
     replica = _text(experience.replica)
@@ -176,7 +176,7 @@ def _digest(text: str) -> str:
 
 
 def _node(space: str, name: str) -> str:
-    """Return the IRI of a name in a namespace as a term of Turtle and SPARQL."""
+    """Return the IRI of a name in a namespace, in the notation of Turtle and SPARQL."""
     return str(ox.NamedNode(space + quote(name, safe="")))
 
 
@@ -193,7 +193,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
     Raises
     ------
     KnowledgeError
-        The file is missing, broken, of another format or no memory of this kind; the message says which, and what to do.
+        The file is missing, damaged, has another format version, or isn't a memory of experience.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -205,7 +205,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
 
 
 def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
-    """Return the experience in a memory file's parts; messages name it by `source`."""
+    """Return the experience in the parts of a memory file; `source` names the file in messages."""
     try:
         triples = found.triples
     except SyntaxError as error:
@@ -236,7 +236,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
     experience = Experience(head["learnsAs"][0], trusts=set(head.get("trusts", ())))
     reader = RuleReader(nodes, names)
     try:
-        named: dict[str, str] = {}  # an edited rule has another name, but keeps the counts of its node
+        named: dict[str, str] = {}  # an edited rule has another name, but keeps its tallies
         for subject, node in nodes.items():
             one: Said | None = reader.said(subject)
             if one is not None:
@@ -247,9 +247,9 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             if "episodes" in node:
                 several = [
                     _count(text, "episodes") for text in node["episodes"]
-                ]  # two after a union of an older and a newer copy
+                ]  # two numbers in a union of two versions
                 experience.episodes[node["replica"][0]] = max(several)
-            if "chosen" in node:  # the paper's links have only a probability
+            if "chosen" in node:  # knowledge links have only a probability
                 counter, target = (
                     _local(reader.one(subject, OWL + end)) for end in ("annotatedSource", "annotatedTarget")
                 )
@@ -264,7 +264,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 if about in named:
                     tallies = experience.counts.setdefault(who, {}).setdefault(named[about], {})
                     counters[_local(subject)] = tallies
-                else:  # a deleted item isn't counted any more; Protégé deletes all triples that name it
+                else:  # the item was deleted, for example in Protégé
                     counters[_local(subject)] = {}
         for counter, target, tally in links:
             fact = facts[target] if target.startswith("fact_") else ITSELF
@@ -285,7 +285,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
 
 
 def _count(text: str, what: str) -> int:
-    """Return a count; raise `ValueError` if it is out of range."""
+    """Return a number as an integer; raise `ValueError` if it is out of range."""
     if not 0 <= (number := int(text)) < MOST:
         raise ValueError(f":{what} {number}; wanted a number from 0 to {MOST}")
     return number
@@ -305,7 +305,8 @@ def _local(iri: str) -> str:
 def pull(endpoint: str, names: Names | None = None, replica: str | None = None, timeout: float = 60.0) -> Experience:
     """Return the union of all memories at a SPARQL endpoint.
 
-    Each replica has a named graph of its own there, so that writers never conflict. An endpoint without memory gives an empty one.
+    Each replica has a named graph at the endpoint, so that writers don't conflict. An endpoint without memories gives an empty
+    experience.
     """
     query = f'CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{MEMORY}graph/")) }}'
     answer = _ask(endpoint, {"query": query}, timeout)
@@ -319,7 +320,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
 
 
 def push(endpoint: str, experience: Experience, names: Names, domain: str, timeout: float = 60.0) -> None:
-    """Replace this replica's graph at a SPARQL endpoint by its own counts; the graphs of other replicas stay unchanged."""
+    """Replace the graph of this replica at a SPARQL endpoint by its tallies; the graphs of other replicas remain unchanged."""
     graph = _node(MEMORY + "graph/", experience.replica)
     text = "".join(turtle(experience, names, domain, only=experience.replica))
     data = ox.serialize([q.triple for q in ox.parse(text, format=ox.RdfFormat.TURTLE)], format=ox.RdfFormat.N_TRIPLES)
@@ -328,7 +329,7 @@ def push(endpoint: str, experience: Experience, names: Names, domain: str, timeo
 
 
 def _ask(endpoint: str, form: Mapping[str, str], timeout: float) -> bytes:
-    from urllib.error import URLError  # imported on use: HTTP modules take long to import
+    from urllib.error import URLError  # imported here because these modules are slow to import
     from urllib.parse import urlencode
     from urllib.request import Request, urlopen
 

@@ -1,4 +1,4 @@
-"""The knowledge links of a confabulation memory, as a value: p(situated object instance | quantified behaviour)."""
+"""Knowledge links of a confabulation memory: p(situated object instance | quantified behaviour)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Conclusion: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 @dataclass
 class Links:
-    """The tables of section III-C of the paper.
+    """The probability tables of the paper, section III-C.
 
-    `tables` has one categorical distribution over values for each learned pair of conclusion and symbol; all other pairs have the
-    uniform distribution.
+    `tables` contains a categorical distribution over values for each learned pair of conclusion and symbol. All other pairs have
+    the uniform distribution.
 
     >>> Links().probability(("MOVE", ("cup",)), Symbol("LOCATION", ("cup",)), "shelf", ["shelf", "table"])
     0.5
@@ -26,7 +26,7 @@ class Links:
     tables: dict[Conclusion, dict[Symbol, dict[str, float]]] = field(default_factory=dict)
 
     def probability(self, conclusion: Conclusion, symbol: Symbol, value: str, values: Sequence[str]) -> float:
-        """Return p(<o, s> | b) for one of the `values` that the symbol can have."""
+        """Return p(<o, s> | b) for a value in `values`, the values that the symbol can have."""
         table = self.tables.get(conclusion, {}).get(symbol)
         if table is None:
             return 1.0 / len(values) if values else 1.0

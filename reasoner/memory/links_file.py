@@ -1,8 +1,7 @@
-"""The confabulation memory on disk: knowledge links as annotated axioms of a Turtle file that imports the scene.
+"""Files of confabulation memories: knowledge links as annotated axioms in a Turtle file that imports the scene.
 
-Each link is a triple ``quantified behaviour :associatedWith situated object instance`` and an ``owl:Axiom`` that annotates it with
-``:probability``. Protégé opens the file and shows the number beside the assertion. The file belongs to the memory: Confab never
-rewrites a file that people edit.
+Each link is a triple ``quantified behaviour :associatedWith situated object instance``, annotated with ``:probability`` by an
+``owl:Axiom``. Protégé shows the probability beside the triple. Confab writes only files of its own, and never edited ontologies.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ SELECT ?behavior ?fact ?probability WHERE {
 
 
 def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
-    """Read the links of a memory file.
+    """Return the knowledge links in a memory file.
 
     Parameters
     ----------
@@ -44,12 +43,12 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     names : Names
         The scene's names; a term that the scene doesn't contain is named by the last part of its IRI.
     found : Lines, optional
-        The result of `memory_lines` for the file, if it has been read before.
+        The result of `memory_lines` for the file if it is known already.
 
     Raises
     ------
     KnowledgeError
-        The file isn't Turtle, or a link lacks its behaviour or fact; the message says which.
+        The file isn't Turtle, or a link lacks its behaviour or fact.
     """
     graph = _graph(path, found)
     nodes: dict[str, dict[str, str]] = {}
@@ -72,7 +71,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
 
 
 def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
-    """Return the scene that a memory file imports, and short names for the terms in the file; `found` as in `load_links`.
+    """Return the IRI of the scene that a memory file imports, and short names for its terms; `found` as in `load_links`.
 
     Raises
     ------
@@ -92,16 +91,16 @@ def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
 
 
 def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
-    """Write the links to a memory file atomically.
+    """Write knowledge links atomically to a memory file.
 
     Parameters
     ----------
     path : Path
     links : Links
     names : Names
-        The scene's names, which give the IRIs.
+        Mapping from the scene's names to IRIs.
     scene : str
-        IRI of the scene, which the file imports.
+        IRI of the scene; the file imports it.
     """
     iri = f"{scene.rstrip('#/')}.memory"
     prefixes = {"owl": OWL, "rdfs": RDFS, "xsd": XSD, "": CORE, "m": iri + "#"}
@@ -110,19 +109,19 @@ def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
 
 
 def links_text(links: Links, names: Names, scene: str) -> str:
-    """Return the links as N-Triples, without the ontology header."""
+    """Return the triples of knowledge links as N-Triples, without the ontology's declaration."""
     iri = f"{scene.rstrip('#/')}.memory"
     triples = [t for t in _triples(links, names, scene, iri) if t.subject != ox.NamedNode(iri)]
     return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
 
 
 def memory_lines(path: Path) -> Lines:
-    """Read a memory file and split it into `Lines`.
+    """Read a memory file and split it into its parts.
 
     Raises
     ------
     KnowledgeError
-        The file is missing or can't be read as text.
+        The file is missing, isn't text, or its brackets are nested too deeply.
     """
     if not path.is_file():
         raise no_such_file(path)
@@ -138,7 +137,7 @@ def memory_lines(path: Path) -> Lines:
 
 
 def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
-    """Return the triples of a file without the counts."""
+    """Return the triples of a memory file, except tallies."""
     found = found or memory_lines(path)
     rest = found.rest + found.paper
     graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
@@ -193,7 +192,7 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
         yield ox.Triple(axiom, node(owl + "annotatedSource"), source)
         yield ox.Triple(axiom, node(owl + "annotatedProperty"), node(CORE + "associatedWith"))
         yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
-        # a decimal, since some programs cut doubles to seven digits when they write Turtle
+        # a decimal, because some programs write doubles with only seven digits
         decimal = f"{Decimal(repr(probability)):f}"
         yield ox.Triple(axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(XSD + "decimal")))
 

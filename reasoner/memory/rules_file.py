@@ -1,8 +1,8 @@
-"""Rules, orders and methods as triples that people can edit, in the vocabulary of conditions and behaviours.
+"""Translation of rules, orders and methods to triples and back, in the vocabulary of conditions and behaviours.
 
-A `:LearnedRule` has a goal (`:forGoal`), conditions (`:asksFor`), and a behaviour with arguments (`:does`); its
-roles are parameters of its own. A `:LearnedMethod` has the refined behaviour (`:refines`) and steps with an index; a
-`:LearnedOrder` has the situation types `:first` and `:then`. ``:enabled false`` switches an item off.
+A `:LearnedRule` has a goal (`:forGoal`), conditions (`:asksFor`), and a behaviour with arguments (`:does`); its roles are
+parameters. A `:LearnedMethod` has the refined behaviour (`:refines`) and steps with an index. A `:LearnedOrder` has the
+situation types `:first` and `:then`. ``:enabled false`` disables an item.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ def label(one: Said) -> str:
 
 
 class RuleWriter:
-    """Writes learned items as Turtle. Short names are expanded to IRIs; a name without an IRI gets one of the memory."""
+    """Writer of learned items as Turtle; names that the scene doesn't contain become IRIs of the memory."""
 
     def __init__(self, names: Names, words: Words = label) -> None:
         self.names, self.words = names, words
 
     def term(self, name: str) -> str:
-        """Return the Turtle term of an individual, class, behaviour or situation type."""
+        """Return the Turtle notation of an individual, class, behaviour or situation type."""
         if name in self.names:
             return str(ox.NamedNode(self.names.iri(name)))
         return f":{name}" if name in (TRUE, FALSE) else str(ox.NamedNode(MEMORY + quote(name, safe="")))
 
     def said(self, one: Said, enabled: bool = True) -> str:
-        """Return the triples of a learned item and its parts."""
+        """Return the Turtle statements of a learned item and its parts."""
         me = f"m:{one.name}"
         match one:
             case Rule():
@@ -70,7 +70,7 @@ class RuleWriter:
         return head + "".join(f"{line} .\n" for line in lines[1:])
 
     def rule(self, rule: Rule, me: str) -> list[str]:
-        """Return a rule's properties as the first text, and the triples of its parts."""
+        """Return the properties of a rule as the first text, followed by the statements of its parts."""
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
         nodes = _RuleNodes(me, self.term, terms)
         goal, *asks = map(nodes.condition, (rule.goal, *rule.asks))
@@ -84,12 +84,12 @@ class RuleWriter:
         return [" ; ".join(said), *roles, *nodes.nodes]
 
     def step(self, does: tuple[str, Sequence[str]], terms: Mapping[str, str]) -> str:
-        """Return the properties of a behaviour with its arguments."""
+        """Return the properties that state a behaviour with its arguments."""
         put = [terms.get(term) or self.term(term) for term in does[1]]
         return " ; ".join([f":does {self.term(does[0])}", *(f":{a} {t}" for a, t in zip(ARGUMENTS, put, strict=False))])
 
     def method(self, method: Method, me: str) -> list[str]:
-        """Return a method's properties as the first text, and the triples of its parts."""
+        """Return the properties of a method as the first text, followed by the statements of its parts."""
         roles = [f"{me}.role{i}" for i in range(method.roles + len(method.open))]
         steps = [f"{me}.step{i}" for i in range(len(method.steps))]
         lines = [f":refines {self.term(method.behavior)} ; :roles {method.roles} ; :step {', '.join(steps)}"]
@@ -112,7 +112,7 @@ class RuleWriter:
 
 
 class _RuleNodes(NodeWriter):
-    """Writes the conditions of a rule; the name of each consists of the rule's name and its position."""
+    """Writer of a rule's conditions; the name of a condition consists of the rule's name and a number."""
 
     def __init__(self, me: str, spelled: Callable[[str], str], terms: Mapping[str, str]) -> None:
         def variable(name: str, node: str, position: int) -> str:
@@ -121,7 +121,7 @@ class _RuleNodes(NodeWriter):
         super().__init__(":", spelled, lambda kind, position: f"{me}.c{position}", variable, terms)
 
     def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
-        """Write each alternative of a disjunction as a conjunction named after it; return their nodes."""
+        """Write each alternative of a disjunction as a conjunction, and return the nodes of the conjunctions."""
         found = [f"{node}.or{number}" for number in range(len(alternatives))]
         for name, group in zip(found, alternatives, strict=True):
             inner = [*map(self.condition, group)]
@@ -130,7 +130,7 @@ class _RuleNodes(NodeWriter):
 
 
 class RuleReader(NodeReader):
-    """Reads learned items from the triples of a file. In `nodes`, properties of the core have no namespace."""
+    """Reader of learned items from the triples of a file; core properties in `nodes` have no namespace."""
 
     def __init__(self, nodes: Mapping[str, Node], names: Names | None) -> None:
         self.nodes, self.names = nodes, names
@@ -138,17 +138,17 @@ class RuleReader(NodeReader):
         self.inside, self.count = [], [0]
 
     def values(self, iri: str, name: str) -> Sequence[str]:
-        """Return the values of a property of a node."""
+        """Return the values of a node's property."""
         return self.nodes.get(iri, {}).get(name, ())
 
     def term(self, iri: str) -> str:
-        """Return the name of a role or of a witness's variable, or the short name of anything else."""
+        """Return the name of a role or of a witness variable, or the short name of another term."""
         if iri in self.roles:
             return self.roles[iri]
         return "?" + unquote(iri).rsplit(".", 1)[-1] if self.is_a(iri, "Variable") else self.short(iri)
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return parts in an order that doesn't depend on their IRIs."""
+        """Return parts in an order that doesn't depend on IRIs."""
         return tuple(sorted(parts, key=repr))
 
     def short(self, iri: str) -> str:
@@ -160,7 +160,7 @@ class RuleReader(NodeReader):
         return iri.rsplit("#", 1)[-1].rsplit("/", 1)[-1]
 
     def said(self, iri: str) -> Said | None:
-        """Return the learned item of a node, or None if the node isn't a learned item; raise `ValueError` if a part is missing."""
+        """Return the learned item of a node, or None for another node; raise `ValueError` if a part is missing."""
         node = self.nodes[iri]
         kinds = [kind.removeprefix(CORE) for kind in node.get(RDF + "type", ())]
         if "LearnedRule" in kinds:
@@ -191,7 +191,7 @@ class RuleReader(NodeReader):
         return Rule(goal, asks, does, kinds)
 
     def arguments_of(self, iri: str) -> list[str]:
-        """Return the IRIs of the arguments of a node, in order."""
+        """Return the IRIs of a node's arguments, in order."""
         return [value for name in ARGUMENTS for value in self.values(iri, name)[:1]]
 
     def method(self, iri: str, node: Node) -> Method:
