@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from confab.planner.checked_conditions import Lookups
@@ -13,9 +13,12 @@ from confab.reasoner.limits import overtime
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.surroundings import Surroundings
+from confab.reasoner.symbols import Symbol
 
 
-def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:
+def refused(
+    graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = (), unmet: Collection[Symbol] = ()
+) -> list[Fault]:
     """Return the faults in the whole scene of a plan that was made in a part of the scene; empty if the plan is valid.
 
     The plan is executed with the individuals of the part, and the checker reports the other individuals on which each condition
@@ -29,6 +32,8 @@ def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[
     plan : Plan
     goals : sequence of str
         Goals that replace goals of the task.
+    unmet : collection of Symbol
+        The soft goals that the plan needn't meet.
     """
     given = dict(parse_fact(slice_.problem, goal) for goal in goals)
     with overtime():
@@ -38,7 +43,8 @@ def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[
                 return [Fault((), "another individual has a name that the plan uses")]
             lookups: Lookups = {}
             problem = around.problem()
-            problem = replace(problem, goal={**problem.goal, **given})
+            wanted = {**problem.goal, **given}
+            problem = replace(problem, goal={s: value for s, value in wanted.items() if s not in unmet}, weights={})
             faults = carried_out(problem, plan, lookups, around.lifted)
             if not around.widen(lookups):
                 return faults

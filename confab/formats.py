@@ -80,6 +80,14 @@ class ScheduleJson(TypedDict):
     steps: list[ScheduledStepJson]
 
 
+class ForgoneJson(TypedDict):
+    """A soft goal that a plan leaves unmet; `price` is the additional cost of a plan that meets it, null if none was found."""
+
+    goal: str
+    weight: float
+    price: float | None
+
+
 class _Outcome(TypedDict):
     scene: str
     status: str
@@ -104,6 +112,7 @@ class OutcomeJson(_Outcome, total=False):
     engine: str
     reason: ReasonJson
     certificate: CertificateJson
+    forgone: list[ForgoneJson]
 
 
 class ResultJson(OutcomeJson, total=False):

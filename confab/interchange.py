@@ -69,6 +69,15 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         data["engine"] = outcome.engine
     if outcome.reason is not None:
         data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
+    if outcome.forgone:
+        data["forgone"] = [
+            {
+                "goal": str(one.fact),
+                "weight": float(one.weight),
+                "price": None if one.price is None else float(one.price),
+            }
+            for one in outcome.forgone
+        ]
     if outcome.certificate is not None:
         data["certificate"] = certificate_json(outcome.certificate)
     return data

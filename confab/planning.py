@@ -19,6 +19,7 @@ from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
+from confab.planner.preferences import preferred
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -195,43 +196,46 @@ def _plan(
         reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
-    timed = None
+    timed, exact = None, options.strategy == "optimal"
+    in_part = problem is seen.problem and not seen.whole
     if needs_others_meanwhile(problem):
+        if problem.weights:
+            raise KnowledgeError(
+                "a task whose steps need others meanwhile takes no soft goals; drop the :weight of its goals"
+            )
         problem = problem if seen.whole else whole()
         outcome, timed = concurrent(problem, deadline)
         queries = scene.knowledge.round_trips - asked
         seconds = {**scene.seconds, "quantify": quantified}
         return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
     if faulty:
-        doable = without(problem, [behavior for behavior, _ in faulty])
+        possible = without(problem, [behavior for behavior, _ in faulty])
         behavior, why = faulty[0]
         leaves = options.leave_levels and mode != "paper"
-        if not leaves and _none_at_all(doable, deadline):
+        if not leaves and _none_at_all(possible, deadline):
             raise KnowledgeError(why, seen.names.iri(behavior.name))
-        outcome = search(doable)
+        doable, outcome = preferred(possible, search, exact)
+        problem = replace(problem, goal=doable.goal, weights={})
         if leaves and outcome.status is Status.UNSOLVABLE:
             raise KnowledgeError(why, seen.names.iri(behavior.name))
         if outcome.status is Status.GAVE_UP and outcome.reason:
             outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
     else:
-        outcome = search(problem)
-    if (
-        problem is seen.problem
-        and not seen.whole
-        and (
-            outcome.status is Status.UNSOLVABLE
-            or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
-        )
+        problem, outcome = preferred(problem, search, exact)
+    if in_part and (
+        outcome.status is Status.UNSOLVABLE
+        or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
     ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
         anew = whole()
-        if anew != problem:
-            problem, outcome = anew, search(anew)
+        if anew != seen.problem:
+            in_part = False
+            problem, outcome = preferred(anew, search, exact)
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, deadline)
     elif asks_for_times(problem, options.minimise):
         outcome, timed = scheduled(problem, outcome, deadline)
     queries = scene.knowledge.round_trips - asked
-    part = None if problem is not seen.problem or seen.whole else seen
+    part = seen if in_part else None
     seconds = {**scene.seconds, "quantify": quantified}
     return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed)
 
@@ -290,7 +294,7 @@ class Result:
         faults = validate(self.problem, plan)
         if faults or self.part is None:
             return faults
-        return refused(self.scene.knowledge, self.part, plan, self.goals)
+        return refused(self.scene.knowledge, self.part, plan, self.goals, self.outcome.unmet)
 
     @property
     def plan(self) -> Plan:

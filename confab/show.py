@@ -116,8 +116,11 @@ def summary(outcome: Outcome) -> str:
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
+    unmet = [f"leaves a soft goal unmet: {one}" for one in outcome.forgone]
     if not outcome.plan.steps:
-        return f"solved: nothing to do, since all goals hold ({outcome.seconds * 1000:.0f} ms)"
+        goals = "all goals that must be met" if unmet else "all goals"
+        done = f"solved: nothing to do, since {goals} hold ({outcome.seconds * 1000:.0f} ms)"
+        return "\n".join([done, *unmet])
     bound = _proved(outcome.plan, outcome.cost, outcome.bound)
     counts = outcome.plan.length
     on = (
@@ -133,6 +136,7 @@ def summary(outcome: Outcome) -> str:
     lines = [
         f"solved{by}: {lengths(outcome.plan)} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
     ]
+    lines += unmet
     lines += outcome.given_up
     lines += [f"the plan violates a condition of the level above: {text}" for text in breaks]
     return "\n".join(lines)

@@ -8,13 +8,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from fractions import Fraction
 from time import perf_counter
 from typing import TYPE_CHECKING, Protocol, overload
 
 from confab.planner.certificates import Certificate
+from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
 from confab.reasoner.names import right_names
-from confab.reasoner.symbols import Condition, Fact, Problem, State
+from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
     import networkx
@@ -234,6 +236,28 @@ class Left:
 
 
 @dataclass(frozen=True)
+class Forgone:
+    """A soft goal that a plan leaves unmet.
+
+    Parameters
+    ----------
+    fact : Fact
+    weight : Fraction
+        The cost of leaving it unmet.
+    price : Fraction, optional
+        The additional cost of the plan that meets it, too; None if no such plan was found.
+    """
+
+    fact: Fact
+    weight: Fraction
+    price: Fraction | None
+
+    def __str__(self) -> str:
+        more = "no plan that meets it was found" if self.price is None else f"it would cost {written(self.price)} more"
+        return f"{self.fact} (weight {written(self.weight)}; {more})"
+
+
+@dataclass(frozen=True)
 class Outcome:
     """The result of a planning call.
 
@@ -244,7 +268,7 @@ class Outcome:
     that found the plan. `given_up` has the levels that were given up, each with its goal. `left` has the runs of lower-level
     steps in the plan, with the conditions of the level above that they violate. `saving` is the number of primitives per second
     by which the plan was still being shortened in the end, None if it wasn't shortened. `certificate` proves that a task is
-    unsolvable; `confab.planner.solve` returns no such outcome without one.
+    unsolvable; `confab.planner.solve` returns no such outcome without one. `forgone` has the soft goals that are left unmet.
     """
 
     status: Status
@@ -262,6 +286,12 @@ class Outcome:
     left: tuple[Left, ...] = ()
     saving: float | None = None
     certificate: Certificate | None = None
+    forgone: tuple[Forgone, ...] = ()
+
+    @property
+    def unmet(self) -> frozenset[Symbol]:
+        """The symbols of the soft goals that are left unmet."""
+        return frozenset(one.fact.symbol for one in self.forgone)
 
 
 @dataclass(frozen=True)

@@ -514,6 +514,8 @@ class Problem:
         The first level on which a value exists, where that isn't 1.
     times : Times, optional
         Deadlines, windows and measured durations (`confab.reasoner.timing`).
+    weights : mapping of Symbol to Fraction
+        The costs of leaving goals unmet; goals without a weight must be met.
     """
 
     scene: str
@@ -525,6 +527,7 @@ class Problem:
     parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     value_levels: Mapping[str, int] = field(default_factory=dict)
     times: Times | None = None
+    weights: Mapping[Symbol, Fraction] = field(default_factory=dict)
 
     def values(self, symbol: Symbol, level: int) -> tuple[str, ...]:
         """Return the values that a symbol can have on a level, in declared order."""

@@ -64,6 +64,7 @@ class Pddl:
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
     timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # (time, atom, new truth)
     goal: Form | None = None
+    preferences: dict[str, Form] = field(default_factory=dict)  # soft goals
     minimize: Form | None = None  # the metric
 
     def above(self, name: str) -> Sequence[str]:

@@ -129,19 +129,26 @@ class _Export:
             if action is not None
         }
         self.derived = list(self.lowering.derived()) if self.lowering.recursive else []
-        wanted = [self.lowering.goal(symbol, value) for symbol, value in problem.goal.items()]
+        hard = [(symbol, value) for symbol, value in problem.goal.items() if symbol not in problem.weights]
+        wanted = [self.lowering.goal(symbol, value) for symbol, value in hard]
+        self.preferences = [
+            (self.words.name("preference", str(symbol), "_".join((*symbol.arguments, symbol.situation))), weight, soft)
+            for symbol, weight in problem.weights.items()
+            for soft in [self.lowering.goal(symbol, problem.goal[symbol])]
+        ]
         self.goal = both([*wanted, *self.lowering.within_bounds(Scope({}))])
         self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]
         self.changes = [change for action in self.actions.values() for change in action.changes]
-        self.costs = any(action.cost != 1 for action in self.actions.values())
+        self.costs = any(action.cost != 1 for action in self.actions.values()) or bool(self.preferences)
 
     def exported(self) -> Exported:
         """Return the texts of the domain and the problem with their name mappings."""
         named = self.words.name("domain", self.problem.scene.rsplit("/", 2)[-2])
         constants = {term.name for term in self.named_in_domain() if not term.variable}
         found = [one for fact in self.facts for one in (fact.terms if isinstance(fact, Atom) else fact[0].terms)]
-        found += [term for term in terms(self.goal) if not term.variable]
+        goals = (self.goal, *(soft for _, _, soft in self.preferences))
+        found += [term for goal in goals for term in terms(goal) if not term.variable]
         stated = {term.name for term in found} | constants
         individuals = dict.fromkeys(one for members in self.problem.classes.values() for one in members)
         individuals |= dict.fromkeys(one for kind, one in self.words.names if kind == "object")
@@ -165,7 +172,8 @@ class _Export:
 
     def requirements(self) -> str:
         """Return the requirement flags of the domain, separated by spaces."""
-        parts = [part for formula in (*self.formulas, self.goal) for part in inside(formula)]
+        goals = (self.goal, *(soft for _, _, soft in self.preferences))
+        parts = [part for formula in (*self.formulas, *goals) for part in inside(formula)]
         parts += [part for change in self.changes for part in inside(change.when)]
         numeric = any(isinstance(part, Compare) for part in parts)
         numeric |= any(isinstance(change.what, Assignment) for change in self.changes)
@@ -177,6 +185,7 @@ class _Export:
             ":equality": any(isinstance(part, Same) for part in parts),
             ":derived-predicates": bool(self.derived),
             ":action-costs": self.costs,
+            ":preferences": bool(self.preferences),
             ":numeric-fluents": numeric,
         }
         return " ".join([":strips", ":typing", *(key for key, needed in wanted.items() if needed)])
@@ -228,9 +237,12 @@ class _Export:
             facts.append(
                 formula_text(fact) if isinstance(fact, Atom) else f"(= {number_text(fact[0])} {decimal(fact[1])})"
             )
-        metric = "  (:metric minimize (total-cost))\n" if self.costs else ""
+        unmet = "".join(f" (* {decimal(weight)} (is-violated {name}))" for name, weight, _ in self.preferences)
+        cost = f"(+ (total-cost){unmet})" if unmet else "(total-cost)"
+        metric = f"  (:metric minimize {cost})\n" if self.costs else ""
         name = self.words.name("problem", self.problem.scene.rsplit("/", 1)[-1])
-        goals = LINE.join(map(formula_text, conjuncts(self.goal)))
+        soft = [f"(preference {name} {formula_text(one)})" for name, _, one in self.preferences]
+        goals = LINE.join([*map(formula_text, conjuncts(self.goal)), *soft])
         return (
             f"(define (problem {name})\n  (:domain {domain})\n"
             f"  (:objects{LINE}{LINE.join(map(self.words.declared, objects))})\n"

@@ -141,7 +141,8 @@ class _Import:
         forms += [axiom.condition for axiom in self.pddl.axioms]
         durations = [a.durative.duration for a in self.pddl.actions.values() if a.durative is not None]
         forms += [Form((one,), 0, 0) for one in durations]
-        read = {word for form in (*forms, self.pddl.goal) for word in functions_read(form)}
+        wanted = [self.pddl.goal, *self.pddl.preferences.values()]
+        read = {word for form in (*forms, *wanted) for word in functions_read(form)}
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
         self.weights = self.costing(changed)
         self.amounts = changed & (read | (changed - self.weights.keys()))
@@ -150,7 +151,7 @@ class _Import:
         conditions += [axiom.condition for axiom in self.pddl.axioms]
         whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
         whens += [f for effects in self.effects.values() for e in effects for f in e.when]
-        asked = [self.pddl.goal, *conditions, *whens, *(a for a in (*counted, *durations) if isinstance(a, Form))]
+        asked = [*wanted, *conditions, *whens, *(a for a in (*counted, *durations) if isinstance(a, Form))]
         heads = {form.head for form in asked if form} | {word for form in asked for word in functions_read(form)}
         self.measures = (heads & self.pddl.functions.keys()) - self.amounts
         self.derived = {axiom.predicate for axiom in self.pddl.axioms}
@@ -219,6 +220,7 @@ class _Import:
         behaviors = {b.name: b for b in map(self.behavior, pddl.actions) if b is not None}
         initial = self.initial(situations, classes)
         goal, reach = self.goal(situations)
+        weights = self.preferences(situations, goal)
         events, all_happened, times = happenings(self, _Variables(self), situations, classes)
         behaviors |= {event.name: event for event in events}
         goal |= all_happened
@@ -233,7 +235,7 @@ class _Import:
         never = [Constraint(self.places[predicate].situation) for predicate in pddl.forbidden]
         constraints = {f"{one.situation}.exceptions": one for one in never}
         domain = Domain(situations, behaviors, rules=rules, constraints=constraints)
-        return Problem(scene, domain, classes, relations, initial, goal, parents, times=times)
+        return Problem(scene, domain, classes, relations, initial, goal, parents, times=times, weights=weights)
 
     def rules(self) -> dict[str, tuple[Rule, ...]]:
         """Return the rules of each derived predicate.
@@ -348,6 +350,27 @@ class _Import:
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
         reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
         return goal, reach
+
+    def preferences(self, situations: Mapping[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
+        """Add the soft goals to the goal, and return their weights in the metric; those without a weight are left out.
+
+        Raises
+        ------
+        PddlError
+            A soft goal isn't equivalent to one fact, or has the symbol of another goal.
+        """
+        found: dict[Symbol, Fraction] = {}
+        for name, form in self.pddl.preferences.items():
+            weight, fact = self.weights.get(f"is-violated {name}", Fraction(0)), dict[Symbol, str]()
+            parts = list(conjuncts(form))
+            if len(parts) != 1 or not self.plain(parts[0], situations, fact) or len(fact) != 1:
+                raise PddlError(f"preference '{name}': only preferences of one fact are supported")
+            if fact.keys() & goal.keys():
+                raise PddlError(f"preference '{name}': {next(iter(fact))} has another goal")
+            if weight > 0:
+                goal |= fact
+                found |= dict.fromkeys(fact, weight)
+        return found
 
     def holds(self, atom: Atom) -> bool | None:
         """Return whether an atom of a static predicate holds; None if actions can change the atom."""
@@ -487,7 +510,7 @@ class _Import:
         waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
         while waiting:
             form, factor = waiting.pop()
-            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, Word)]
+            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, Word) and is_number(item)]
             forms = [item for item in form.items[1:] if isinstance(item, Form)]
             if form.head == "+":
                 waiting += [(one, factor) for one in forms]
@@ -495,6 +518,8 @@ class _Import:
                 waiting.append((forms[0], factor * prod(numbers)))
             elif form.head in changed:
                 found[form.head] = factor
+            elif form.head == "is-violated":
+                found[f"is-violated {words_of(form)[1]}"] = factor
         return found
 
     def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:

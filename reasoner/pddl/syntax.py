@@ -133,9 +133,15 @@ class _Reader:
             sections[section.head] = section
             if section.head == ":objects":
                 self.objects(section.items[1:])
-            elif section.head == ":metric":
-                self.metric(section)
-            elif section.head not in (":requirements", ":domain", ":init", ":goal", ":length", ":constraints"):
+            elif section.head not in (
+                ":requirements",
+                ":domain",
+                ":init",
+                ":goal",
+                ":length",
+                ":constraints",
+                ":metric",
+            ):
                 raise self.fail(section, f"unknown section {section.head} in a problem")
         for wanted in (":init", ":goal"):
             if wanted not in sections:
@@ -147,9 +153,30 @@ class _Reader:
         goal = sections[":goal"]
         if len(goal.items) != 2 or not isinstance(goal.items[1], Form):
             raise self.fail(goal, "wanted one condition as the goal")
-        if goal.items[1].items:
-            self.condition(goal.items[1], {})
-            self.pddl.goal = goal.items[1]
+        self.goal(goal.items[1])
+        if ":metric" in sections:
+            self.metric(sections[":metric"])
+
+    def goal(self, form: Form) -> None:
+        """Read the goal; a conjunct ``(preference NAME CONDITION)`` is a soft goal."""
+        parts = [*form.items[1:]] if form.head == "and" else [form]
+        hard: list[Word | Form] = []
+        for part in parts:
+            if not isinstance(part, Form) or part.head != "preference":
+                hard.append(part)
+                continue
+            if len(part.items) != 3 or not isinstance(part.items[2], Form):
+                raise self.fail(part, "wanted (preference NAME CONDITION)")
+            name = self.word(part.items[1], "a name").text
+            if name in self.pddl.preferences:
+                raise self.fail(part, f"a second preference {name}")
+            self.condition(part.items[2], {})
+            self.pddl.preferences[name] = part.items[2]
+        if self.pddl.preferences:
+            form = Form((Word("and", form.line, form.column), *hard), form.line, form.column)
+        if form.items:
+            self.condition(form, {})
+            self.pddl.goal = form
 
     def metric(self, form: Form) -> None:
         words = form.items[1:]
@@ -392,7 +419,7 @@ class _Reader:
             for item in rest:
                 self.number(item, variables)
         elif head == "preference":
-            raise self.fail(form, "preferences are not supported")
+            raise self.fail(form, "preferences are supported as conjuncts of the goal only")
         else:
             self.atom(form, variables)
 
@@ -440,6 +467,10 @@ class _Reader:
                 raise self.fail(item, f"({item.head} …) takes 2 numbers, got {len(item.items) - 1}")
             for one in item.items[1:]:
                 self.number(one, variables)
+        elif item.head == "is-violated" and len(item.items) == 2:
+            name = self.word(item.items[1], "the name of a preference")
+            if name.text not in self.pddl.preferences:
+                raise self.fail(name, f"undefined preference '{name.text}'")
         else:
             self.atom(item, variables, self.pddl.functions, "function")
 

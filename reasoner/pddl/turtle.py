@@ -368,13 +368,15 @@ class _SceneWriter:
         yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{goal} .'
         for iri, fact in zip(iris, goals, strict=True):
             symbol = fact.symbol
+            weight = self.problem.weights.get(symbol)
+            soft = {} if weight is None else {"weight": [decimal_text(weight)]}
             if self.problem.domain.situations[symbol.situation].quantity is not None:
                 [(sign, limit)] = bounds(fact.value)
                 properties = self.individual.symbol(symbol.situation, symbol.arguments)
-                properties |= {"sign": [sign], "amount": [decimal_text(limit)]}
+                properties |= {"sign": [sign], "amount": [decimal_text(limit)], **soft}
                 yield f"{self.individual.statement(iri, 'Comparison', properties)} ."
                 continue
-            properties = self.individual.symbol(symbol.situation, symbol.arguments, fact.value)
+            properties = {**self.individual.symbol(symbol.situation, symbol.arguments, fact.value), **soft}
             yield f"{self.individual.statement(iri, 'ValueCondition', properties)} ."
 
 

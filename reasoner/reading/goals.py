@@ -62,7 +62,8 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
             )
         if given.setdefault(symbol, value) != value:
             raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
-    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())))
+    weights = {symbol: weight for symbol, weight in problem.weights.items() if symbol not in given}
+    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())), weights=weights)
 
 
 def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
@@ -122,18 +123,25 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     KnowledgeError
         Two goals contradict each other, or a goal mentions an individual that isn't in the scene.
     """
-    goal = dict[Symbol, str]()
+    goal, weights = dict[Symbol, str](), dict[Symbol, Fraction]()
     for task in tasks:
         goals = parts.values(task, "goal")
         for iri, wanted in ((goal, one) for goal in goals for one in _wanted(parts, goal, problem.classes)):
+            weight = _weight(parts, iri)
             if not _is_fact(wanted, problem):
                 problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
                 goal[symbol] = TRUE
+                weights |= {} if weight is None else {symbol: weight}
                 continue
             if isinstance(wanted, Comparison):
                 symbol, value = _bounds(iri, wanted)
+                if symbol in goal and weights.get(symbol) != weight:
+                    raise KnowledgeError(
+                        f"<{iri}>: {symbol} has another goal with another weight; give both the same :weight"
+                    )
                 value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
                 goal[symbol] = value
+                weights |= {} if weight is None else {symbol: weight}
                 if symbol not in problem.initial:
                     raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
                 continue
@@ -145,13 +153,24 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
             members = (problem.classes.get(of, ()) for of in kind.arguments)
             if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
                 continue  # the symbol doesn't exist
+            weights |= {} if weight is None else {symbol: weight}
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
                 raise KnowledgeError(
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
                 )
-    return replace(problem, goal=dict(sorted(goal.items())))
+    return replace(problem, goal=dict(sorted(goal.items())), weights=weights)
+
+
+def _weight(parts: Parts, iri: str) -> Fraction | None:
+    """Return the weight of a soft goal; None for a goal that must be met."""
+    weight = parts.decimal(iri, "weight")
+    if weight is not None and weight <= 0:
+        raise KnowledgeError(
+            f"<{iri}>: the :weight is {written(weight)}; wanted the cost of leaving the goal unmet, above 0", iri
+        )
+    return weight
 
 
 def _is_fact(wanted: Condition, problem: Problem) -> bool:

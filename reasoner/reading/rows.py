@@ -24,7 +24,19 @@ from confab.reasoner.vocabulary import CORE, OWL, TYPE
 FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, sorted by name
 DATA = frozenset(
     CORE + name
-    for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update", "construct", "never", "always")
+    for name in (
+        "index",
+        "negated",
+        "level",
+        "fromLevel",
+        "firstId",
+        "cost",
+        "update",
+        "construct",
+        "never",
+        "always",
+        "weight",
+    )
 )
 DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
