@@ -1,1 +1,1 @@
-"""Knowledge graph in, grounded symbols out; inference, task recognition, and the memory's home."""
+"""The knowledge graph and its translation to planning problems; inference, task recognition and memory."""

@@ -1,10 +1,10 @@
-"""Regression: a condition after a behaviour, written as a condition before it.
+"""Regression: translation of a condition after a behaviour to an equivalent condition before it.
 
-``IN(parcel) = van`` holds after LOAD(?item, ?into) if the parcel is ?item and the van is ?into, or if the parcel is another one
-and is in the van before. Conditions inside alternatives and witnesses are rewritten in place. Terms with equal names, and terms
-of classes without a common individual, are compared here, so the result may simply be true or false.
+For example, ``IN(parcel) = van`` holds after LOAD(?item, ?into) in two cases: the parcel is ?item and the van is ?into, or the
+parcel isn't ?item and is in the van before. Conditions in alternatives and witnesses are translated, too. Equalities of equal
+terms, or of terms without a common individual, are evaluated, so that the result may be true or false.
 
-Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; here over functional situation types and numeric effects.
+Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; extended to functional situation types and numeric effects.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from confab.reasoner.symbols import (
 
 Formula: TypeAlias = "Condition | bool"
 Conjunction: TypeAlias = "tuple[Condition, ...] | None"
-"""Conditions that all hold; None for a contradiction."""
+"""A conjunction of conditions; None if it is contradictory."""
 Scaled: TypeAlias = "Callable[[Expression], Expression]"
 Term: TypeAlias = "tuple[Amount, str, Scaled]"
 OPPOSITE: Mapping[str, str] = {"increase": "decrease", "decrease": "increase"}
@@ -48,11 +48,11 @@ MOST_CASES = 24
 
 
 class TooManyCasesError(ValueError):
-    """The number of effects that change one expression at once exceeds the maximum."""
+    """Raised if more than `MOST_CASES` combinations of effects may change one expression."""
 
 
 def both(formulas: Iterable[Formula]) -> Conjunction:
-    """Return a conjunction without conditions that are always true; None if it contradicts itself."""
+    """Return the conjunction of formulas without always true conjuncts; return None if it is contradictory."""
     found: dict[Condition, None] = {}
     for formula in formulas:
         if formula is False:
@@ -65,7 +65,7 @@ def both(formulas: Iterable[Formula]) -> Conjunction:
 
 
 def either(alternatives: Iterable[Conjunction]) -> Formula:
-    """Return a disjunction of conjunctions."""
+    """Return the disjunction of conjunctions."""
     left = [group for group in dict.fromkeys(alternatives) if group is not None]
     if not left:
         return False
@@ -93,22 +93,22 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Return whether a condition may determine a variable, which the negated condition would leave undetermined."""
+    """Return whether a condition may determine a variable, which its negation would leave undetermined."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 
 @dataclass
 class Afterwards:
-    """Conditions and amounts after one behaviour, in terms of the state before it.
+    """Translation of conditions and amounts after one behaviour to the state before it.
 
     Parameters
     ----------
     behavior : Behavior
-        As it is written, with its effects on all of a class.
+        The behaviour before effects on all members of a class are expanded.
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
     kinds : dict of term to class
-        The classes of all terms of the behaviour and of the conditions; new variables are added.
+        The classes of all terms in the behaviour and the conditions; classes of new variables are added.
     """
 
     behavior: Behavior
@@ -118,7 +118,7 @@ class Afterwards:
     _number: Iterator[int] = field(default_factory=lambda: count(1))
 
     def __post_init__(self) -> None:
-        """Note which values the preconditions determine."""
+        """Record the values that the preconditions determine."""
         preconditions = self.behavior.preconditions
         bound = {p.name for p in self.behavior.parameters}.union(*map(mentions, preconditions))
         self._fixed = frozenset(bound)
@@ -135,7 +135,7 @@ class Afterwards:
         }
 
     def fixed(self, term: str) -> bool:
-        """Return whether a term is an individual, or is bound whenever the behaviour is applicable."""
+        """Return whether a term is an individual, or a variable that the preconditions bind."""
         return not is_variable(term) or term in self._fixed
 
     def boolean(self, situation: str) -> bool:
@@ -144,7 +144,7 @@ class Afterwards:
 
     @cached_property
     def amounts(self) -> tuple[AmountEffect, ...]:
-        """The effects on amounts; an effect for each individual of a class is replaced by one effect per individual."""
+        """The effects on amounts; an effect for each member of a class is expanded unless the member is an argument."""
         found: list[AmountEffect] = []
         for effect in self.behavior.amounts:
             if effect.each is None or effect.each.name in effect.arguments:
@@ -155,13 +155,13 @@ class Afterwards:
         return tuple(found)
 
     def fresh(self, kind: str) -> str:
-        """Return a new variable of a class; no condition or effect contains it yet."""
+        """Return a new variable of a class, with an unused name."""
         name = next(name for n in self._number if (name := f"?kept{n}") not in self.kinds)
         self.kinds[name] = kind
         return name
 
     def renamed(self, condition: Condition) -> Condition:
-        """Return a condition whose witnesses have new variables, so that their names differ from all terms of the behaviour."""
+        """Return a condition in which the variables of witnesses are replaced by new ones."""
         match condition:
             case Witness(variable, kind, inner):
                 terms = {variable: self.fresh(kind)}
@@ -173,7 +173,7 @@ class Afterwards:
                 return condition
 
     def apart(self, effect: Effect) -> Effect:
-        """Return an effect with the variables that its own conditions determine renamed."""
+        """Return an effect in which the variables of its own conditions are replaced by new ones."""
         given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
         own = {*effect.arguments, *given}.union(*map(mentions, effect.when))
         own = {term for term in own if is_variable(term)} - self._fixed - ({effect.each.name} if effect.each else set())
@@ -194,7 +194,7 @@ class Afterwards:
         return {*self.classes.get(kind, ())}
 
     def among(self, term: str, kind: str) -> Formula:
-        """Return the condition that a term belongs to a class."""
+        """Return the condition that a term denotes a member of a class."""
         members = self.members(kind)
         if not is_variable(term):
             return term in members
@@ -213,7 +213,7 @@ class Afterwards:
         return EqualityCondition(one, other)
 
     def before(self, condition: Condition) -> Formula:
-        """Return a condition before the behaviour, given its preconditions."""
+        """Return the equivalent of a condition in the state before the behaviour, simplified by the preconditions."""
         if isinstance(condition, ValueCondition):
             found = self.value(condition.situation, condition.arguments, condition.value)
             return negation(found) if condition.negated else found
@@ -225,7 +225,7 @@ class Afterwards:
         return ValueCondition(situation, arguments, value) if known is None else self.equal(known, value)
 
     def old(self, situation: str, arguments: tuple[str, ...], kind: str) -> tuple[str, Conjunction]:
-        """Return a term for the value of a symbol before the behaviour, and the conditions that determine it."""
+        """Return a term for the value of a symbol before the behaviour, and the conditions that determine the term."""
         known = self._known.get((situation, arguments))
         if known is not None:
             return known, both([self.among(known, kind)])
@@ -233,7 +233,7 @@ class Afterwards:
         return term, (ValueCondition(situation, arguments, term),)
 
     def fires(self, effect: Effect, arguments: Sequence[str]) -> Conjunction:
-        """Return the conditions under which an effect, with its variables renamed apart, changes a symbol."""
+        """Return the conditions under which an effect with unique variables changes a symbol."""
         if effect.each is not None:
             at = effect.arguments.index(effect.each.name)
             member = self.among(arguments[at], effect.each.kind)
@@ -251,9 +251,9 @@ class Afterwards:
         return any(situations_of(inner) & self.behavior.changes for inner in walk(condition))
 
     def condition(self, condition: Condition) -> Formula:
-        """Return a condition after the behaviour.
+        """Return the equivalent of a condition after the behaviour in the state before it.
 
-        Its variables are bound by other conditions, or by the condition itself as a witness.
+        All variables of the condition must be bound, by other conditions or by its own witnesses.
         """
         if not self.changed(condition):
             return condition
@@ -279,7 +279,7 @@ class Afterwards:
         return negation(found) if negated else found
 
     def _overwritten(self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Formula) -> Formula:
-        """Return the condition that a symbol has a value after one more effect, given the condition without that effect."""
+        """Return the condition that a symbol has a value after an effect, given the condition without this effect."""
         apart = self.apart(effect)
         assert isinstance(apart, ValueEffect)
         fires = self.fires(apart, arguments)
@@ -295,20 +295,21 @@ class Afterwards:
     def linear(
         self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
     ) -> list[Term] | None:
-        """Return the changing amounts of an expression, if it is linear in them and effects only add to or subtract from them.
+        """Return the changing amounts in an expression if it is linear in them and effects only increase or decrease them.
 
         Parameters
         ----------
         expression : Expression
         operation : str
-            A key of `OPPOSITE`: what an increase of the expression does to the whole.
+            A key of `OPPOSITE`: the operation on the whole expression that an increase of this part causes.
         scaled : callable
-            The change of the whole, for a change of the expression.
+            Returns the change of the whole expression for a change of this part.
 
         Returns
         -------
         list of (Amount, str, callable) or None
-            Each amount, with what its increase does to the whole, and by how much; None if the expression isn't linear.
+            Each amount, the operation on the whole expression that its increase causes, and a function that returns the change.
+            None if the expression isn't linear.
         """
         found: list[list[Term] | None]
         match expression:
@@ -335,7 +336,7 @@ class Afterwards:
         return any(effect.situation in situations_in(expression) for effect in self.amounts)
 
     def cases(self, expression: Expression) -> list[tuple[tuple[Condition, ...], Expression]]:
-        """Return the values of an expression after the behaviour, each with the conditions under which it results."""
+        """Return the possible values of an expression after the behaviour, each with its conditions before the behaviour."""
         match expression:
             case Amount(situation, arguments):
                 found: list[tuple[Conjunction, Expression]] = [((), expression)]
@@ -376,7 +377,7 @@ def _changed(now: Expression, operation: str, by: Expression) -> Expression:
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
-    """Return conditions with a witness for each variable that only an alternative or another witness determines.
+    """Return conditions with explicit witnesses for variables that occur only in alternatives or other witnesses.
 
     >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
     >>> found.alternatives[0][0].variable

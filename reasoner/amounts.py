@@ -1,7 +1,7 @@
-"""Amounts: values that are exact numbers, and arithmetic expressions over them.
+"""Amounts, which are exact numbers as values of symbols, and arithmetic expressions.
 
-A state stores an amount as text like any other value, with one text for each number: ``3``, ``1.5``, and ``1/3`` for a number
-without a finite decimal. The goal value of an amount may be bounds, written ``>=2`` or ``>=2,<5``.
+A state stores an amount as text, like any other value. Each number has one canonical text: ``3``, ``1.5``, and ``1/3`` for a
+number without a finite decimal notation. The goal value of an amount may be bounds such as ``>=2`` or ``>=2,<5``.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from functools import lru_cache
 from typing import TypeAlias
 
 Number: TypeAlias = "Fraction | float"
-"""A fraction, or `NOTHING`; never another float."""
+"""A fraction, or `NOTHING`, which is the only allowed float."""
 NOTHING = float("nan")
-"""The amount of a symbol without one (nan): every result computed with it is `NOTHING`, and every comparison with it is false."""
+"""The amount of a symbol without an amount (NaN). Calculations with it result in `NOTHING`; comparisons with it are false."""
 
 
 LARGEST = 10**60
-"""Maximum numerator and denominator of an amount; without a bound, repeated doubling would fill the memory."""
+"""Maximum numerator and denominator of an amount, so that repeated multiplication can't exhaust the memory."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """The kind of a situation type's amounts: unit, whether they are whole numbers, lower and upper bound."""
+    """Properties of the amounts of a situation type: the unit, whether they are whole numbers, and the bounds."""
 
     unit: str = ""
     whole: bool = False
@@ -35,11 +35,11 @@ class Quantity:
 
     @property
     def bounded(self) -> bool:
-        """Whether there is a lower or an upper bound."""
+        """Whether the amounts have a lower or an upper bound."""
         return self.least is not None or self.most is not None
 
     def allows(self, amount: Number) -> bool:
-        """Return whether an amount is of this kind."""
+        """Return whether an amount is a number within the bounds, and a whole number if this is required."""
         return (
             isinstance(amount, Fraction)  # and not `NOTHING`
             and (self.least is None or amount >= self.least)
@@ -52,7 +52,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Amount:
-    """The present amount of a symbol."""
+    """The current amount of a symbol."""
 
     situation: str
     arguments: tuple[str, ...]
@@ -60,7 +60,7 @@ class Amount:
 
 @dataclass(frozen=True)
 class Measure:
-    """The number that a static relation states for individuals, such as a capacity or a distance: the last element of a tuple."""
+    """The number that a static relation, such as a distance, states for some individuals as the last element of a row."""
 
     relation: str
     arguments: tuple[str, ...]
@@ -68,7 +68,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Calculation:
-    """Two amounts added (``+``), subtracted (``-``), multiplied (``*``) or divided (``/``)."""
+    """An arithmetic operation on two expressions: ``+``, ``-``, ``*`` or ``/``."""
 
     operator: str
     left: Expression
@@ -85,9 +85,9 @@ COMPARING: Mapping[str, Callable[[Number, Number], bool]] = {
     ">": operator.gt,
 }
 MORE, LESS = "more", "less"
-"""The direction in which an amount has to change to meet its goal."""
+"""The direction in which an amount has to change to satisfy its goal."""
 OPERATIONS = ("assign", "scale", "increase", "decrease")
-"""The operations of effects on amounts, in the order in which a behaviour's effects on one symbol are applied."""
+"""Operations of effects on amounts, in the order in which the effects of one behaviour on one symbol are applied."""
 
 
 def inside(expression: Expression) -> Iterator[Expression]:
@@ -99,17 +99,17 @@ def inside(expression: Expression) -> Iterator[Expression]:
 
 
 def terms_of(expression: Expression) -> tuple[str, ...]:
-    """Return the terms of all symbols and relations in an expression."""
+    """Return the terms of all amounts and measures in an expression."""
     return tuple(t for part in inside(expression) if isinstance(part, Amount | Measure) for t in part.arguments)
 
 
 def situations_in(expression: Expression) -> frozenset[str]:
-    """Return the situation types of all symbols in an expression."""
+    """Return the situation types of all amounts in an expression."""
     return frozenset(part.situation for part in inside(expression) if isinstance(part, Amount))
 
 
 def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:
-    """Return an expression with some terms substituted."""
+    """Return an expression in which `terms` maps terms to their replacements."""
     if isinstance(expression, Calculation):
         left, right = put_in(expression.left, terms), put_in(expression.right, terms)
         return Calculation(expression.operator, left, right)
@@ -120,7 +120,7 @@ def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:
 
 @lru_cache(maxsize=2**16)
 def number(text: str | None) -> Number:
-    """Return the number of a text, or `NOTHING` for None."""
+    """Return the number that a text denotes, or `NOTHING` for None."""
     return NOTHING if text is None else Fraction(text)
 
 
@@ -147,7 +147,7 @@ DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})
 
 
 def exact(text: str) -> Fraction | None:
-    """Return the exact number of a decimal text, or None if the text is no number.
+    """Return the exact value of a number in decimal notation, or None for a text that isn't a number.
 
     >>> exact("1.50"), exact("many")
     (Fraction(3, 2), None)
@@ -156,12 +156,12 @@ def exact(text: str) -> Fraction | None:
 
 
 def divided(left: Number, right: Number) -> Number:
-    """Return a quotient, or `NOTHING` for division by zero."""
+    """Return a quotient, or `NOTHING` for a division by zero."""
     return left / right if right else NOTHING
 
 
 def done(operation: str, amount: Number, by: Number) -> Number:
-    """Return an amount after an effect; `NOTHING` stays `NOTHING`."""
+    """Return an amount after an effect; the result is `NOTHING` if the amount was `NOTHING`."""
     match operation:
         case "assign":
             return by if isinstance(amount, Fraction) else NOTHING
@@ -178,7 +178,7 @@ def done(operation: str, amount: Number, by: Number) -> Number:
 
 @lru_cache(maxsize=2**12)
 def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
-    """Return the goal value of an amount as pairs of operator and number.
+    """Return the bounds that are the goal value of an amount, as pairs of operator and number.
 
     >>> bounds(">=2,<5"), bounds("3")
     ((('>=', Fraction(2, 1)), ('<', Fraction(5, 1))), (('=', Fraction(3, 1)),))
@@ -186,7 +186,7 @@ def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
     Raises
     ------
     ValueError
-        The text is neither a number nor bounds.
+        The text contains neither a number nor bounds.
     """
     found = []
     for part in wanted.split(","):
@@ -197,7 +197,7 @@ def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
 
 
 def bounds_written(wanted: str) -> str:
-    """Return the canonical text of an amount's goal value: a number, or bounds.
+    """Return the canonical text of the goal value of an amount: a number, or bounds.
 
     >>> bounds_written("=2.0"), bounds_written("<5, >=2"), bounds_written("=2,<5")
     ('2', '<5,>=2', '<5,<=2,>=2')
@@ -210,7 +210,7 @@ def bounds_written(wanted: str) -> str:
 
 
 def meets(value: str | None, wanted: str) -> bool:
-    """Return whether a value equals the wanted value, or is an amount within the wanted bounds.
+    """Return whether a value equals the goal value, or is an amount within the bounds of the goal value.
 
     >>> meets("shelf", "shelf"), meets("1.5", ">=2"), meets("2", ">=2,<5")
     (True, False, True)
@@ -223,7 +223,7 @@ def meets(value: str | None, wanted: str) -> bool:
 
 
 def towards(amount: str | None, wanted: str) -> str:
-    """Return `MORE` or `LESS` if an amount has to change to meet its goal, else the goal.
+    """Return `MORE` or `LESS` if an amount has to change to satisfy its goal; otherwise return the goal value.
 
     >>> towards("1.5", ">=2"), towards("3", "2"), towards("2", "2")
     ('more', 'less', '2')
@@ -236,7 +236,7 @@ def towards(amount: str | None, wanted: str) -> str:
 
 
 def nearer(before: str | None, after: Number, wanted: str) -> bool:
-    """Return whether an amount comes nearer to its goal, or meets it."""
+    """Return whether a change brings an amount closer to the bounds of its goal or within them."""
     if before is None or not isinstance(after, Fraction):
         return False
     limits, old = bounds(wanted), number(before)

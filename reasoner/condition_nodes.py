@@ -1,26 +1,26 @@
-"""Conditions, effects and calculations as RDF nodes: the properties of each kind, and how they are written and read.
+"""Conditions, effects and calculations as RDF nodes: the properties of each kind of node, and their writing and reading.
 
-A node is an individual of a class of the core (``:ValueCondition``, ``:AmountEffect``, ``:Calculation``). The table lists its
-properties; a negated condition also has ``:negated true``.
+A node is an individual of a core class, for example ``:ValueCondition``. The table lists the properties of each class; a negated
+condition also has ``:negated true``.
 
 ========================  =====================================================================
 class                     properties
 ========================  =====================================================================
 `:ValueCondition`         ``:situationType``, arguments, ``:value``
-`:RelationCondition`      ``:relation``, arguments, the last of several as ``:value``
+`:RelationCondition`      ``:relation``, arguments; the last of several is the ``:value``
 `:ClassCondition`         ``:about``, ``:ofClass``
 `:EqualityCondition`      ``:about``, ``:value``
-`:Witness`                ``:witness``, ``:condition`` for each condition on it
+`:Witness`                ``:witness`` (the variable), ``:condition`` for each condition
 `:AnyOf`                  ``:alternative`` for each condition or `:AllOf`
 `:AllOf`                  ``:condition`` for each condition
-`:Comparison`             ``:sign``; on its left an amount or ``:left``, on its right ``:amount`` or ``:right``
-`:Calculation`            as a comparison; or an amount alone; or ``:amount`` alone
-`:ValueEffect`            as a value condition, ``:when`` for each condition
+`:Comparison`             ``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right``
+`:Calculation`            those of a comparison, or only an amount, or only ``:amount``
+`:ValueEffect`            those of a value condition, ``:when`` for each condition
 `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
 ========================  =====================================================================
 
-Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is a situation type with its arguments, or a relation
-with all of its arguments but the number.
+Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is stated by a situation type with its arguments, or by
+a relation with its arguments except the number.
 """
 
 from __future__ import annotations
@@ -50,55 +50,55 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE, TYPE, XSD
 
 T = TypeVar("T")
 Node: TypeAlias = "Mapping[str, Sequence[str]]"
-"""The values of a node by property, both as IRIs, or as the text of a literal."""
+"""The values of a node by the IRI of the property; values are IRIs or the text of literals."""
 Properties: TypeAlias = "dict[str, list[str]]"
-"""The values of a node's properties, by the properties' names in the core."""
+"""The values of a node by the name of the property in the core."""
 STRINGS = ("sign", "change", "aggregate")
 """Properties whose values are words."""
 LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
-"""Properties with other literals, and their datatypes."""
+"""Properties whose values are other literals, with the datatypes."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
-"""Maximum depth of nested conditions and calculations; the conjunctions of a disjunction do not count."""
+"""Maximum depth of nested conditions and calculations; the conjunctions in a disjunction aren't counted."""
 MOST_CONDITIONS = 10_000
-"""Maximum number of conditions inside one condition; each occurrence counts."""
+"""Maximum number of conditions inside one condition; a condition is counted each time that it occurs."""
 DECIMALS = 30
-"""Number of decimals of a number without a finite decimal form."""
+"""Number of decimal places to which a number without a finite decimal notation is rounded."""
 
 
 # ---------------------------------------------------------------------------------------------------------- properties
 
 
 def argument_properties(terms: Sequence[str]) -> Properties:
-    """Return the properties that name arguments."""
+    """Return the properties that state arguments."""
     return {name: [term] for name, term in zip(ARGUMENTS, terms, strict=False)}
 
 
 def symbol_properties(situation: str, arguments: Sequence[str], value: str | None = None) -> Properties:
-    """Return the properties that name a symbol and its value; without a value, those of an amount or of a true symbol."""
+    """Return the properties that state a symbol and its value; the value is omitted for amounts and true symbols."""
     found = {"situationType": [situation], **argument_properties(arguments)}
     return found if value is None else {**found, "value": [value]}
 
 
 def relation_properties(relation: str, terms: Sequence[str]) -> Properties:
-    """Return the properties that name a relation and its arguments."""
+    """Return the properties that state a relation and its arguments."""
     *first, last = terms
     found = {"relation": [relation], **argument_properties(first or [last])}
     return {**found, "value": [last]} if first else found
 
 
 def class_properties(term: str, kind: str) -> Properties:
-    """Return the properties that name an individual and its class."""
+    """Return the properties that state an individual and a class."""
     return {"about": [term], "ofClass": [kind]}
 
 
 def equality_properties(left: str, right: str) -> Properties:
-    """Return the properties of an equality: they name its two individuals."""
+    """Return the properties that state the two terms of an equality."""
     return {"about": [left], "value": [right]}
 
 
 def triples(node: ox.NamedNode | ox.BlankNode, properties: Properties) -> Iterator[ox.Triple]:
-    """Yield the triples of a node whose properties have IRIs or texts of literals as values; the property `TYPE` is a whole IRI."""
+    """Yield the triples of a node; keys of `properties` are names in the core, or the IRI `TYPE`."""
     for name, values in properties.items():
         prop = ox.NamedNode(name if name == TYPE else CORE + name)
         for value in values:
@@ -117,27 +117,27 @@ def _object(name: str, value: str) -> ox.NamedNode | ox.Literal:
 
 
 class NodeWriter:
-    """Writes the nodes of a behaviour, rule or learned item as statements of Turtle.
+    """Writer of the nodes of a behaviour, rule or learned item as Turtle statements.
 
     Parameters
     ----------
     prefix : str
         The prefix of the core in the file.
     spelled : callable
-        Returns the Turtle term of an individual, a class, a relation or a situation type.
+        Returns the Turtle notation of an individual, class, relation or situation type.
     named : callable
-        Returns the Turtle term of a new node, given its kind (``condition``, ``amount``) and its position among the nodes.
+        Returns the Turtle notation of a new node, given its kind (``condition``, ``amount``) and its position among the nodes.
     variable : callable
-        Returns the Turtle term of a witness's variable, given its name, the node of the witness, and the position of that node.
-    terms : mapping of variable to Turtle term
-        Parameters and variables outside of the conditions.
+        Returns the Turtle notation of a witness variable, given its name, the witness's node and the position of this node.
+    terms : mapping of variable to Turtle notation
+        Parameters and variables that are bound outside the conditions.
     boolean : callable, optional
-        Returns whether the value `TRUE` of a situation type may be left out.
+        Returns whether the value `TRUE` of a situation type can be omitted.
 
     Attributes
     ----------
     nodes : list of str
-        The statements, without the full stop; a node stands before the nodes inside it.
+        The statements without the final full stop; a node precedes the nodes inside it.
     """
 
     def __init__(
@@ -154,11 +154,11 @@ class NodeWriter:
         self.nodes: list[str] = []
 
     def put(self, term: str) -> str:
-        """Return the Turtle term of a variable or an individual."""
+        """Return the Turtle notation of a variable or an individual."""
         return self.terms.get(term) or self.spelled(term)
 
     def said(self, properties: Properties) -> list[str]:
-        """Return properties as predicates with their objects."""
+        """Return properties with their values in Turtle notation."""
         found = []
         for name, values in properties.items():
             objects = [f'"{value}"' for value in values] if name in STRINGS else values
@@ -166,24 +166,24 @@ class NodeWriter:
         return found
 
     def statement(self, node: str, kind: str, properties: Properties, negated: bool = False) -> str:
-        """Return the statement of a node."""
+        """Return the Turtle statement of a node."""
         head = f"{node} a owl:NamedIndividual, {self.prefix}{kind}"
         return " ; ".join([head, *self.said({**properties, "negated": ["true"] if negated else []})])
 
     def reserved(self, kind: str) -> tuple[str, int]:
-        """Return a new node, and its position among the statements."""
+        """Return a new node and the position that is reserved for its statement."""
         self.nodes.append("")
         return self.named(kind, len(self.nodes) - 1), len(self.nodes) - 1
 
     def symbol(self, situation: str, arguments: Sequence[str], value: str | None = None) -> Properties:
-        """Return the properties of a symbol with its value."""
+        """Return the properties that state a symbol and its value."""
         if value == TRUE and self.boolean(situation):
             value = None
         own = None if value is None else self.put(value)
         return symbol_properties(self.spelled(situation), [*map(self.put, arguments)], own)
 
     def condition(self, one: Condition) -> str:
-        """Write a condition with its nested conditions; return its node."""
+        """Write a condition and its nested conditions, and return its node."""
         node, position = self.reserved("condition")
         match one:
             case ValueCondition(situation, arguments, value):
@@ -210,26 +210,26 @@ class NodeWriter:
         return node
 
     def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
-        """Write the alternatives of a disjunction and return their nodes.
+        """Write the alternatives of a disjunction, and return their nodes.
 
-        The node of an alternative with one condition is that condition.
+        An alternative with a single condition is represented by the node of the condition.
         """
         return [self.condition(group[0]) if len(group) == 1 else self.all_of(group) for group in alternatives]
 
     def all_of(self, conditions: Sequence[Condition]) -> str:
-        """Write a conjunction; return its node."""
+        """Write a conjunction, and return its node."""
         node, position = self.reserved("condition")
         self.nodes[position] = self.statement(node, "AllOf", {"condition": [*map(self.condition, conditions)]})
         return node
 
     def measured(self, one: Amount | Measure) -> Properties:
-        """Return the properties of an amount, or of a number that a relation gives."""
+        """Return the properties that state an amount, or a relation that gives a number."""
         if isinstance(one, Amount):
             return self.symbol(one.situation, one.arguments)
         return {"relation": [self.spelled(one.relation)], **argument_properties([*map(self.put, one.arguments)])}
 
     def side(self, name: str, one: Expression) -> Properties:
-        """Return the properties of one side; an amount on the left and a decimal on the right need no separate node."""
+        """Return the properties for one operand; an amount on the left and a number on the right need no node of their own."""
         if name == "right" and isinstance(one, Fraction) and finite(one):
             return {"amount": [decimal_text(one)]}
         if name == "left" and isinstance(one, Amount | Measure):
@@ -237,7 +237,7 @@ class NodeWriter:
         return {name: [self.calculation(one)]}
 
     def calculation(self, one: Expression) -> str:
-        """Write a calculation with its nested ones; return its node."""
+        """Write a numeric expression with nested expressions, and return its node."""
         node, position = self.reserved("amount")
         match one:
             case Calculation(sign, left, right):
@@ -253,7 +253,7 @@ class NodeWriter:
         return node
 
     def effect(self, node: str, one: Effect) -> str:
-        """Write an effect as a given node; return that node."""
+        """Write an effect as the node `node`, and return this node."""
         when = {"when": [*map(self.condition, one.when)]}
         if isinstance(one, AmountEffect):
             changed = {**self.symbol(one.situation, one.arguments), "change": [one.operation]}
@@ -265,12 +265,12 @@ class NodeWriter:
 
 
 def finite(number: Fraction) -> bool:
-    """Return whether a number has a finite decimal form."""
+    """Return whether a number has a finite decimal notation."""
     return "/" not in written(number)
 
 
 def decimal_text(number: Fraction) -> str:
-    """Return a number as a decimal in Turtle; an infinite decimal fraction is rounded.
+    """Return the Turtle notation of a number as a decimal, rounded to `DECIMALS` places.
 
     >>> decimal_text(Fraction(2)), decimal_text(Fraction(1, 8))
     ('2.0', '0.125')
@@ -283,18 +283,18 @@ def decimal_text(number: Fraction) -> str:
 
 
 class NodeReader:
-    """Reads conditions and calculations from nodes.
+    """Reader of conditions and numeric expressions from nodes.
 
-    `term` and `short` return the names of terms, classes, relations and situation types. Subclasses check these names.
+    `term` and `short` return the names of terms, classes, relations and situation types; subclasses implement and check them.
 
     Attributes
     ----------
     error : type of ValueError
     nodes : mapping of IRI to node
     inside : list of str
-        The nodes being read, from the outermost to the innermost.
+        The nodes that are being read, from the outermost to the innermost.
     count : list of int
-        The number of conditions read inside the outermost node.
+        The number of conditions that have been read inside the outermost node.
     """
 
     error: ClassVar[type[ValueError]] = ValueError
@@ -303,7 +303,7 @@ class NodeReader:
     count: list[int]
 
     def short(self, iri: str) -> str:
-        """Return the name of a class, a relation, a situation type or an individual."""
+        """Return the name of a class, relation, situation type or individual."""
         raise NotImplementedError
 
     def term(self, iri: str) -> str:
@@ -311,30 +311,30 @@ class NodeReader:
         raise NotImplementedError
 
     def values(self, iri: str, name: str) -> Sequence[str]:
-        """Return the values of a property of a node."""
+        """Return the values of a node's property."""
         return self.nodes.get(iri, {}).get(CORE + name, ())
 
     def one(self, iri: str, name: str) -> str:
-        """Return the only value of a property; the node must have exactly one value."""
+        """Return the value of a property that must have exactly one value."""
         found = self.values(iri, name)
         if len(found) != 1:
             raise self.error(f"<{iri}>: wanted one :{name}, found {len(found)}; state it once")
         return found[0]
 
     def is_a(self, iri: str, *kinds: str) -> bool:
-        """Return whether a node is of one of some classes of the core."""
+        """Return whether a node is stated to belong to one of some core classes."""
         types = self.nodes.get(iri, {}).get(TYPE, ())
         return any(CORE + kind in types for kind in kinds)
 
     def word(self, iri: str, name: str, known: Sequence[str]) -> str:
-        """Return the value of a property; it has to be one of the known words."""
+        """Return the value of a property, which must be one of the words in `known`."""
         said = self.one(iri, name)
         if said not in known:
             raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
         return said
 
     def decimal(self, iri: str, name: str) -> Fraction | None:
-        """Return the exact number of a property; None if it has none."""
+        """Return the value of a property as an exact number; return None if the property has no value."""
         if not self.values(iri, name):
             return None
         said = self.one(iri, name)
@@ -343,18 +343,18 @@ class NodeReader:
         return found
 
     def flag(self, iri: str, name: str) -> bool:
-        """Return whether a boolean property is stated true."""
+        """Return whether the value of a boolean property is true."""
         said = set(self.values(iri, name))
         if said - {"true", "false", "1", "0"} or len(said) > 1:
             raise self.error(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
         return bool(said & {"true", "1"})
 
     def arguments(self, iri: str) -> tuple[str, ...]:
-        """Return the arguments of a node, in order."""
+        """Return the names of a node's arguments, in order."""
         return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
 
     def situation(self, iri: str) -> str:
-        """Return the IRI of the situation type of a node."""
+        """Return the IRI of a node's situation type."""
         return self.one(iri, "situationType")
 
     def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
@@ -363,23 +363,23 @@ class NodeReader:
         return self.short(self.situation(iri)), self.arguments(iri), value
 
     def relation(self, iri: str) -> str:
-        """Return the relation of a node."""
+        """Return the name of a node's relation."""
         return self.short(self.one(iri, "relation"))
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition that a term is an individual of a class; the class is given as an IRI."""
+        """Return the condition that a term denotes a member of the class with an IRI."""
         return ClassCondition(term, self.short(kind), negated)
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
-        """Return the variable of a witness, and the conditions that follow from its class."""
+        """Return the variable of a witness, and the conditions that its class implies."""
         return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return the conditions of a conjunction, or the alternatives of a disjunction, in their order in the value."""
+        """Return the conjuncts of a conjunction or the alternatives of a disjunction in the order that the result shall have."""
         return tuple(parts)
 
     def entered(self, iri: str, what: str) -> None:
-        """Begin to read a node; raise an error if the node is inside itself or nested too deeply."""
+        """Begin to read a node; raise an error if the node contains itself or is nested too deeply."""
         if iri not in self.nodes:
             raise self.error(f"<{iri}> is used as a {what} but isn't declared as one; declare it, or correct the name")
         depth = sum(not self.is_a(node, "AllOf") for node in self.inside)
@@ -389,7 +389,7 @@ class NodeReader:
         self.inside.append(iri)
 
     def condition(self, iri: str) -> Condition:
-        """Return a condition; a recursive or too deeply nested condition is a fault."""
+        """Return the condition of a node; raise an error if it contains itself or is nested too deeply."""
         self.entered(iri, "condition")
         self.count[0] = self.count[0] + 1 if len(self.inside) > 1 else 0
         if self.count[0] > MOST_CONDITIONS:
@@ -401,7 +401,7 @@ class NodeReader:
         return found
 
     def read(self, iri: str) -> Condition:
-        """Return the condition of a node that is declared."""
+        """Return the condition of a declared node."""
         negated = self.flag(iri, "negated")
         if self.is_a(iri, "ValueCondition"):
             return ValueCondition(*self.symbol(iri), negated)
@@ -425,22 +425,22 @@ class NodeReader:
         raise self.error(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
-        """Return the conditions under a property of a node."""
+        """Return the conditions that are the values of a node's property."""
         return self.in_order(condition for value in self.values(iri, name) for condition in self.group(value))
 
     def group(self, iri: str) -> tuple[Condition, ...]:
-        """Return a condition, or the conditions of a conjunction."""
+        """Return the conjuncts of a conjunction, or another condition as the only conjunct."""
         found = self.condition(iri)
         if self.is_a(iri, "AllOf") and isinstance(found, AnyOf) and not found.negated:
             return found.alternatives[0]
         return (found,)
 
     def left(self, iri: str) -> Expression:
-        """Return the left side of a comparison or calculation; without a ``:left`` it is the node's own amount."""
+        """Return the left operand of a node: the value of ``:left``, or the amount that the node itself states."""
         return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
 
     def right(self, iri: str) -> Expression:
-        """Return the right side of a comparison, calculation or effect: ``:right`` or the node's number."""
+        """Return the right operand of a node: the value of ``:right``, or the number ``:amount``."""
         if self.values(iri, "right"):
             return self.expression(self.one(iri, "right"))
         number = self.decimal(iri, "amount")
@@ -449,13 +449,13 @@ class NodeReader:
         return number
 
     def measured(self, iri: str) -> Amount | Measure:
-        """Return the amount of an object, or the number of a relation."""
+        """Return the amount or the relation whose number a node refers to."""
         if self.values(iri, "relation"):
             return Measure(self.relation(iri), self.arguments(iri))
         return Amount(self.short(self.situation(iri)), self.arguments(iri))
 
     def expression(self, iri: str) -> Expression:
-        """Return an amount, a number or a calculation."""
+        """Return the numeric expression of a node: an amount, a number or a calculation."""
         self.entered(iri, "calculation")
         if self.values(iri, "sign"):
             found: Expression = Calculation(self.word(iri, "sign", SIGNS), self.left(iri), self.right(iri))

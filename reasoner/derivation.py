@@ -1,7 +1,7 @@
-"""Stratification: the order in which defined situation types are computed; mutually dependent types are computed together.
+"""Stratification of derived situation types: the order in which they are computed.
 
-A situation type may depend on the negation of another type only if the other type is computed earlier. Otherwise its value
-would be undefined or ambiguous.
+Mutually dependent types are computed together. A situation type may depend on the negation of another type only if the other type
+is computed earlier; otherwise its value would be undefined or ambiguous.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
-    """Yield the situation types that conditions name, each with True if the conditions depend on its negation.
+    """Yield the situation types in conditions, each with a flag: whether the conditions depend on its negation.
 
     >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
     [('FULL', True)]
@@ -44,7 +44,7 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
 
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
-    """Return the groups of mutually dependent defined situation types, each after the groups on which it depends."""
+    """Return the groups of mutually dependent derived situation types, in order of dependency."""
     needs = {
         name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
     }
@@ -57,7 +57,7 @@ def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
 
 
 def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
-    """Return the situation types that depend on themselves, directly or through others."""
+    """Return the situation types that depend on themselves, directly or indirectly."""
     needs = {
         name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
     }
@@ -65,7 +65,7 @@ def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
 
 
 def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
-    """Return the pairs of mutually dependent situation types in which the first depends on the negation of the second."""
+    """Return the pairs of mutually dependent situation types of which the first depends on the negation of the second."""
     together = {name: group for group in strata(rules) for name in group}
     return sorted(
         {

@@ -1,4 +1,4 @@
-"""Atomic writing of files: complete, or not at all."""
+"""Atomic writing of files: a file is replaced completely or not at all."""
 
 from __future__ import annotations
 
@@ -21,22 +21,24 @@ from confab.reasoner.limits import LimitError
 
 log = logging.getLogger(__name__)
 STDOUT = Path("-")
-"""In place of a file's name: standard output."""
+"""File name that stands for the standard output."""
 PATIENCE = 600.0
-"""Seconds to wait for other writers of a file. (A lesson in a large scene takes minutes.)"""
+"""Seconds to wait for other writers of a file; learning in a large scene takes minutes."""
 
 
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file atomically: a reader, or a crash, sees either the old content or the new. Errors are those of `written_whole`.
+    """Write a file atomically, so that a reader sees either the old or the new content, even after a crash.
+
+    The errors are those of `written_whole`.
 
     Parameters
     ----------
     path : Path
     content : str, bytes or iterable of str
     check : callable, optional
-        Reads the written file; if it raises an error, no file is replaced.
+        Is called with the temporary file; if it raises an error, the old file is kept.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     if path == STDOUT:
@@ -52,21 +54,21 @@ def write_whole(
 
 @contextmanager
 def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
-    """Yield the name of a temporary file to be written; at the end of the block it replaces a file, completely or not at all.
+    """Provide a temporary file name in a ``with`` block, and replace `path` by this file at the end of the block.
 
-    A link is followed: its target is replaced. Permissions stay as they were. Folders, devices, read-only files, and files with
-    content of another kind than the new content (`confab.reasoner.kinds`) are never replaced.
+    Links are followed and permissions are kept. Folders, devices, read-only files, and files whose content is of another kind than
+    the new content (`confab.reasoner.kinds`) are never replaced.
 
     Parameters
     ----------
     path : Path
     suffix : str
-        The ending of the temporary file's name, for libraries that look at it.
+        Suffix of the temporary file, for libraries that depend on it.
 
     Raises
     ------
     OSError
-        The file can't be written, or must not be replaced; it names the file.
+        The file can't be written or mustn't be replaced; the error names the file.
     """
     target = _behind(path)
     part = target.parent / f".confab-{uuid4().hex}.part{suffix}"
@@ -96,12 +98,12 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
 
 
 def check_replaceable(path: Path, kind: str) -> None:
-    """Raise the errors that `written_whole` would raise for content of a kind; called before the content is computed.
+    """Raise the errors that `written_whole` would raise for content of a kind, before the content is computed.
 
     Raises
     ------
     OSError
-        The file must not be replaced.
+        The file mustn't be replaced.
     """
     if path == STDOUT:
         return
@@ -119,7 +121,7 @@ def has_content(path: Path) -> bool:
 
 
 def _replaceable(target: Path) -> os.stat_result | None:
-    """Return the status of an ordinary, writable file; None if the file doesn't exist."""
+    """Return the status of a regular, writable file; return None if the file doesn't exist."""
     if target.is_symlink():
         raise OSError(errno.ELOOP, "is a link that leads back to itself; give the name of a file")
     old = target.stat() if target.exists() else None
@@ -132,7 +134,7 @@ def _replaceable(target: Path) -> os.stat_result | None:
 
 
 def _same_kind(target: Path, new: Kind | None) -> None:
-    """Raise `FileExistsError` unless content of a kind may replace a file."""
+    """Raise `FileExistsError` if content of another kind mustn't replace a file."""
     old = kind_of(target)
     if old is not None and (new is None or not new.replaces(old)):
         what = "this output" if new is None or new.name == old.name else new.name
@@ -142,16 +144,17 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Lock a file: its folder is locked, so that no lock file is left behind. Other callers of this function wait.
+    """Lock a file during a ``with`` block; other callers for files in the same folder wait.
 
-    Links are followed, so that all paths to a file lead to one lock. A caller that has to wait is notified.
+    The folder is locked, so that no lock file remains. Links are followed, so that all paths to a file share one lock. A warning is
+    logged if the caller has to wait.
 
     Raises
     ------
     OSError
-        There is no such folder, and it can't be made.
+        The folder doesn't exist and can't be created.
     LimitError
-        Another process has kept the folder locked for `PATIENCE` seconds.
+        Another process has locked the folder for `PATIENCE` seconds.
     """
     folder = _behind(path).parent
     folder.mkdir(parents=True, exist_ok=True)
@@ -177,7 +180,7 @@ def alone(path: Path) -> Iterator[None]:
 
 
 def as_iri_part(name: str) -> str:
-    """Return a file's name as the last part of an IRI, with invalid characters escaped.
+    """Return a file name as the last part of an IRI, with invalid characters escaped.
 
     >>> as_iri_part("my table"), as_iri_part("Küche-2")
     ('my%20table', 'Küche-2')
@@ -186,13 +189,13 @@ def as_iri_part(name: str) -> str:
 
 
 def _behind(path: Path) -> Path:
-    """Return the target of a path through all links, even if it doesn't exist yet."""
+    """Return the path after following all links, even if the target doesn't exist."""
     return Path(os.path.realpath(path))
 
 
 @contextmanager
 def silent_about_numbers() -> Iterator[None]:
-    """Suppress rdflib's warnings, with tracebacks, about literals that don't match their datatypes."""
+    """Suppress rdflib's warnings about literals that don't match their datatypes, during a ``with`` block."""
     spoken = logging.getLogger("rdflib.term")
     before, spoken.disabled = spoken.disabled, True
     try:

@@ -1,8 +1,7 @@
-"""Constant folding: conditions and effects without parts that always hold or never hold.
+"""Constant folding: removal of the parts of conditions and effects that are always true or always false.
 
-Regression (`confab.reasoner.afterwards`) substitutes individuals and numbers for terms, and repeats conditions inside others.
-Then ``a1 = a2``, ``1 < 2``, "an individual of a class that has some", or a condition beside its own negation is decided in
-every state.
+Regression (`confab.reasoner.afterwards`) replaces terms by individuals and numbers, and duplicates conditions. As a result, parts
+such as ``a1 = a2``, ``1 < 2``, a witness of a non-empty class, or a condition beside its own negation don't depend on the state.
 """
 
 from __future__ import annotations
@@ -29,15 +28,15 @@ from confab.reasoner.symbols import (
 
 @dataclass(frozen=True)
 class Folding:
-    """Decides conditions.
+    """Simplification of conditions.
 
     Parameters
     ----------
     classes : mapping of class to individuals
     kinds : mapping of term to class
-        The class of each variable that no witness binds.
+        The class of each variable that isn't bound by a witness.
     known : set of Condition
-        Conditions that hold.
+        Conditions that are true in the context.
     """
 
     classes: Mapping[str, Sequence[str]]
@@ -45,7 +44,7 @@ class Folding:
     known: frozenset[Condition] = frozenset()
 
     def effects(self, effects: Iterable[AmountEffect]) -> tuple[AmountEffect, ...]:
-        """Return increases and decreases without those that never happen; equal ones are added up."""
+        """Return the increases and decreases that may happen, with equal ones combined."""
         found = Counter[AmountEffect]()
         for effect in effects:
             when = self.conjunction(effect.when)
@@ -54,7 +53,7 @@ class Folding:
         return tuple(replace(effect, amount=_times(many, effect.amount)) for effect, many in found.items())
 
     def conjunction(self, conditions: Iterable[Condition]) -> Conjunction:
-        """Return conditions without those that follow from the others; None if they never hold together."""
+        """Return the conjuncts that don't follow from the others; return None if the conjunction is contradictory."""
         known, found, more = self.known, list[Condition](), False
         for part in sorted(_parts(conditions), key=lambda condition: bool(groups(condition))):
             folded = replace(self, known=known).condition(part)
@@ -67,7 +66,7 @@ class Folding:
         return self.conjunction(found) if more else tuple(found)
 
     def condition(self, condition: Condition) -> Formula:
-        """Return a condition; true or false if it is decided."""
+        """Return a simplified condition, or a truth value if the condition doesn't depend on the state."""
         if condition in self.known:
             return True
         if opposite(condition) in self.known:
@@ -103,7 +102,7 @@ class Folding:
         return condition
 
     def _alternatives(self, alternatives: Iterable[tuple[Condition, ...]]) -> Iterator[Conjunction]:
-        """Yield alternatives; an alternative that is a disjunction itself is replaced by its own alternatives."""
+        """Yield simplified alternatives; nested disjunctions are flattened."""
         for group in map(self.conjunction, alternatives):
             match group:
                 case (AnyOf(inner, False),):
@@ -117,7 +116,7 @@ class Folding:
 
 
 def _parts(conditions: Iterable[Condition]) -> Iterator[Condition]:
-    """Yield the conditions of a conjunction, including those of conjunctions inside it."""
+    """Yield the conjuncts of a conjunction; nested conjunctions are flattened."""
     for condition in conditions:
         match condition:
             case AnyOf((group,), False):

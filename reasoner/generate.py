@@ -1,23 +1,23 @@
-"""Scenes for trials, as ordinary ontology files made from Turtle templates.
+"""Generation of test scenes as ordinary ontology files from Turtle templates.
 
-A family is a Turtle file in ``ontology/families``: a line ``#* SECTION`` heads a block that is repeated for each row of
-that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named:
-a template uses objects of a `first` and a `second` kind.
+A family is a Turtle file in ``ontology/families``. A line ``#* SECTION`` begins a block that is repeated for each row of the
+section; the row's values replace the words ``_WORD_``. This module names no class, situation type or behaviour of a domain; a
+template uses objects of a `first` and a `second` kind.
 
 ==============================  ========================================================================
 section                         words
 ==============================  ========================================================================
-(the top), ``once``             SCENE, FAMILY, OBJECTS, HANDS, CLUTTER, SEED
+(beginning), ``once``           SCENE, FAMILY, OBJECTS, HANDS, CLUTTER, SEED
 ``hand``, ``place``             HAND, PLACE
 ``reach``                       HAND and PLACE, for each place that a hand reaches
-``first``, ``second``           ITEM (number within its kind), INDEX, START and GOAL (places), OTHER (an item at random)
-``some first``, ``some second`` the same, for about half of them at random
+``first``, ``second``           ITEM (number within its kind), INDEX, START and GOAL (places), OTHER (a random item)
+``some first``, ``some second`` the same words, for a random half of the objects
 ``clutter``                     ITEM, ROOM
 ==============================  ========================================================================
 
-``#* like NAME`` puts the blocks of ``parts/NAME.ttl`` before the family's own; ``#* placement NAME`` picks one of
-`PLACEMENTS`. The places are a grid of two rows: 1 … n near, n + 1 … 2 n far. The hands' strips of columns overlap by
-two thirds; two hands reach three quarters of the columns each.
+``#* like NAME`` inserts the blocks of ``parts/NAME.ttl`` before the family's own blocks. ``#* placement NAME`` selects one of
+`PLACEMENTS`. The places form a grid of two rows: 1 … n near, n + 1 … 2 n far. Each hand reaches a strip of columns. The strips of
+neighbouring hands overlap by two thirds; each of two hands reaches three quarters of the columns.
 """
 
 from __future__ import annotations
@@ -37,16 +37,17 @@ from confab.reasoner.names import nearest
 
 FOLDER = ontology.ROOT / "families"
 WORD = re.compile(r"_([A-Z]+)_")
-PER_ROOM = 100  # how many irrelevant objects one room has
+PER_ROOM = 100  # number of irrelevant objects in a room
 
 Row = Mapping[str, object]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A table before its goals are chosen.
+    """The places of a table and the positions of objects on it.
 
-    `reach` has the places of each hand; `starts` and `goals` a place for each object, those of the first kind first.
+    `reach` contains the places that each hand reaches. `starts` and `goals` contain a place for each object, those of the first
+    kind first.
     """
 
     places: Sequence[int]
@@ -56,24 +57,24 @@ class Layout:
 
 
 def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> str:
-    """Return a scene as Turtle text; the same arguments give the same text.
+    """Return a scene as Turtle text; equal arguments give equal texts.
 
     Parameters
     ----------
     family : str
         One of `families`.
     objects : int
-        Even; half of them of the first kind (bottles), half of the second (cups).
+        An even number; half of the objects are of the first kind (bottles), half of the second kind (cups).
     hands : int
     clutter : int
-        Irrelevant objects in other rooms, where no hand reaches.
+        Number of irrelevant objects in other rooms, which no hand reaches.
     seed : int
-        Seed of all random numbers.
+        Seed of the random numbers.
 
     Raises
     ------
     KnowledgeError
-        The family is unknown, or has no table for these numbers.
+        The family is unknown, or has no layout for these numbers.
 
     Examples
     --------
@@ -85,7 +86,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 
 
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
-    """Write a scene, named after its file, atomically and piece by piece; parameters as in `generate`."""
+    """Write a scene that is named after its file, atomically and in pieces; parameters as in `generate`."""
     write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
 
@@ -120,7 +121,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name:
 
 
 def _blocks(path: Path) -> list[tuple[str, str]]:
-    """Return the sections of a template with their text, after those of its ``like`` template."""
+    """Return the sections of a template with their texts, preceded by those of its ``like`` template."""
     found: list[tuple[str, str]] = []
     section, lines = "once", list[str]()
     for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:
@@ -159,14 +160,14 @@ def _rows(section: str, once: Row, layout: Layout, clutter: int, random: Random)
             }
             for i in (sorted(random.sample(chosen, (half + 1) // 2)) if section.startswith("some ") else chosen)
         )
-    return [once]  # the section `once`, and what stands below a directive
+    return [once]  # the section `once`, and text below a directive
 
 
 # ----------------------------------------------------------------------------------------------------------- placements
 
 
 def strips(columns: int, hands: int, places: Sequence[int]) -> list[list[int]]:
-    """Return the places of each hand: strips of columns that overlap by two thirds.
+    """Return the places that each hand reaches: strips of columns that overlap by two thirds.
 
     >>> strips(4, 2, range(1, 9))
     [[1, 2, 3, 5, 6, 7], [2, 3, 4, 6, 7, 8]]
@@ -179,14 +180,14 @@ def strips(columns: int, hands: int, places: Sequence[int]) -> list[list[int]]:
 
 
 def _side_by_side(objects: int, hands: int, random: Random) -> Layout:
-    """Put all objects into the near row, the first at its far end; each goal is a random far place."""
+    """Return a layout with all objects in the near row; each goal is a random far place."""
     places = range(1, 2 * objects + 1)
     goals = random.sample(places[objects:], objects)
     return Layout(places, strips(objects, hands, places), places[:objects][::-1], goals)
 
 
 def _exchange(objects: int, hands: int, random: Random) -> Layout:
-    """Pair the objects at random; each goal is the partner's place."""
+    """Return a layout in which random pairs of objects have to exchange their places."""
     layout = _side_by_side(objects, hands, random)
     order, goals = random.sample(range(objects), objects), list(layout.starts)
     for one, other in zip(order[::2], order[1::2], strict=True):
@@ -195,22 +196,22 @@ def _exchange(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _rotation(objects: int, hands: int, random: Random) -> Layout:
-    """Set the goal of each object to the place of the next one."""
+    """Return a layout in which the goal of each object is the place of the next object."""
     layout = _side_by_side(objects, hands, random)
     return Layout(layout.places, layout.reach, layout.starts, [*layout.starts[1:], layout.starts[0]])
 
 
 def _crowded(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects on a table with one free place; each goal is a random place."""
+    """Return a layout with one free place; each goal is a random place."""
     places = range(1, objects + 2)
     reach = strips(-(-len(places) // 2), hands, places)
     return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
 
 
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
-    """Put objects at places that only the first or the last hand reaches, with goals on the other side.
+    """Return a layout with objects at places that only the first or only the last hand reaches, and goals on the other side.
 
-    Other objects stay in between.
+    Further objects remain in between.
     """
     places = range(1, 2 * objects + 1)
     reach = strips(objects, hands, places)
@@ -230,21 +231,21 @@ def _opposite(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _occupied(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects of the first kind at the goals of the second kind."""
+    """Return a layout in which objects of the first kind occupy the goals of the second kind."""
     places, half = range(1, 2 * objects + 1), objects // 2
     starts = random.sample(places[objects:], half) + random.sample(places[:objects], half)
     return Layout(places, strips(objects, hands, places), starts, starts[:half] + random.sample(starts[:half], half))
 
 
 def _anywhere(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects at random places with random goals; a hand reaches each place with probability 3/4."""
+    """Return a layout with random places and goals, in which a hand reaches each place with probability 3/4."""
     places = range(1, 2 * objects + 1)
     reach = [[place for place in places if random.random() < 0.75] for _ in range(hands)]
     return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
 
 
 def _unreachable(objects: int, hands: int, random: Random) -> Layout:
-    """Like `_side_by_side`, but no hand reaches the goal of one object of the second kind."""
+    """Return the layout of `_side_by_side`, in which no hand reaches the goal of one object of the second kind."""
     layout = _side_by_side(objects, hands, random)
     barred = random.choice(layout.goals[objects // 2 :])
     reach = [[place for place in places if place != barred] for places in layout.reach]

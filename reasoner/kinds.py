@@ -1,8 +1,8 @@
 """The kinds of files that Confab writes, recognised by their content.
 
-Reports, pictures and films name Confab as their maker, plans and verdicts have keys of their own, memories and episodes
-properties of their own. Files that people go on editing (scenes, PDDL) end with a stamp, a comment with a hash of the content
-above it; an edited file is no longer recognised. All other files are foreign.
+Reports, pictures and films contain the maker's name "Confab". Plans and verdicts have specific keys; memories and episodes have
+specific properties. Files for further editing (scenes, PDDL) end with a stamp, a comment with a hash of the content above it, so
+that an edited file is no longer recognised. All other files are foreign.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ TREE = "an exported behaviour tree"
 DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
 STAMP = re.compile(rb"(<!-- )?[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})( -->)?\n?\Z")
 STAMP_BYTES = 200
-"""Bytes at the end of a file that contain any stamp."""
+"""Number of bytes at the end of a file in which a stamp is searched."""
 HEAD_BYTES = 4096
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-")
 GENERATOR = re.compile(rb'<meta name="generator" content="Confab"')
@@ -52,9 +52,9 @@ class Kind:
     name : str
         The name of the kind in messages, with its article.
     foreign : bool
-        Whether Confab doesn't write such files; they are never overwritten.
+        Whether Confab doesn't write such files; foreign files are never overwritten.
     columns : tuple of str, optional
-        The columns of rows; None if the content has none or its format doesn't state them.
+        The columns of query results; None if they are unknown or don't exist.
     """
 
     name: str
@@ -65,13 +65,13 @@ class Kind:
         return f"{self.name} (columns {', '.join(self.columns)})" if self.columns else self.name
 
     def replaces(self, old: Kind) -> bool:
-        """Return whether content of this kind may replace content of another."""
+        """Return whether content of this kind may replace content of the kind `old`."""
         same_columns = None in (self.columns, old.columns) or self.columns == old.columns
         return not old.foreign and self.name == old.name and same_columns
 
 
 def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
-    """Yield the pieces of a text and a stamp, a comment by which the kind of the text is recognised until it is edited.
+    """Yield the pieces of a text and then a stamp, a comment that identifies the kind of the text until it is edited.
 
     >>> print("".join(stamped("a text", ["one"])).strip())
     one
@@ -89,13 +89,13 @@ def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[s
 
 
 def kind_of(file: Path, suffix: str | None = None) -> Kind | None:
-    """Return the kind of a file's content; None if it is empty.
+    """Return the kind of a file's content; return None for an empty file.
 
     Parameters
     ----------
     file : Path
     suffix : str, optional
-        The suffix that distinguishes CSV from other texts; by default that of the file.
+        The suffix that distinguishes CSV from other texts; by default the file's suffix.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def _json(text: bytes) -> Kind | None:
 
 
 def _turtle(text: bytes) -> Kind | None:
-    """Return the kind of a Turtle file by the first significant triple; None if it isn't Turtle."""
+    """Return the kind of a Turtle file according to its first distinctive triple; return None if it isn't Turtle."""
     some = False
     if nested(text) <= MOST_NESTED:
         try:
@@ -197,7 +197,7 @@ def _told_by(triple: ox.Quad) -> str | None:
 
 
 def _rows(file: Path, suffix: str | None) -> Kind:
-    """Return the kind of any other text: rows of a query if its first line has columns that fit the file's suffix."""
+    """Return the kind of any other text: query results if its first line contains columns in the format of the suffix."""
     with file.open(encoding="utf-8", errors="replace", newline="") as lines:
         first = lines.readline(HEAD_BYTES).rstrip("\r\n")
     columns: tuple[str, ...] = ()

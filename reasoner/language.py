@@ -1,4 +1,7 @@
-"""Traversal of conditions: terms, variables and nested conditions. A new kind of condition is added here and in the checker."""
+"""Traversal of conditions: terms, variables and nested conditions.
+
+A new kind of condition must be added here and in the independent plan checker.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ from confab.reasoner.symbols import (
 
 
 class DomainError(ValueError):
-    """A behaviour can't be executed as it is written; the message names the behaviour and the faulty term."""
+    """Raised if a behaviour can't be executed as defined; the message names the behaviour and the faulty term."""
 
 
 def is_variable(term: str) -> bool:
-    """Return whether a term is a parameter or variable, not an individual."""
+    """Return whether a term is a parameter or variable and not an individual."""
     return term.startswith("?")
 
 
@@ -47,7 +50,7 @@ def walk(condition: Condition) -> Iterator[Condition]:
 
 
 def terms(condition: Condition) -> tuple[str, ...]:
-    """Return the terms of a condition itself, without those of nested conditions."""
+    """Return the terms of a condition, without those of nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):
             return (*arguments, value)
@@ -64,7 +67,7 @@ def terms(condition: Condition) -> tuple[str, ...]:
 
 
 def situations_of(condition: Condition) -> frozenset[str]:
-    """Return the situation types of a condition itself, without those of nested conditions."""
+    """Return the situation types of a condition, without those of nested conditions."""
     match condition:
         case ValueCondition(situation):
             return frozenset({situation})
@@ -75,7 +78,7 @@ def situations_of(condition: Condition) -> frozenset[str]:
 
 
 def measured(behavior: Behavior) -> Iterator[Measure]:
-    """Yield the static numbers that a behaviour looks up in its effects and conditions, such as distances."""
+    """Yield the numbers of static relations, such as distances, that a behaviour reads in its effects and conditions."""
     amounts = [effect.amount for effect in behavior.amounts]
     for condition in behavior.conditions:
         amounts += [side for c in walk(condition) if isinstance(c, Comparison) for side in (c.left, c.right)]
@@ -83,12 +86,12 @@ def measured(behavior: Behavior) -> Iterator[Measure]:
 
 
 def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
-    """Return the relations that behaviours use as numbers, whose tuples end with a number."""
+    """Return the relations whose numbers behaviours read."""
     return frozenset(one.relation for behavior in behaviors for one in measured(behavior))
 
 
 def mentions(condition: Condition) -> set[str]:
-    """Return all variables of a condition except those of the witnesses inside it.
+    """Return all variables of a condition except those that nested witnesses bind.
 
     >>> sorted(mentions(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "?l"),))))
     ['?l']
@@ -99,7 +102,7 @@ def mentions(condition: Condition) -> set[str]:
 
 
 def needs(condition: Condition) -> set[str]:
-    """Return the variables that must be bound before a condition can be tested; the condition determines its other variables.
+    """Return the variables that must be bound before a condition can be evaluated; the condition binds its other variables.
 
     >>> needs(ValueCondition("LOCATION", ("cup1",), "?l")), needs(ValueCondition("LOCATION", ("cup1",), "?l", True))
     (set(), {'?l'})
@@ -113,12 +116,12 @@ def needs(condition: Condition) -> set[str]:
 
 
 def _unbound(group: Sequence[Condition]) -> set[str]:
-    """Return the variables that must be bound before a conjunction can be tested; its value conditions determine the others."""
+    """Return the variables that must be bound before a conjunction can be evaluated."""
     determined = {c.value for c in group if isinstance(c, ValueCondition) and not c.negated}
     return {term for c in group for term in needs(c)} - determined
 
 
 def nothing_determines(where: str, waiting: Sequence[Condition], bound: set[str]) -> DomainError:
-    """Return the error for a behaviour none of whose waiting conditions can be tested."""
+    """Return the error for a behaviour with conditions whose variables nothing binds."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

@@ -1,7 +1,7 @@
-"""The deadline of a call. The caller sets the deadline once; loops read it from a context variable, not from a parameter.
+"""The deadline of a call, stored in a context variable so that it needn't be passed as a parameter.
 
-`within` sets it. Loops call `check`, or read `left`. Blocks nest, and the earliest deadline applies, so that a part of a call can
-receive a share of its time.
+The caller sets the deadline by `within`; loops call `check` or read `left`. In nested blocks the earliest deadline applies, so
+that a part of a call can have a share of the time.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from time import perf_counter
 
 
 class LimitError(Exception):
-    """A limit was reached; the message names the limit, the work in progress, and how to raise the limit."""
+    """Raised if a limit was reached; the message names the limit, the work in progress, and how to raise the limit."""
 
 
 class OutOfTimeError(LimitError):
-    """The deadline has passed."""
+    """Raised if the deadline has passed."""
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,18 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """Return the deadline after some seconds; None means no deadline."""
+        """Return the deadline in a number of seconds from now, or no deadline for None."""
         return cls() if seconds is None else cls(perf_counter() + seconds, seconds)
 
     @property
     def left(self) -> float | None:
-        """Seconds left, at least 0; None without a deadline."""
+        """Remaining seconds, at least 0; None without a deadline."""
         return None if math.isinf(self.at) else max(0.0, self.at - perf_counter())
 
     def check(self, doing: str, ahead: float = 0.0) -> None:
-        """Raise `OutOfTimeError` if the deadline has passed, or will have passed after a step of `ahead` seconds.
+        """Raise `OutOfTimeError` if the deadline has passed or is less than `ahead` seconds away.
 
-        `doing` names the work for the message.
+        The message names the work in progress by `doing`.
         """
         if perf_counter() + ahead > self.at:
             raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
@@ -58,9 +58,9 @@ _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # n
 
 @contextmanager
 def within(limit: Deadline | float | None) -> Iterator[Deadline]:
-    """Limit everything in a block to a deadline, or to seconds from now.
+    """Apply a deadline, or a limit in seconds from now, to a ``with`` block; provide the effective deadline.
 
-    Yields the effective deadline: the earlier one of the new deadline and the current deadline.
+    The effective deadline is the earlier one of the given deadline and the current deadline.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def overtime(share: float = 0.1) -> Iterator[Deadline]:
-    """Extend the deadline by a share of its time, at least a tenth of a second, to check a result that was found in time.
+    """Extend the deadline by a share of the time limit, at least 0.1 s, for checking a result that was found in time.
 
     Examples
     --------
@@ -106,5 +106,5 @@ def current() -> Deadline:
 
 
 def check(doing: str, ahead: float = 0.0) -> None:
-    """Raise `OutOfTimeError` if the current deadline has passed, or will have passed in `ahead` seconds."""
+    """Raise `OutOfTimeError` if the current deadline has passed or is less than `ahead` seconds away."""
     _current.get().check(doing, ahead)

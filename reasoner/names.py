@@ -1,4 +1,4 @@
-"""Short names for IRIs: the last part of the IRI if it is unique in the scene, otherwise with the ontology's name before it."""
+"""Short names for IRIs: the last part of the IRI if it is unique in the scene, otherwise preceded by the ontology's name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ V = TypeVar("V")
 
 
 class Names:
-    """A one-to-one table of IRIs and short names.
+    """A one-to-one mapping of IRIs and short names.
 
     >>> names = Names(["https://x.org/a#cup1", "https://x.org/b#cup1", "https://x.org/a#plate"])
     >>> names.short("https://x.org/a#plate"), names.short("https://x.org/b#cup1")
@@ -38,11 +38,11 @@ class Names:
         self._names = {iri: name for name, iri in self._iris.items()}
 
     def short(self, iri: str) -> str:
-        """Return the short name of an IRI; for an IRI outside the scene, its last part."""
+        """Return the short name of an IRI; for an unknown IRI, return its last part."""
         return self._names.get(iri) or local_name(iri)
 
     def iri(self, name: str) -> str:
-        """Return the IRI of a short name; raise `KeyError` if there is none."""
+        """Return the IRI of a short name; raise `KeyError` for an unknown name."""
         return self._iris[name]
 
     @property
@@ -51,27 +51,27 @@ class Names:
         return self._names.keys()
 
     def agree(self, other: Names) -> bool:
-        """Return whether all IRIs of this table have the same short names in the other one."""
+        """Return whether all IRIs have the same short names in another mapping."""
         return all(other._names.get(iri) == name for iri, name in self._names.items())
 
     def __contains__(self, name: object) -> bool:
-        """Return whether an IRI has this short name."""
+        """Return whether a short name is known."""
         return name in self._iris
 
 
 class Named(dict[str, V]):
-    """A mapping whose error for a missing name has the most similar one."""
+    """A mapping whose `KeyError` for a missing name suggests the most similar name."""
 
     def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:
         super().__init__(content)
         self.kind, self.hint = kind, hint
 
     def __missing__(self, name: object) -> NoReturn:
-        """Raise the error."""
+        """Raise `KeyError` with the most similar name."""
         raise KeyError(f"no {self.kind} '{name}'{nearest(str(name), self)}" + (f"; {self.hint}" if self.hint else ""))
 
     def __reduce__(self) -> tuple[type[dict[str, V]], tuple[dict[str, V]]]:
-        """Return the parts of a copy: a mapping without the hint."""
+        """Return the reduced form for copying and pickling: a plain dictionary."""
         return dict, (dict(self),)
 
 
@@ -82,7 +82,7 @@ def local_name(iri: str) -> str:
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
-    """Return ``; did you mean 'x'?`` with the most similar known word; without one, return the hint, or an empty text."""
+    """Return ``; did you mean 'x'?`` with the most similar known word; if no word is similar, return the hint."""
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
     near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [
@@ -96,24 +96,24 @@ def _ontology_name(iri: str) -> str:
 
 
 TYPED = 0.85
-"""Minimum similarity of a wrong name to a right name for which it counts as a typing error."""
+"""Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
 FEW_NAMES = 30
-"""Maximum number of names of an object that are all listed if none of them resembles the wrong name."""
+"""Maximum number of names that are listed in an error if no name is similar to the wrong one."""
 GUESSING: list[str] = []
-"""Modules that find the meaning of a wrong name by their functions `guessed` and `chosen`; the top layer adds one."""
+"""Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one."""
 
 
 def right_names(kind: str, module: str = "", table: str = "", made: str = "") -> Callable[[C], C]:
-    """Return a class decorator: the error for a missing attribute, or an unknown argument, names the right one.
+    """Return a class decorator that adds the correct name to errors for unknown attributes and arguments.
 
     Parameters
     ----------
     kind : str
-        The object without the name, e.g. ``a scene``.
+        Description of the object, e.g. ``a scene``.
     module, table : str
-        The module and the name of the mapping of right names to words of the same meaning; it is imported when a name is wrong.
+        Module and name of a mapping from correct names to words with the same meaning; imported when a name is wrong.
     made : str, optional
-        The call that creates such an object; the error of a constructor without arguments names it.
+        The call that creates such an object; the error of the constructor without arguments mentions it.
     """
 
     def hints() -> Mapping[str, str]:
@@ -146,7 +146,7 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
 
 
 def _checked(function: Callable[..., R]) -> Callable[..., R]:
-    """Return a method whose error for an unknown argument names the arguments that it takes."""
+    """Return a method whose error for an unknown argument lists the arguments."""
     parameters = [*signature(function).parameters.values()][1:]
     takes = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
     if not takes or any(each.kind is each.VAR_KEYWORD for each in parameters):
@@ -165,19 +165,19 @@ def _checked(function: Callable[..., R]) -> Callable[..., R]:
 
 
 class WrongNameError(AttributeError):
-    """The error for a missing name: with the name of the same function, or the most similar name.
+    """Raised for an unknown attribute; the message suggests the name with the same meaning, or the most similar name.
 
-    The text is made only when it is read, since libraries often request names that objects don't have.
+    The message is created when it is read, because libraries often test whether objects have attributes.
 
     Parameters
     ----------
     kind : str
-        The object without the name, e.g. ``a scene``.
+        Description of the object, e.g. ``a scene``.
     name : str
     there : object
-        The object; `dir` lists its public names.
+        The object; its public names are determined by `dir`.
     hints : callable
-        Returns the mapping of a right name to the words that mean it.
+        Returns the mapping from a correct name to words with the same meaning.
     """
 
     def __init__(self, kind: str, name: str, there: object, hints: Callable[[], Mapping[str, str]]) -> None:
@@ -185,7 +185,7 @@ class WrongNameError(AttributeError):
         self._wrong, self._there, self._hints = (kind, name), there, hints
 
     def __str__(self) -> str:
-        """Return the text with the right name."""
+        """Return the message with the suggested name."""
         (kind, name), there = self._wrong, self._there
         text = f"{kind} has no '{name}'"
         if name.startswith("_"):
@@ -200,5 +200,5 @@ class WrongNameError(AttributeError):
         return text + nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
 
     def __reduce__(self) -> tuple[type[AttributeError], tuple[str]]:
-        """Return the parts of a copy: an error with the text."""
+        """Return the reduced form for copying and pickling: an `AttributeError` with the message."""
         return AttributeError, (str(self),)

@@ -1,6 +1,6 @@
-"""The depth of nesting of documents.
+"""The nesting depth of documents.
 
-The depth is checked before parsing, since the time, memory or stack of some parsers grows much faster than the depth.
+The depth is checked before parsing, because some parsers need time, memory or stack that grow much faster than the depth.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ from contextlib import suppress
 from xml.parsers import expat
 
 MOST_NESTED = 1_000
-"""Maximum depth of a document; all parsers used here can read it. Ontologies have about ten levels."""
+"""Maximum nesting depth of a document, which all used parsers can read. Ontologies have about ten levels."""
 PIECE = 256
-"""Number of bytes that are counted at once; the depth may be overestimated by this number."""
+"""Number of bytes that are counted together; the depth may be overestimated by this number."""
 TURTLE = re.compile(
     rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
     rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""Texts, IRIs and comments of Turtle and related formats, whose brackets don't count."""
+"""Literals, IRIs and comments of Turtle and related formats, in which brackets aren't counted."""
 JSON = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 OPENING, CLOSING = (b"[", b"(", b"{", b"<<"), (b"]", b")", b"}", b">>")
 
 
 def nested(content: bytes, quoted: re.Pattern[bytes] = TURTLE) -> int:
-    """Return an upper bound of the number of brackets open at once; `quoted` matches text whose brackets don't count.
+    """Return an upper bound of the nesting depth of brackets; brackets inside matches of `quoted` aren't counted.
 
     >>> nested(b"[" * 5000 + b"]" * 5000), nested(b"[]" * 5000), nested(b'"[" ' * 5000)
     (5000, 256, 0)
@@ -43,7 +43,7 @@ def nested(content: bytes, quoted: re.Pattern[bytes] = TURTLE) -> int:
 
 
 def nested_elements(content: bytes) -> int:
-    """Return the depth of the nested elements of an XML document, up to the first position where it isn't well-formed.
+    """Return the nesting depth of elements in an XML document, up to the first syntax error.
 
     >>> nested_elements(b"<a>" * 5000 + b"</a>" * 5000), nested_elements(b"<a>" + b"<b></b>" * 5000)
     (5000, 2)
@@ -63,6 +63,6 @@ def nested_elements(content: bytes) -> int:
 
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler, parser.EndElementHandler = begin, end
-    with suppress(expat.ExpatError):  # the reader of the document reports it
+    with suppress(expat.ExpatError):  # reported when the document is read
         parser.Parse(content, True)
     return most

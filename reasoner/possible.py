@@ -1,8 +1,8 @@
-"""Impossible states: one check, with one set of messages, for every source of states.
+"""Detection of impossible states, with the same messages for all sources of states.
 
-Facts come from files, callers, observations, interventions and the board. A value must belong to its situation type, an amount
-must lie within its bounds, and an exclusive value may have only one holder. A symbol without a value is unknown, which is no
-fault.
+Facts come from files, callers, observations, interventions and the blackboard. A value must belong to its situation type, an
+amount must be within its bounds, and an exclusive value may belong to only one individual. A symbol without a value is unknown,
+which is allowed.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from confab.reasoner.amounts import DECIMAL, Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Domain, Fact, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
-"""Perceivers of the place of an object, of the object in a hand, and of the position of a hand."""
+"""Perceivers of an object's place, of the object in a hand, and of a hand's position."""
 
 
 class ImpossibleStateError(ValueError):
-    """A given state is impossible; the message says why, and what to do."""
+    """Raised if a given state is impossible; the message states the reason and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,9 @@ class Impossible:
     Attributes
     ----------
     symbol : Symbol
-        One of those whose values are at fault.
+        A symbol with a faulty value.
     what, why, remedy : str
+        The fault, the reason why it is one, and the remedy.
     """
 
     symbol: Symbol
@@ -50,9 +51,9 @@ def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
     Parameters
     ----------
     problem : Problem
-        Has the situation types and the individuals; its initial state isn't looked at.
+        Problem with the situation types and the individuals; its initial state isn't used.
     state : State
-        The values of some symbols, or of all.
+        The values of some or all symbols.
     """
     declared = problem.individuals
     wrong = [*values_at_fault(state, problem.domain, declared)]
@@ -72,18 +73,19 @@ def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield the exclusive values with two holders, and objects that are both held and at a place."""
+    """Yield exclusive values that belong to two individuals, and objects that are both in a hand and at a place."""
     yield from _had_twice(problem, state)
     yield from _held_elsewhere(problem, state)
 
 
 def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't apply to the state before it.
+    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't apply to the previous state.
 
     Parameters
     ----------
     problem : Problem
     before, after : State
+        The previous state and the state to check.
     cause : str
         Description of the transition, for the message.
     """
@@ -94,7 +96,7 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
 
 
 def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if one of some facts is a derived amount, which other facts determine."""
+    """Raise `ImpossibleStateError` if a fact is a derived amount, which depends on other facts."""
     for fact in facts:
         if (name := fact.symbol.situation) in domain.aggregates:
             text = f"a rule defines {name}; change a fact that it follows from"
@@ -102,7 +104,7 @@ def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> No
 
 
 def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:
-    """Yield undeclared values, and amounts that are no numbers or outside their bounds."""
+    """Yield undeclared values, invalid amounts, amounts out of bounds, and violated constraints."""
     for symbol, value in state.items():
         quantity = domain.situations[symbol.situation].quantity
         if quantity is not None and (limits := _limits(value, quantity)):
@@ -129,7 +131,7 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
 
 
 def _limits(value: str, quantity: Quantity) -> str:
-    """Return the requirement on an amount, if a value violates it."""
+    """Return the requirement that an amount violates, or an empty text."""
     if not DECIMAL.fullmatch(value):
         return "wanted a number, like 2 or 1.5"
     if quantity.allows(Fraction(value)):
@@ -141,7 +143,7 @@ def _limits(value: str, quantity: Quantity) -> str:
 
 
 def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield the exclusive values with two holders."""
+    """Yield exclusive values that belong to two individuals."""
     having: dict[tuple[str, str], list[Symbol]] = defaultdict(list)
     for symbol, value in sorted(state.items()):
         perceived = problem.domain.situations[symbol.situation].perceived
@@ -158,9 +160,9 @@ def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield objects at a place while a hand elsewhere holds them, and objects in a hand while no hand holds them.
+    """Yield objects that are at a place although a hand elsewhere holds them, and objects "in a hand" that no hand holds.
 
-    A hand that grasps or releases an object holds it while it is still at its place, as long as the hand is at that object.
+    While a hand grasps or releases an object, the object may be both in the hand and at its place.
     """
     by = {s.perceived.by: s for s in problem.domain.situations.values() if s.perceived is not None}
     if PLACE not in by or HELD not in by:

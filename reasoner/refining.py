@@ -1,4 +1,4 @@
-"""Behaviours that no plan can contain: faults of a domain that are certain without a search (docs/levels.md)."""
+"""Behaviours that no plan can contain, detected without search (docs/levels.md)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from confab.reasoner.symbols import FALSE, AmountEffect, AnyOf, Behavior, Proble
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
-    """Yield each relevant behaviour that no plan can contain in any situation, with the reason.
+    """Yield each relevant behaviour that no plan can contain in any state, with the reason.
 
-    Two faults are detected. A behaviour above the lowest level can never be refined if it always makes a change that no behaviour
-    of some level below makes. Any behaviour is useless if it always leaves a situation type with a rest value at another value and
-    no behaviour restores it, since no refinement and no plan may end so.
+    - A behaviour above the lowest level can't be refined if it always has an effect that no behaviour of a lower level has.
+    - A behaviour can't be in a plan if it always gives a symbol a value other than its rest value, and no behaviour restores the
+      rest value, because every refinement and every plan must restore it.
     """
     domain = problem.domain
     values: dict[str, set[str]] = {}
@@ -33,7 +33,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
                 continue
             made = _values(problem, behavior, effect)
             if FALSE in made or made & values.get(situation, set()):
-                continue  # facts that hold already aren't changed
+                continue  # the value may already hold
             if below is not None and not made & _given(problem, below, situation):
                 yield behavior, _unrefined(behavior, f"it makes {situation} {_said(effect)}", below)
             first = next((level for level in domain.levels if level >= kind.level), behavior.level)
@@ -49,7 +49,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
 
 
 def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
-    """Return a problem in which some behaviours are inapplicable; the IDs of all behaviours stay the same."""
+    """Return a problem in which some behaviours are never applicable; the IDs of all behaviours remain the same."""
     never = {one.name: replace(one, preconditions=(*one.preconditions, AnyOf(()))) for one in behaviors}
     return replace(problem, domain=replace(problem.domain, behaviors={**problem.domain.behaviors, **never}))
 
@@ -57,7 +57,7 @@ def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
 def _needed(problem: Problem) -> list[Behavior]:
     """Return the relevant behaviours.
 
-    Those that change a situation type in the goal, or in a condition or effect of a relevant behaviour or rule.
+    A behaviour is relevant if it changes a situation type in the goal, or in a condition or effect of a relevant behaviour or rule.
     """
     behaviors = [*problem.domain.behaviors.values()]
     doing = [*behaviors, *(rule.behavior for rules in problem.domain.rules.values() for rule in rules)]
@@ -85,7 +85,7 @@ def _from(problem: Problem, level: int) -> list[Behavior]:
 
 
 def _given(problem: Problem, level: int, situation: str) -> set[str]:
-    """Return the values that behaviours of a level, and of those below it, may give to symbols of a situation type."""
+    """Return the values that behaviours of a level and of lower levels may give to symbols of a situation type."""
     return {
         value
         for behavior in _from(problem, level)
@@ -101,7 +101,7 @@ def _values(problem: Problem, behavior: Behavior, effect: ValueEffect) -> set[st
 
 
 def _sure(problem: Problem, behavior: Behavior) -> Iterator[ValueEffect | AmountEffect]:
-    """Yield the effects of every execution of a behaviour; none if no individual fits one of its parameters."""
+    """Yield the effects that every execution of a behaviour has; yield no effect if a parameter's class is empty."""
     kinds = behavior.kinds
     if not all(problem.members(kind) for kind in kinds.values()):
         return

@@ -1,7 +1,7 @@
-"""Refutations by motion planning: a behaviour that is impossible as long as some facts hold.
+"""Refutations by motion planning: a behaviour is physically impossible while some facts hold.
 
-A refutation is an additional precondition of the behaviour, in a problem as in the ontology: the behaviour is not applicable with
-these arguments while all of its facts hold. So planning, checking and explaining take it into account without further code.
+A refutation becomes a precondition of the behaviour, both in the problem and in the ontology: with the refuted arguments, the
+behaviour isn't applicable while all facts hold. Planning, validation and explanation therefore need no special treatment.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact,
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with its arguments, the facts under which it is impossible, and the reason.
+    """A behaviour with its arguments, the facts that make it impossible, and the reason.
 
-    An empty argument matches any individual.
+    An empty argument stands for any individual.
     """
 
     behavior: str
@@ -26,13 +26,13 @@ class Refutation:
 
     @property
     def individuals(self) -> frozenset[str]:
-        """The individuals in the arguments and facts of the refutation."""
+        """The individuals in the arguments and facts."""
         return frozenset(
             {*self.arguments, *(part for fact in self.facts for part in (*fact.symbol.arguments, fact.value))}
         )
 
     def covers(self, other: Refutation) -> bool:
-        """Return True if this refutation applies in every case in which `other` applies."""
+        """Return whether this refutation applies in every case in which `other` applies."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
         return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
 
@@ -45,7 +45,7 @@ class Refutation:
 
 
 def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem:
-    """Return the problem with an additional precondition for each refutation of one of its behaviours."""
+    """Return a problem in which each refutation is an additional precondition of its behaviour."""
     behaviors = dict(problem.domain.behaviors)
     for one in refutations:
         behavior = behaviors.get(one.behavior)
@@ -64,6 +64,6 @@ def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem
 
 
 def _condition(fact: Fact) -> ValueCondition:
-    """Return the condition that a fact holds; for a false fact, the negation of the condition that it is true."""
+    """Return the condition that a fact holds; a false fact becomes a negated condition."""
     value = TRUE if fact.value == FALSE else fact.value
     return ValueCondition(fact.symbol.situation, fact.symbol.arguments, value, negated=fact.value == FALSE)

@@ -1,4 +1,4 @@
-"""Conditions and amounts as sentences. They contain names, or the words that a caller has for facts and names."""
+"""Conditions and amounts as English sentences, with the names or words that the caller provides."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 )
 
 Words = Callable[[Fact | str], str]
-"""Writes a fact, or the name of an individual, a class or a relation."""
+"""Function that returns the words for a fact, or for the name of an individual, class or relation."""
 REGULAR = (
     "balance come connect contain face fit get hang hold join know "
     "lead lie live need own rest sit stand stay suit want wear wish work"
@@ -42,13 +42,13 @@ DENIALS = {
     **{"reaches": "doesn't reach", "passes": "doesn't pass", "goes": "doesn't go"},
     **{f"{verb}s": f"doesn't {verb}" for verb in REGULAR.split()},
 }
-"""Verbs in the third person with their negations."""
+"""Verbs in the third person, with their negations."""
 SIGNS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "=": "exactly"}
-"""Signs of a comparison in words."""
+"""Comparison operators in words."""
 
 
 def said(condition: Condition, words: Words = str) -> str:
-    """Return a condition as a sentence, in the caller's words for facts and names."""
+    """Return a condition as a clause; `words` returns the words for facts and names."""
     match condition:
         case ValueCondition(situation, arguments, value, negated):
             if negated and value in (TRUE, FALSE):
@@ -76,9 +76,9 @@ def said(condition: Condition, words: Words = str) -> str:
 
 
 def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
-    """Return the sentence that some, no, or every individual of a class satisfies conditions.
+    """Return the clause that some, no, or every individual of a class satisfies conditions.
 
-    "Every" is the negation of a witness whose last condition is negated.
+    "Every" stands for a negated witness whose last condition is negated.
     """
     but = [c for c in conditions if isinstance(c, EqualityCondition) and c.negated and variable in (c.left, c.right)]
     asked = sorted((c for c in conditions if c not in but), key=lambda c: c.negated)
@@ -88,13 +88,11 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         asked[-1] = replace(asked[-1], negated=False)
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
-    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # denotes the individual
+    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
     clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
     if not clauses:
         return f"there is {whole}"
-    if (
-        which != "every"
-    ):  # the order of the clauses is free: the last is the predicate, best one with the individual as its subject
+    if which != "every":  # clauses with the individual as the subject come last
         clauses.sort(key=lambda clause: clause.startswith(f"{mark} "))
     *before, last = clauses
     if not before and last.endswith(f" {mark}") and last.count(mark) == 1 and which != "every":
@@ -121,12 +119,12 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
 
 
 def _is_subject(mark: str, clause: str) -> bool:
-    """Return whether the individual denoted by a mark is the subject of a clause and occurs nowhere else in it."""
+    """Return whether the individual that a mark stands for is the subject of a clause and occurs only there."""
     return clause.startswith(f"{mark} ") and clause.count(mark) == 1
 
 
 def _relative(mark: str, clause: str) -> str | None:
-    """Return a clause as a relative clause about the individual denoted by a mark; None if it can't be one."""
+    """Return a clause as a relative clause about the individual that a mark stands for, or None if this is impossible."""
     if _is_subject(mark, clause):
         return f"that {clause.removeprefix(f'{mark} ')}"
     if clause.endswith(f" {mark}") and clause.count(mark) == 1 and " and " not in clause:
@@ -139,7 +137,7 @@ def _signed(sentence: str, negated: bool) -> str:
 
 
 def denied(sentence: str) -> str:
-    """Return the opposite of a sentence.
+    """Return the negation of a clause.
 
     >>> denied("cup 1 is at location 7"), denied("ferry EMPTY")
     ("cup 1 isn't at location 7", 'not ferry EMPTY')
@@ -152,7 +150,7 @@ def denied(sentence: str) -> str:
 
 
 def an(noun: str) -> str:
-    """Return a noun with its article.
+    """Return a noun with the indefinite article.
 
     >>> an("Item"), an("cup")
     ('an Item', 'a cup')
@@ -161,7 +159,7 @@ def an(noun: str) -> str:
 
 
 def counted(expression: Expression, words: Words = str) -> str:
-    """Return an amount in words.
+    """Return a numeric expression in words.
 
     >>> from fractions import Fraction
     >>> counted(Calculation("-", Amount("SERVINGS", ("bottle1",)), Fraction(1, 2)))

@@ -1,18 +1,17 @@
-"""The reasoner's output values: symbols, conditions, effects, behaviours and problems, read from the knowledge graph.
+"""Dataclasses for planning problems: symbols, facts, conditions, effects, behaviours, rules and domains.
 
-This module knows neither RDF nor search nor physics. Every name is a string, unique within one scene (`cup1`, `B1_MOVE`,
-`LOCATION`); the reasoner keeps its IRI. A term that starts with ``?`` is a parameter or variable of a behaviour, any other term is
-an individual.
+The module is independent of RDF, search and physics. Every name is a string that is unique in the scene (`cup1`, `B1_MOVE`,
+`LOCATION`); `Names` maps it to an IRI. A term that starts with ``?`` is a parameter or variable; any other term is an individual.
 
 ============================  =========================================  =====================
-the paper                     the field                                  here
+in the paper                  standard term                              class
 ============================  =========================================  =====================
 situated object symbol        state variable (SAS+)                      `Symbol`
 situated object instance      fact                                       `Fact`
-situation type                the variable's property, and its domain    `SituationType`
+situation type                property of state variables, with domain   `SituationType`
 behaviour                     action schema                              `Behavior`
 quantified behaviour          ground action                              `GroundBehavior`
-(none)                        derived predicate, and its axioms          `Rule`
+(none)                        axiom of a derived predicate               `Rule`
 (none)                        derived amount: sum, count, extremum       `Aggregate`
 ============================  =========================================  =====================
 """
@@ -36,7 +35,7 @@ FALSE = "false"
 
 @dataclass(frozen=True, order=True)
 class Symbol:
-    """A situated object symbol ``<o, S>``: a situation type with its arguments, the first of them the object."""
+    """A situated object symbol ``<o, S>``: a situation type with its arguments, of which the first is the object."""
 
     situation: str
     arguments: tuple[str, ...]
@@ -48,32 +47,32 @@ class Symbol:
 
 @dataclass(frozen=True, order=True)
 class Fact:
-    """A situated object instance ``<o, s>``: a symbol with one of its values."""
+    """A situated object instance ``<o, s>``: a symbol with a value."""
 
     symbol: Symbol
     value: str
 
     def __str__(self) -> str:
-        """Return the fact in goal notation, e.g. ``cup1 LOCATION location7``."""
+        """Return the fact in the notation of goals, e.g. ``cup1 LOCATION location7``."""
         return " ".join((*self.symbol.arguments[:1], self.symbol.situation, *self.symbol.arguments[1:], self.value))
 
 
 State: TypeAlias = Mapping[Symbol, str]
-"""A value for every symbol of the scene; a missing boolean symbol is `FALSE`."""
+"""The value of every symbol; a missing boolean symbol is `FALSE`."""
 
 
 @dataclass(frozen=True)
 class Perceived:
-    """The perception of a situation type's values.
+    """How the values of a situation type are perceived.
 
     Attributes
     ----------
     by : str
         The perceiver.
     exclusive : bool
-        Whether no two individuals can have the same value at once, except for special values.
+        Whether two individuals can't have the same value at the same time, except for special values.
     special : tuple of (str, str)
-        The special values as pairs of name and value: ``("valueInHand", "in_hand")``.
+        Names and special values, e.g. ``("valueInHand", "in_hand")``.
     """
 
     by: str
@@ -83,13 +82,15 @@ class Perceived:
 
 @dataclass(frozen=True)
 class SituationType:
-    """A property of objects, which is also the class of its values.
+    """A property of objects that varies between states; it is also the class of its values.
 
-    `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional is
-    `boolean`: its value is the last argument, and there is one symbol per value, which is `TRUE` or `FALSE`. The symbols exist
-    from `level` on; `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene
-    doesn't state. With a `quantity` the values are numbers (`confab.reasoner.amounts`), and only the symbols with a stated
-    amount exist. `perceived` states how physics reads the values, if it reads them.
+    - `arguments` are the classes of the arguments, and `range` is the class of the values.
+    - A property that isn't functional is `boolean`: the property's value becomes the last argument of a symbol, whose own value is
+      `TRUE` or `FALSE`.
+    - `level` is the first level on which the symbols exist.
+    - `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
+    - With a `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
+    - `perceived` states how the values are perceived in physics; None if they aren't.
     """
 
     name: str
@@ -108,9 +109,9 @@ class SituationType:
 
 @dataclass(frozen=True)
 class ValueCondition:
-    """``situation(arguments) = value``. If the value is an unbound variable, the condition determines it.
+    """The condition ``situation(arguments) = value``; if the value is an unbound variable, the condition determines it.
 
-    A symbol that doesn't exist has no value: the condition is then false, and its negation true.
+    A symbol that doesn't exist has no value: the condition is false, and its negation is true.
     """
 
     situation: str
@@ -121,7 +122,7 @@ class ValueCondition:
 
 @dataclass(frozen=True)
 class RelationCondition:
-    """A static relation holds between the arguments."""
+    """The condition that a static relation holds between the arguments."""
 
     relation: str
     arguments: tuple[str, ...]
@@ -130,7 +131,7 @@ class RelationCondition:
 
 @dataclass(frozen=True)
 class ClassCondition:
-    """The term is an individual of the class."""
+    """The condition that a term denotes a member of a class."""
 
     term: str
     kind: str
@@ -139,7 +140,7 @@ class ClassCondition:
 
 @dataclass(frozen=True)
 class EqualityCondition:
-    """Both terms are the same individual."""
+    """The condition that two terms denote the same individual."""
 
     left: str
     right: str
@@ -148,9 +149,10 @@ class EqualityCondition:
 
 @dataclass(frozen=True)
 class Witness:
-    """Some individual of class `kind`, substituted for `variable`, satisfies all `conditions`; negated: none does.
+    """The condition that some individual of class `kind`, denoted by `variable`, satisfies all `conditions`.
 
-    "The location is free" is ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
+    If negated, no individual satisfies them. "The location is free" is
+    ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
     """
 
     variable: str
@@ -161,7 +163,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on every state: a situation type is true of no individuals, or of all individuals of its classes."""
+    """A condition on every state: a situation type is never true, or always true for all individuals of its argument classes."""
 
     situation: str
     always: bool = False
@@ -172,9 +174,9 @@ class Constraint:
 
 @dataclass(frozen=True)
 class AnyOf:
-    """At least one alternative, which is a conjunction, holds; negated: none does. It binds no variables outside of itself.
+    """The condition that at least one alternative (a conjunction) is true; if negated, no alternative is true.
 
-    `constraint` is the constraint that a precondition maintains, for its sentence; it makes no difference to the meaning.
+    It binds no variables outside itself. `constraint` is the constraint that a precondition enforces; it is used only in messages.
     """
 
     alternatives: tuple[tuple[Condition, ...], ...]
@@ -184,7 +186,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison of two amounts by `operator` (a key of `amounts.COMPARING`); false if one of them is missing."""
+    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`); false if one of them has no value."""
 
     left: Expression
     operator: str
@@ -199,10 +201,10 @@ Condition: TypeAlias = (
 
 @dataclass(frozen=True)
 class ValueEffect:
-    """``situation(arguments)`` becomes `value`, if all of `when` held before; variables in `when` are determined there.
+    """The effect that ``situation(arguments)`` becomes `value` if all conditions in `when` hold in the state before.
 
-    With `each`, the effect is on every individual of that class, substituted for that variable. A `Problem` has an effect for each
-    of them instead (`spread`).
+    Conditions in `when` may determine variables. With `each`, the effect is on every member of the class of this variable. In a
+    `Problem`, `spread` has replaced such an effect by one effect per member.
     """
 
     situation: str
@@ -214,9 +216,9 @@ class ValueEffect:
 
 @dataclass(frozen=True)
 class AmountEffect:
-    """The amount of ``situation(arguments)`` is assigned, increased, decreased or scaled, if all of `when` held before.
+    """The effect that an amount is assigned, increased, decreased or scaled if all conditions in `when` hold in the state before.
 
-    The number is evaluated in the state before; changes of one symbol are added.
+    The number is evaluated in the state before the behaviour; changes of the same symbol are added.
     """
 
     situation: str
@@ -234,22 +236,22 @@ Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
 class Span(Enum):
-    """The part of a step at which a condition must hold, or an effect takes place."""
+    """The part of a step's duration in which a condition must hold, or at which an effect takes place."""
 
     START = "atStart"
-    THROUGHOUT = "throughout"  # of an effect: it is in the making until the end
+    THROUGHOUT = "throughout"  # an effect with this span takes place at the end
     END = "atEnd"
 
 
 @dataclass(frozen=True)
 class Timing:
-    """A behaviour in time.
+    """The duration of a behaviour, and the spans of its conditions and effects.
 
     Attributes
     ----------
     duration : Expression, optional
-        Seconds, evaluated where the behaviour begins. None: the duration of its refinement; for a primitive, the measured
-        duration.
+        Seconds, evaluated in the state at the start. None stands for the duration of the refinement or, for a primitive behaviour,
+        the measured duration.
     actors : tuple of str
         Terms whose individuals can take part in only one step at a time.
     conditions, effects : tuple of pairs
@@ -262,29 +264,29 @@ class Timing:
     effects: tuple[tuple[Span, Effect], ...] = ()
 
     def asked(self, span: Span) -> tuple[Condition, ...]:
-        """Return the conditions of a span."""
+        """Return the conditions with a span."""
         return tuple(condition for at, condition in self.conditions if at is span)
 
     def made(self, span: Span) -> tuple[Effect, ...]:
-        """Return the effects of a span."""
+        """Return the effects with a span."""
         return tuple(effect for at, effect in self.effects if at is span)
 
 
 @dataclass(frozen=True)
 class Times:
-    """The times of a task, in seconds from the begin of the plan.
+    """The times of a task, in seconds from the beginning of the plan.
 
     Attributes
     ----------
     deadlines : mapping of Symbol to seconds
-        The latest time from which on a goal has to hold.
+        The time from which on a goal must hold at the latest.
     windows : mapping of individual to pairs of seconds
-        When an individual is available. A window without an end (None) lasts for ever; an individual without windows is always
+        Time windows in which an individual is available; None as the end means no end. An individual without windows is always
         available.
     measured : mapping of behaviour to seconds
         The average measured duration of behaviours without a stated duration.
     events : mapping of behaviour to seconds
-        Events, which no actor executes: they happen at that time (PDDL's timed initial literals).
+        The fixed times of events, which no actor executes (PDDL's timed initial literals).
     """
 
     deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)
@@ -298,7 +300,7 @@ class Times:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter (enumerated by quantification) or variable (determined by the state) with the class of its values."""
+    """A parameter (enumerated by quantification) or variable (determined by the state), with its class."""
 
     name: str
     kind: str
@@ -306,13 +308,14 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Behavior:
-    """A lifted behaviour.
+    """A lifted behaviour (action schema).
 
-    Effects are applied in order, false facts first. So a fact that one binding makes both false and true is true, as in PDDL.
-    The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
-    the individuals that effects on all members of a class name. A `price` replaces `cost`, and a precondition requires that the
-    price is defined (`priced`). `timing` states when its conditions must hold and its effects take place
-    (`confab.reasoner.timing`).
+    - Effects are applied in order; effects that make facts false come first. As in PDDL, a fact that is made both false and true is
+      true.
+    - A behaviour isn't applicable if it would violate the bounds of an amount.
+    - `price` replaces `cost`; a precondition requires that it is a number (`priced`).
+    - `spread` contains the individuals that occur only because effects on all members of a class were expanded.
+    - `timing` states the spans of conditions and effects (`confab.reasoner.timing`).
     """
 
     name: str
@@ -328,7 +331,7 @@ class Behavior:
     timing: Timing | None = None
 
     def __post_init__(self) -> None:
-        """Sort the effects."""
+        """Sort the effects in the order of their application."""
         object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda effect: effect.value != FALSE)))
         if self.amounts:
             ordered = sorted(self.amounts, key=lambda effect: OPERATIONS.index(effect.operation))
@@ -336,23 +339,23 @@ class Behavior:
 
     @cached_property
     def priced(self) -> Comparison | None:
-        """The conditions of the price: it is a number, and not negative."""
+        """The precondition that the price is a number and not negative; None without a price."""
         return None if self.price is None else Comparison(self.price, ">=", Fraction(0))
 
     @cached_property
     def lasting(self) -> Comparison | None:
-        """The conditions of a calculated duration: it is a number, and not negative."""
+        """The precondition that a calculated duration is a number and not negative; None for other durations."""
         duration = None if self.timing is None else self.timing.duration
         return None if isinstance(duration, Fraction | None) else Comparison(duration, ">=", Fraction(0))
 
     @cached_property
     def asked(self) -> tuple[Condition, ...]:
-        """The preconditions without those of the price and the duration."""
+        """The preconditions except `priced` and `lasting`."""
         return tuple(condition for condition in self.preconditions if condition not in (self.priced, self.lasting))
 
     @cached_property
     def every_effect(self) -> tuple[ValueEffect | AmountEffect, ...]:
-        """The behaviour's effects on values, then those on amounts."""
+        """The effects on values, followed by the effects on amounts."""
         return (*self.effects, *self.amounts)
 
     @cached_property
@@ -362,7 +365,7 @@ class Behavior:
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
-        """The behaviour's preconditions and the conditions of its effects."""
+        """The preconditions and the conditions of all effects."""
         return (*self.preconditions, *(condition for effect in self.every_effect for condition in effect.when))
 
     @cached_property
@@ -373,20 +376,19 @@ class Behavior:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of a defined situation type: it is true of its arguments in every state in which all conditions hold.
+    """A rule of a derived situation type: its symbol is true in every state in which all conditions hold.
 
-    If a situation type has several rules, one true rule suffices; if none is true, the situation is false. States don't contain
-    its symbols: their values are computed on demand. Rules may depend on each other, but not on the negation of a situation
-    type that depends on them (`confab.reasoner.derivation`).
+    A symbol is true if at least one rule applies to it, and false otherwise. States don't contain derived symbols; their values are
+    computed on demand. Rules may be recursive, but not through negation (`confab.reasoner.derivation`).
 
     Parameters
     ----------
     situation : str
-        A boolean situation type, which no behaviour changes.
+        A boolean situation type that no behaviour changes.
     parameters : tuple of Parameter
-        The names of its arguments in the conditions, and their classes.
+        Names and classes of the arguments.
     variables : tuple of Parameter
-        Further variables, which the conditions determine, as in a behaviour.
+        Further variables, which the conditions determine.
     conditions : tuple of Condition
     """
 
@@ -397,22 +399,22 @@ class Rule:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The rule as a behaviour that makes its situation type true, for functions that look for achievers."""
+        """The rule as a behaviour that makes its situation type true, for functions that search for achievers."""
         head = ValueEffect(self.situation, tuple(p.name for p in self.parameters), TRUE)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
 
 
 AGGREGATES = ("sum", "count", "max", "min")
-"""The functions of an aggregate."""
+"""Aggregate functions."""
 
 
 @dataclass(frozen=True)
 class Aggregate:
-    """A rule of a derived amount: in every state the sum, count, maximum or minimum over all solutions of its conditions.
+    """A rule of a derived amount: the sum, count, maximum or minimum over all solutions of its conditions, in every state.
 
-    A solution assigns an individual to each of the `variables`. A solution for which `amount` is not defined is left out. A sum
-    or count without solutions is zero; a maximum or minimum without solutions doesn't exist. No behaviour that an author writes
-    changes a derived amount; `confab.reasoner.aggregates` adds the effects that keep it up to date.
+    A solution assigns an individual to each variable in `variables`. Solutions for which `amount` has no value are ignored. A sum
+    or count without solutions is zero; a maximum or minimum without solutions doesn't exist. Behaviours of the domain don't change
+    a derived amount directly; `confab.reasoner.aggregates` adds effects that update it.
 
     Parameters
     ----------
@@ -421,11 +423,11 @@ class Aggregate:
     function : str
         One of `AGGREGATES`.
     amount : Expression
-        The number to be summed or compared; 1 for a count.
+        The aggregated number; 1 for a count.
     parameters : tuple of Parameter
-        The names of its arguments in the conditions, and their classes.
+        Names and classes of the arguments.
     variables : tuple of Parameter
-        The variables of the individuals to be aggregated.
+        The variables that the aggregate ranges over.
     conditions : tuple of Condition
     """
 
@@ -438,7 +440,7 @@ class Aggregate:
 
     @cached_property
     def kept(self) -> bool:
-        """Whether the amount is part of each state; a maximum or minimum is replaced by conditions instead."""
+        """Whether states contain the amount (sums and counts); conditions replace maxima and minima instead."""
         return self.function in ("sum", "count")
 
     @cached_property
@@ -448,21 +450,21 @@ class Aggregate:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The aggregate as a behaviour that changes its amount, for functions that determine the dependencies of an amount."""
+        """The aggregate as a behaviour that changes its amount, for functions that determine dependencies."""
         head = AmountEffect(self.situation, tuple(p.name for p in self.parameters), "increase", self.amount)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, cost=0.0, amounts=(head,))
 
 
 @dataclass(frozen=True, order=True)
 class GroundBehavior:
-    """A quantified behaviour with the ID that its level's numbering gives it."""
+    """A quantified behaviour (ground action) with its ID on its level."""
 
     id: int
     behavior: str
     arguments: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return the behaviour as in the paper's figures, e.g. ``22 B1_MOVE cup1 location7``."""
+        """Return the behaviour in the notation of the paper's figures, e.g. ``22 B1_MOVE cup1 location7``."""
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
@@ -470,8 +472,8 @@ class GroundBehavior:
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
-    `rules` has the defined situation types, each with its rules; `aggregates` the derived amounts. `constraints` has the situation
-    types that are never true, or always true, by the name of the derived count of exceptions, whose maximum is 0.
+    `rules` contains the rules of each derived situation type, and `aggregates` the derived amounts. `constraints` maps the name of
+    a derived count of violations, whose maximum is 0, to the constraint.
     """
 
     situations: Mapping[str, SituationType]
@@ -483,11 +485,11 @@ class Domain:
 
     @property
     def levels(self) -> tuple[int, ...]:
-        """The levels with behaviours, the most abstract first."""
+        """The levels with behaviours, beginning with the most abstract level."""
         return tuple(sorted({b.level for b in self.behaviors.values()}))
 
     def at_level(self, level: int) -> tuple[Behavior, ...]:
-        """Return the behaviours of one level in declared order."""
+        """Return the behaviours of a level in declared order."""
         return tuple(b for b in self.behaviors.values() if b.level == level)
 
 
@@ -501,19 +503,18 @@ class Problem:
         IRI of the scene.
     domain : Domain
     classes : mapping of class to individuals
-        In declared order; superclasses include their subclasses' individuals.
+        The members of each class and its subclasses, in declared order.
     relations : mapping of relation to set of tuples
-        Static facts.
+        Rows of static relations.
     initial : State
-        One value for every symbol.
     goal : State
         Goal values of some symbols.
     parents : mapping of class to its direct superclasses
-        For statistics that back off; the planner's search doesn't use it.
+        Used by statistics that generalise over classes; the search doesn't use it.
     value_levels : mapping of individual to level
-        The first level on which a value exists, where that isn't 1.
+        The first level on which a value exists, if it isn't 1.
     times : Times, optional
-        Deadlines, windows and measured durations (`confab.reasoner.timing`).
+        Deadlines, time windows and measured durations (`confab.reasoner.timing`).
     weights : mapping of Symbol to Fraction
         The costs of leaving goals unmet; goals without a weight must be met.
     """
@@ -535,22 +536,22 @@ class Problem:
         return tuple(value for value in members if self.value_levels.get(value, 1) <= level)
 
     def first_level(self, symbol: Symbol) -> int:
-        """Return the first level on which a symbol exists, with its situation type and its arguments."""
+        """Return the first level on which a symbol, its situation type and its arguments exist."""
         individuals = (self.value_levels.get(argument, 1) for argument in symbol.arguments)
         return max((self.domain.situations[symbol.situation].level, *individuals))
 
     def sees(self, level: int, symbol: Symbol, value: str) -> bool:
-        """Return whether a level sees a symbol and its value."""
+        """Return whether a symbol and a value exist on a level."""
         return self.first_level(symbol) <= level and self.value_levels.get(value, 1) <= level
 
     def goal_on(self, level: int) -> dict[Symbol, str]:
-        """Return the goal of one level: the task's goal, and rest values of the symbols of `at_rest`."""
+        """Return the goal on a level: the task's goal, and the rest values of the symbols in `at_rest`."""
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
-        """Return the symbols that a level sees and that are initially at rest.
+        """Return the symbols on a level that initially have their rest value, with this value.
 
-        Unstated boolean symbols count if the level changes them.
+        Boolean symbols that the initial state omits are included if a behaviour of the level changes their situation type.
         """
         rests = {s.name: s.rest for s in self.domain.situations.values() if s.rest is not None}
         found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation)}
@@ -564,7 +565,7 @@ class Problem:
         return {symbol: value for symbol, value in found.items() if self.first_level(symbol) <= level}
 
     def members(self, kind: str) -> frozenset[str]:
-        """Return the individuals of a class as a set."""
+        """Return the members of a class as a set."""
         return self._members.get(kind, frozenset())
 
     @cached_property
@@ -577,9 +578,9 @@ class Problem:
         return {kind: frozenset(members) for kind, members in self.classes.items()}
 
     def id_of(self, behavior: str, arguments: tuple[str, ...]) -> int:
-        """Return the ID of a quantified behaviour without enumerating the others.
+        """Return the ID of a quantified behaviour without enumerating other behaviours.
 
-        IDs are in declared order: of behaviours, then of parameters, then of individuals (section 4 of PAPER.md).
+        IDs follow the declared order of behaviours, then of parameters, then of individuals (section 4 of PAPER.md).
         """
         number, kinds = self._numbers[behavior]
         rank = 0
@@ -606,7 +607,7 @@ class Problem:
 
 
 def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
-    """Return a condition with some terms substituted."""
+    """Return a condition in which `terms` maps terms to their replacements."""
 
     def put(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(terms.get(name, name) for name in names)
@@ -621,7 +622,7 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
         case EqualityCondition(left, right, negated):
             return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
         case Witness(variable, kind, conditions, negated):
-            own = f"{variable}_inside" if variable in terms.values() else variable  # else it would capture that term
+            own = f"{variable}_inside" if variable in terms.values() else variable  # avoids variable capture
             inner = {**terms, variable: own}
             return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
         case AnyOf(alternatives, negated, constraint):
@@ -632,7 +633,7 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
 
 
 def made_of(effect: Effect, one: str) -> Effect:
-    """Return an effect on all individuals of a class as an effect on one of them."""
+    """Return the effect on one member for an effect on all members of a class."""
     if effect.each is None:
         return effect
     terms = {effect.each.name: one}
@@ -644,7 +645,7 @@ def made_of(effect: Effect, one: str) -> Effect:
 
 
 def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour with each effect on all individuals of a class replaced by effects on the individuals."""
+    """Return a behaviour in which each effect on all members of a class is replaced by one effect per member."""
     if all(effect.each is None for effect in behavior.every_effect):
         return behavior
 
@@ -662,9 +663,9 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
-    """Return the preconditions that follow from the bounds of the amounts that a behaviour changes, if conditions can express them.
+    """Return preconditions that ensure the bounds of the amounts that a behaviour changes, as far as conditions can express them.
 
-    Each is the negation of a violated bound, so it holds for missing amounts, which effects don't change.
+    Each precondition negates the violation of a bound. It therefore holds for amounts that don't exist, which effects don't change.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

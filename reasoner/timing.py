@@ -1,8 +1,8 @@
-"""How behaviours lie in time: durations, actors, and the spans of conditions and effects (docs/levels.md, "In time").
+"""Durations, actors and time spans of behaviours (docs/levels.md, "In time").
 
-The preconditions and effects of a behaviour are its *projection*: the conditions before it, and the effects after it, if no
-other step overlaps it. Every planner reads the projection. `Timing` states in addition when each condition must hold and when
-each effect takes place.
+The preconditions and effects of a behaviour are its *projection*: the conditions before it and the effects after it if no other
+step overlaps it. All planners use the projection. `Timing` states in addition when each condition must hold and when each effect
+takes place.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from confab.reasoner.symbols import (
 
 
 def timing_of(behavior: Behavior) -> Timing:
-    """Return a behaviour's timing; without one, everything is throughout."""
+    """Return a behaviour's timing; by default, all conditions and effects have the span `THROUGHOUT`."""
     if behavior.timing is not None:
         return behavior.timing
     conditions = tuple((Span.THROUGHOUT, condition) for condition in behavior.preconditions)
@@ -39,8 +39,7 @@ def projected(
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    A condition that an effect at the start achieves isn't required before; an effect at the start that a later one replaces
-    isn't seen afterwards.
+    Conditions that an effect at the start achieves are omitted, and so are effects at the start that a later effect overwrites.
     """
     given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
     later = {(e.situation, e.arguments) for span, e in effects if span is not Span.START and not e.when and not e.each}
@@ -59,10 +58,9 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours that give a symbol a value only for their duration.
+    """Return the behaviours that give a symbol a value only while they last, if another behaviour or the goal may need it.
 
-    The value counts if another behaviour or the goal can require it. Such plans need concurrency: in no sequence of whole steps
-    does the value hold for another step.
+    Such plans need concurrency: in a sequence of steps, the value never holds for another step.
     """
     found = set[str]()
     for behavior in problem.domain.behaviors.values():
@@ -77,7 +75,7 @@ def only_during(problem: Problem) -> frozenset[str]:
 
 
 def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
-    """Return the effects at the start of a behaviour that its end undoes."""
+    """Return the effects at the start of a behaviour that a later effect of it reverses."""
     if behavior.timing is None:
         return ()
     last = {
@@ -94,7 +92,7 @@ def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
 
 
 def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
-    """Return whether a condition of a behaviour can hold because a symbol has the value of an effect."""
+    """Return whether a behaviour has a condition that may be satisfied by the value of an effect."""
     whens = [c for _, made in timing_of(behavior).effects for c in made.when]
     asked = [c for _, condition in timing_of(behavior).conditions for c in walk(condition)]
     kinds = dict(behavior.kinds)
@@ -114,7 +112,7 @@ def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
 
 
 def on_each(effects: Sequence[Effect], classes: Mapping[str, Sequence[str]]) -> tuple[Effect, ...]:
-    """Return effects; an effect on all individuals of a class is replaced by one effect per individual."""
+    """Return effects in which each effect on all members of a class is replaced by one effect per member."""
     found: list[Effect] = []
     for effect in effects:
         every = () if effect.each is None else classes.get(effect.each.kind, ())
@@ -131,7 +129,7 @@ PARTS = {"days": 86400, "hours": 3600, "minutes": 60, "seconds": 1}
 
 
 def seconds_of(text: str) -> Fraction | None:
-    """Return the seconds of an xsd:dayTimeDuration, or None if the text isn't a duration or is negative.
+    """Return the seconds of an xsd:dayTimeDuration, or None if the text isn't a non-negative duration.
 
     >>> seconds_of("PT1M2.5S"), seconds_of("P1D"), seconds_of("2 s")
     (Fraction(125, 2), Fraction(86400, 1), None)

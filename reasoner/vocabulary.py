@@ -1,4 +1,4 @@
-"""The terms of the ontology in Python: namespaces, and the terms that several modules use."""
+"""Namespaces of the ontologies, and IRIs that several modules use."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ SHACL = "http://www.w3.org/ns/shacl#"
 SKOS = "http://www.w3.org/2004/02/skos/core#"
 XSD = "http://www.w3.org/2001/XMLSchema#"
 PREFIXES = {"": CORE, "owl": OWL, "rdf": RDF, "rdfs": RDFS, "skos": SKOS, "xsd": XSD}
-"""The prefixes that every query may use."""
+"""The prefixes that are predefined in every query."""
 
 TYPE = RDF + "type"
 INDIVIDUAL = OWL + "NamedIndividual"
 ONTOLOGY = OWL + "Ontology"
 LABEL = RDFS + "label"
 ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
-"""The properties by which conditions, effects and facts name their arguments, in order; the value follows them."""
+"""Properties that state the arguments of conditions, effects and facts, in order."""

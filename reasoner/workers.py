@@ -1,8 +1,7 @@
-"""Processes that end with the process that started them, even if that is killed, and have their own limit of CPU time.
+"""Child processes that end together with their parent process, even if it is killed, and have their own limit of CPU time.
 
-Each process gets one end of a pipe; the other end belongs to the parent process. As soon as the other end is closed, the kernel
-(Linux) kills the process with its children. After kill -9 or a crash, no code has to run for that, and any thread may have
-started the process.
+Each process has one end of a pipe whose other end belongs to the parent process. When the parent's end is closed, the Linux
+kernel kills the process and its children. This needs no code in the parent, so it also works after ``kill -9`` or a crash.
 """
 
 from __future__ import annotations
@@ -25,18 +24,18 @@ CPU_SECONDS = 3_600.0
 """Default limit of CPU seconds of a process."""
 MOST_SECONDS = 1e9
 TEXT_BYTES = 2_000
-"""Number of characters from the end of a process's stderr that are reported."""
+"""Maximum number of characters of a process's error output that are reported."""
 
 
 class WorkerError(RuntimeError):
-    """A process ended without an answer.
+    """Raised if a process ended without a result.
 
     Parameters
     ----------
     said : str
-        Its output on stderr.
+        Error output of the process.
     status : int
-        Its exit code, negative for a signal.
+        Exit status, negative for a signal.
     """
 
     def __init__(self, said: str, status: int) -> None:
@@ -45,7 +44,7 @@ class WorkerError(RuntimeError):
 
     @property
     def late(self) -> bool:
-        """Whether the process ended at its limit of CPU time."""
+        """Whether the process reached its limit of CPU time."""
         return self.status == -signal.SIGXCPU
 
     @property
@@ -55,23 +54,23 @@ class WorkerError(RuntimeError):
 
 
 def tie(end: int) -> None:
-    """Have the kernel kill the process group of this process when the other end of a pipe is closed.
+    """Let the kernel kill the process group of this process when the other end of a pipe is closed.
 
     Parameters
     ----------
     end : int
-        The reading end, which is never read.
+        File descriptor of the reading end, from which nothing is read.
     """
     if sys.platform == "linux":
         fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp())
         fcntl.fcntl(end, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([end], [], [], 0)[0]:  # it was closed before
+    if select.select([end], [], [], 0)[0]:  # already closed
         os._exit(1)
 
 
 def limit_cpu(seconds: float) -> None:
-    """Extend the CPU limit of this process by some seconds."""
+    """Set the limit of CPU time of this process to `seconds` from now."""
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     soft = int(used + min(seconds, MOST_SECONDS)) + 1
@@ -85,9 +84,9 @@ def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) 
     ----------
     command : sequence of str
     seconds : float
-        Maximum CPU time of each process of the command.
+        Maximum CPU seconds of each process of the command.
     **options
-        Of `subprocess.Popen`.
+        Options of `subprocess.Popen`.
     """
     import weakref
     from subprocess import Popen
@@ -108,13 +107,13 @@ def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) 
 
 
 def kill(process: Popen[bytes]) -> None:
-    """Kill a process that was started here, with its children."""
+    """Kill a process that `start` started, and its children."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
 
 def end(process: Popen[bytes]) -> None:
-    """Kill a process as `kill` does, and wait for it."""
+    """Kill a process with its children, and wait for its end."""
     with suppress(OSError), process:
         kill(process)
 
@@ -127,29 +126,29 @@ def call(
     timeout: float | None = None,
     started: Callable[[Popen[bytes]], object] | None = None,
 ) -> Any:
-    """Return the result of a function that runs in a separate process.
+    """Run a function in a separate process, and return its result.
 
     Parameters
     ----------
     function : callable
-        A function of a module; its output is lost.
+        A function of a module; its output is discarded.
     *arguments
-        Arguments of the function; they, and the result or the exception, are pickled.
+        Arguments of the function; arguments and result are pickled.
     seconds : float
-        CPU time.
+        Maximum CPU seconds.
     megabytes : int, optional
-        Memory.
+        Maximum memory in megabytes.
     timeout : float, optional
-        Seconds that may pass.
+        Maximum elapsed seconds.
     started : callable, optional
-        Called with the process, so that other code can end it by `kill`.
+        Is called with the process, so that other code can end it by `kill`.
 
     Raises
     ------
     WorkerError
-        The process ended before the function.
+        The process ended without a result.
     subprocess.TimeoutExpired
-        The time has passed.
+        The timeout has passed.
     """
     import pickle
     from subprocess import PIPE
@@ -175,7 +174,7 @@ def call(
 
 
 def answer(megabytes: int) -> None:
-    """Call the function that stdin names, and write its result or exception to stdout."""
+    """Call the function that is read from standard input, and write its result or exception to standard output."""
     import pickle
 
     out = os.fdopen(os.dup(1), "wb")
@@ -194,10 +193,10 @@ def answer(megabytes: int) -> None:
 
 
 def main(end: int, seconds: int, command: list[str]) -> None:
-    """Become a command that ends with the process that holds the other end of a pipe."""
+    """Replace this process by a command that ends when the other end of a pipe is closed."""
     tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # of a process that was started with a limit itself
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # an existing limit of this process
     most = seconds + 1 if hard == resource.RLIM_INFINITY else min(seconds + 1, hard)
     resource.setrlimit(resource.RLIMIT_CPU, (min(seconds, most), most))
     os.execvp(command[0], command)

@@ -1,1 +1,1 @@
-"""The embodiment: what the ontology states about robots, furniture and objects, as values for `sim/`."""
+"""The ontology's description of robots, furniture and objects, as dataclasses for `sim/`."""

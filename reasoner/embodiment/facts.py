@@ -1,7 +1,7 @@
-"""The graph's statements about bodies as tables: attributes, links, classes and indices by node.
+"""The graph's statements about bodies as tables: attributes, links, classes and indices of each node.
 
-The vocabulary is that of ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``),
-another query the links; all further access is by lookup.
+The vocabulary is ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``) and one query
+all links; all further accesses are lookups in these tables.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ GREY = "0.7 0.7 0.7 1"
 
 
 class EmbodimentError(KnowledgeError):
-    """The ontology's description of a body is unusable; the message says what is wrong, where, and what to do."""
+    """Raised if the ontology's description of a body is invalid; the message states the fault, its position and the remedy."""
 
 
 @dataclass(frozen=True)
 class BodyFacts:
-    """Attributes, links, classes and indices by node (an IRI)."""
+    """Attributes, links, classes and indices of nodes, by the IRI of the node."""
 
     attributes: Mapping[str, Mapping[str, str]]
     links: Mapping[str, Mapping[str, Sequence[str]]]
@@ -77,18 +77,18 @@ class BodyFacts:
         return cls(attributes, links, grouped(rows(store, TYPES)), grouped(rows(store, SUPERS)), indices)
 
     def text(self, node: str, name: str, default: str | None = None) -> str:
-        """Return an attribute's text, or `default`; raise `EmbodimentError` if both are missing."""
+        """Return the text of an attribute, or `default`; raise `EmbodimentError` if both are missing."""
         value = self.attributes.get(node, {}).get(name, default)
         if value is None:
             raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)", node)
         return value
 
     def number(self, node: str, name: str, default: float | None = None) -> float:
-        """Return an attribute's number."""
+        """Return the first number of an attribute."""
         return self.numbers(node, name, None if default is None else str(default))[0]
 
     def numbers(self, node: str, name: str, default: str | None = None) -> tuple[float, ...]:
-        """Return the numbers that an attribute lists."""
+        """Return all numbers in the text of an attribute."""
         value = self.text(node, name, default)
         try:
             return tuple(float(word) for word in value.split())
@@ -96,23 +96,23 @@ class BodyFacts:
             raise EmbodimentError(f"{node} has :{camel(name)} '{value}'; wanted numbers", node) from None
 
     def position(self, node: str, default: str | None = None) -> Vector:
-        """Return a node's coordinates."""
+        """Return the coordinates x, y and z of a node, in metres."""
         x, y, z = (self.numbers(node, name, default)[0] for name in ("x", "y", "z"))
         return (x, y, z)
 
     def turned(self, node: str) -> Vector:
-        """Return a node's roll, pitch and yaw, each 0 by default."""
+        """Return roll, pitch and yaw of a node in radians, each 0 by default."""
         return (self.number(node, "roll", 0.0), self.number(node, "pitch", 0.0), self.number(node, "yaw", 0.0))
 
     def color(self, node: str, default: str = GREY) -> Color:
-        """Return a node's colour."""
+        """Return the colour of a node: red, green, blue and opacity."""
         numbers = self.numbers(node, "color", default)
         if len(numbers) != 4:
             raise EmbodimentError(f"{node} has :color {numbers}; wanted red, green, blue and opacity", node)
         return (numbers[0], numbers[1], numbers[2], numbers[3])
 
     def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
-        """Return the path of the file that an attribute names, from the folders or PyBullet's data."""
+        """Return the path of the file that an attribute names, searched in the folders and in PyBullet's data."""
         file = self.text(node, name)
         installed = [place.parent for place in [pybullet_data()] if place]
         for folder in (*folders, *installed):
@@ -124,7 +124,7 @@ class BodyFacts:
         )
 
     def all_numbers(self, node: str) -> dict[str, float]:
-        """Return all numeric attributes of a node."""
+        """Return all attributes of a node whose value is a number."""
         found = {}
         for name, value in self.attributes.get(node, {}).items():
             try:
@@ -134,9 +134,9 @@ class BodyFacts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the numbers of a skill or perceiver.
+        """Return the numbers of a skill or perceiver (`general`) for a behaviour or situation type (`special`).
 
-        Numbers of the behaviour or situation type that uses it override its own numbers; adjustments override both.
+        Numbers of the behaviour or situation type override numbers of the skill or perceiver; adjustments override both.
         """
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):
@@ -152,11 +152,11 @@ class BodyFacts:
         return self.links.get(node, {}).get(name, ())
 
     def ordered(self, nodes: Iterable[str]) -> list[str]:
-        """Return nodes ordered by index and then by IRI; nodes without an index come last."""
+        """Return nodes sorted by index, then by IRI; nodes without an index come last."""
         return sorted(nodes, key=lambda node: (self.indices.get(node, 10**9), node))
 
     def members(self, class_name: str) -> list[str]:
-        """Return the individuals of a class of the vocabulary and of its subclasses."""
+        """Return the individuals of a class of the embodiment vocabulary and of its subclasses."""
         known, layer = {PREFIXES[""] + class_name}, {PREFIXES[""] + class_name}
         while layer:
             layer = {sub for sub, ups in self.supers.items() if layer & {*ups}} - known
@@ -164,7 +164,7 @@ class BodyFacts:
         return self.ordered(node for node, kinds in self.classes.items() if known & {*kinds})
 
     def nearest_first(self, node: str) -> list[str]:
-        """Return a node, its classes and their superclasses, from the nearest to the most general."""
+        """Return a node, its classes and their superclasses, from the most specific to the most general."""
         found = [node]
         layer = list(self.classes.get(node, ()))
         while layer:
@@ -182,7 +182,7 @@ def rows(store: ox.Store, query: str) -> list[tuple[str, ...]]:
 
 
 def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
-    """Return the second elements of pairs, grouped by the first."""
+    """Return the second elements of pairs, grouped by the first element."""
     groups: dict[str, list[str]] = defaultdict(list)
     for key, value in rows:
         groups[key].append(value)
@@ -190,17 +190,17 @@ def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
 
 
 def snake(name: str) -> str:
-    """Return ``uprightAngle`` as ``upright_angle``."""
+    """Return a camel-case name in snake case: ``upright_angle`` for ``uprightAngle``."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 def camel(name: str) -> str:
-    """Return ``uprightAngle`` of ``upright_angle``."""
+    """Return a snake-case name in camel case: ``uprightAngle`` for ``upright_angle``."""
     head, *tail = name.split("_")
     return head + "".join(word.capitalize() for word in tail)
 
 
 def pybullet_data() -> Path | None:
-    """Return the folder of robots and meshes that PyBullet brings, or None if it isn't installed."""
+    """Return the folder of PyBullet's robots and meshes, or None if the package isn't installed."""
     found = find_spec("pybullet_data")
     return Path(found.origin).parent if found and found.origin else None

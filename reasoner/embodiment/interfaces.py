@@ -1,6 +1,6 @@
-"""Read the interfaces of robots from the knowledge graph: actions, arguments, answers, and readings of the world model.
+"""Reading of robots' interfaces from the graph: actions, their arguments and results, and readings of the robot's world model.
 
-The vocabulary is that of ``ontology/embodiment.ttl``, section *Interfaces of robots*.
+The vocabulary is the section *Interfaces of robots* of ``ontology/embodiment.ttl``.
 """
 
 from __future__ import annotations
@@ -46,12 +46,15 @@ SELECT DISTINCT ?situation ?field ?absent ?step WHERE {
 NAMES = "SELECT DISTINCT ?node ?name WHERE { ?node :robotName ?name } ORDER BY ?node ?name"
 
 TIME_LIMIT = 60.0
-"""Seconds after which an action that states no time limit is stopped."""
+"""Seconds after which an action without a stated time limit is stopped."""
 
 
 @dataclass(frozen=True)
 class InterfaceCall:
-    """The action that carries out a behaviour. Each argument is a position among the behaviour's parameters, or a constant."""
+    """The robot's action that executes a behaviour.
+
+    Each argument of the action is a constant, or the position of a parameter of the behaviour, counted from 0.
+    """
 
     action: str
     arguments: Mapping[str, int | str]
@@ -60,7 +63,7 @@ class InterfaceCall:
 
 @dataclass(frozen=True)
 class Meaning:
-    """The meaning of a status: success, or a failure code and the situation types that must change before a retry."""
+    """The meaning of a result status: success, or a failure code and the situation types that must change before a retry."""
 
     success: bool
     code: str
@@ -69,7 +72,7 @@ class Meaning:
 
 @dataclass(frozen=True)
 class Reading:
-    """How a situation type is read: the field of the entity that its first argument names."""
+    """The field of an entity in the robot's world model that contains the value of a situation type's symbol."""
 
     situation: str
     field: str
@@ -79,9 +82,9 @@ class Reading:
 
 @dataclass(frozen=True)
 class Interface:
-    """The interface of a robot: calls by behaviour, meanings by status.
+    """The interface of a robot, with its calls by behaviour and the meanings of its result statuses.
 
-    `robot_names` has the individuals that the robot names differently.
+    `robot_names` maps individuals to the robot's names for them, if these are different.
     """
 
     iri: str
@@ -97,21 +100,21 @@ class Interface:
 
 
 def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) -> Interface:
-    """Return the interface of a name.
+    """Return the interface with a given name.
 
     Parameters
     ----------
     store : pyoxigraph.Store
-        A scene, or an interface alone, with its imports.
+        A scene or only an interface, with its imports.
     names : callable
-        Function from an IRI to the short name that plans use.
+        Returns the short name of an IRI, as used in plans.
     wanted : str
         Local name of the interface.
 
     Raises
     ------
     EmbodimentError
-        There is no such interface, an argument has neither a parameter nor a constant, or a behaviour has two actions.
+        The interface doesn't exist, an argument has neither a parameter nor a constant, or a behaviour has two actions.
     """
     found = {local_name(row[0]): row for row in rows(store, INTERFACES)}
     if wanted not in found:

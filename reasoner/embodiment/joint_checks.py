@@ -1,6 +1,6 @@
-"""Rules of validation on joints and features of links, their solids, and the places that they carry: see `RULES` at the end.
+"""Validation rules on mechanisms: their joints, features, solids and places (`RULES`).
 
-Mechanisms with a URDF file of their own are not checked.
+Mechanisms with their own URDF file aren't checked.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from confab.reasoner.embodiment.values import Embodiment, Feature, Flaw, Link, Mechanism, Part
 
 JOINT = "perceive_joint"
-"""The perceiver that distinguishes open from shut."""
+"""The perceiver that distinguishes an open joint from a shut joint."""
 
 
 def _links(embodiment: Embodiment) -> Iterator[Link]:
@@ -19,7 +19,7 @@ def _links(embodiment: Embodiment) -> Iterator[Link]:
 
 
 def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield links whose joint is stated to move, but cannot."""
+    """Yield links that are stated to move but whose joint is fixed or has no range."""
     for link in _links(embodiment):
         reach = f"from {link.lower:g} to {link.upper:g}"
         if link.kind == "fixed" and (link.lower or link.upper):
@@ -39,7 +39,7 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield perceived joints that never count as open or shut, always do, or count as both."""
+    """Yield perceived joints that are never open or never shut, always open or always shut, or both at once."""
     uses = [use for use in embodiment.perceivers.values() if use.perceiver == JOINT]
     perceived = {name for use in uses for name in use.links}
     for link in _links(embodiment):
@@ -62,7 +62,7 @@ def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield features whose part is farther away than the widest hand opens."""
+    """Yield features whose part is farther away than the opening of the widest hand."""
     openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
     for link in _links(embodiment) if openings else ():
         own = {part.name: part for part in link.parts if part.kind != "mesh"}
@@ -80,12 +80,12 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _least_distance(feature: Feature, part: Part) -> float:
-    """Return the distance of a feature from the sphere around a part: a lower bound of its distance from the part."""
+    """Return a lower bound of the distance between a feature and a part: the distance to the sphere around the part."""
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
 
 def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield solids that two links, or a link and its furniture, share."""
+    """Yield solids that belong to two links, or to a link and its mechanism."""
     owners: dict[str, str] = {}
     for name, parts in _bodies(embodiment):
         for part in parts:
@@ -100,9 +100,9 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield places on furniture or links that have no supporting surface or are inside a solid.
+    """Yield places on furniture or links that are on no supporting surface or inside a solid.
 
-    Near meshes and tilted solids nothing is yielded.
+    Places near meshes and tilted solids aren't checked.
     """
     bodies = dict(_bodies(embodiment))
     grounds = {mechanism.name: mechanism for mechanism in embodiment.mechanisms}
@@ -132,7 +132,7 @@ SURFACE = 0.005
 
 
 def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
-    """Yield pieces of furniture and links with their solids."""
+    """Yield the name and the solids of each mechanism's base and of each link."""
     for mechanism in embodiment.mechanisms:
         if not mechanism.urdf:
             yield mechanism.name, mechanism.parts
@@ -140,12 +140,12 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
 
 
 def _without_flat_top(part: Part) -> bool:
-    """Return whether a solid has no horizontal top, or a top that is not computed here."""
+    """Return whether a solid has no horizontal top, or a kind whose top isn't calculated."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 
 def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
-    """Return the horizontal distance of a point from an upright solid; at most 0 if it is above, below or inside."""
+    """Return the horizontal distance in metres of a point from an upright solid; at most 0 for a point above, below or inside."""
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":
         return math.hypot(dx, dy) - part.size[0] / 2
@@ -154,7 +154,7 @@ def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
 
 
 def _on_ground(embodiment: Embodiment, mechanism: Mechanism, point: tuple[float, float, float]) -> bool:
-    """Return whether a point in the frame of a mechanism is on top of a fixture."""
+    """Return whether a point in the frame of a mechanism is on the top of a fixture."""
     cos, sin = math.cos(mechanism.yaw), math.sin(mechanism.yaw)
     x = mechanism.position[0] + cos * point[0] - sin * point[1]
     y = mechanism.position[1] + sin * point[0] + cos * point[1]

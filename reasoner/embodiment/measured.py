@@ -1,4 +1,4 @@
-"""Read the bounds of measured situation types: `e:holdsIf` of the situation type, for the perceiver `e:perceive_measured`."""
+"""Reading of measured situation types: their bounds `e:holdsIf` for the perceiver `e:perceive_measured`."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ MEASURED = "perceive_measured"
 """The perceiver of measured situation types."""
 
 PAIRED = ("beside", "apart", "above", "over", "inside", "contact", "turned")
-"""Quantities between two individuals, in metres, newtons and radians; `inside` is 1 or 0."""
+"""Quantities measured between two individuals, in metres, newtons and radians; `inside` is 1 or 0."""
 
 SINGLE = ("tilt", "joint")
-"""Quantities of one individual."""
+"""Quantities measured on one individual."""
 
 OF_JOINTS = ("opened", "shut", "lower", "upper")
-"""Numbers of a link that a bound may name."""
+"""Numbers of a link that can be a bound."""
 
 ONE_VALUED = (
     "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property . ?property a owl:FunctionalProperty }"
@@ -29,22 +29,22 @@ VALUED = "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?propert
 
 
 def one_valued(store: ox.Store) -> frozenset[str]:
-    """Return the situation types whose symbols have one value."""
+    """Return the situation types whose symbols have exactly one value."""
     return frozenset(row[0] for row in rows(store, ONE_VALUED))
 
 
 def valued(store: ox.Store) -> frozenset[str]:
-    """Return the situation types with values other than true and false."""
+    """Return the situation types that have a value property."""
     return frozenset(row[0] for row in rows(store, VALUED))
 
 
 def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alone: bool) -> tuple[Guard, ...]:
-    """Return the bounds under which a measured situation type holds; if `alone`, it is about one individual.
+    """Return the bounds within which a measured situation type is true; `alone` states whether it has a single argument.
 
     Raises
     ------
     EmbodimentError
-        There are none, or one names an unknown quantity or number.
+        No bound is stated, or a bound contains an unknown quantity or number.
     """
     found = guards(situation, facts.text(situation, "holds_if"))
     known = SINGLE if alone else (*PAIRED, *SINGLE)
@@ -69,7 +69,7 @@ def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alon
 def asked(
     facts: BodyFacts, situation: str, values: tuple[str, ...], names: Callable[[str], str]
 ) -> tuple[tuple[str, ...], ...]:
-    """Return the arguments of all symbols of a type that is true or false: individuals, or pairs of individual and value."""
+    """Return the arguments of all symbols of a boolean situation type: single individuals, or pairs of individual and value."""
     kinds = {kind for kind, links in facts.links.items() if situation in links.get("has_situation_type", ())}
     those = (
         node for node in facts.ordered(facts.classes) if node not in kinds and kinds & {*facts.nearest_first(node)[1:]}

@@ -1,6 +1,6 @@
-"""Rules of validation on the dimensions of bodies, which queries cannot compute: see `RULES` at the end.
+"""Validation rules on the dimensions of objects, which SPARQL can't calculate (`RULES`).
 
-Each rule is a function from an `Embodiment` to flaws.
+Each rule is a function that yields the flaws of an `Embodiment`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def too_wide(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def grasped_outside(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield objects whose grasp height is not between their base and their top."""
+    """Yield objects whose grasp height isn't between their base and their top."""
     for name, body in embodiment.bodies.items():
         top = body.shape.profile[-1][0] if body.shape.profile else body.shape.numbers.get("height", 0.0)
         if not 0 < body.shape.grasp_height < top:
@@ -39,7 +39,7 @@ def grasped_outside(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _width(shape: Shape) -> float:
-    """Return the width of a shape between the fingers at its grasp height."""
+    """Return the width in metres of a shape between the fingers at its grasp height."""
     if not shape.profile:
         return min(shape.numbers.get("width", 0.0), shape.numbers.get("depth", 0.0)) or 2 * shape.numbers["radius"]
     radius = shape.profile[-1][1]

@@ -1,4 +1,4 @@
-"""Read mechanisms, which are furniture with moving links, from the graph."""
+"""Reading of mechanisms (furniture with moving links) from the graph."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that state the extent of a part; a radius counts twice."""
+"""The attributes that state the size of a solid by kind; a radius is doubled."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 
@@ -33,7 +33,7 @@ def _mechanism(facts: BodyFacts, node: str, names: Callable[[str], str], folders
 
 
 def _check_parents(facts: BodyFacts) -> None:
-    """Raise `EmbodimentError` if a link is part of no mechanism, or of itself."""
+    """Raise `EmbodimentError` if a link isn't part of exactly one mechanism or is part of itself."""
     mechanisms = {*facts.members("Mechanism")}
     for node in facts.ordered(node for node, links in facts.links.items() if "part_of" in links):
         above = [node]
@@ -45,7 +45,7 @@ def _check_parents(facts: BodyFacts) -> None:
 
 
 def _no_mechanism(above: Sequence[str], parents: Sequence[str]) -> str:
-    """Return the message for a link whose chain of parents, `above`, does not end at a mechanism."""
+    """Return the message for a link whose chain of parents `above` doesn't end at a mechanism."""
     if not parents:
         why = f"{above[-1]} is neither an e:Mechanism nor part of one"
     elif len(parents) > 1:
@@ -56,7 +56,7 @@ def _no_mechanism(above: Sequence[str], parents: Sequence[str]) -> str:
 
 
 def _links(facts: BodyFacts, mechanism: str) -> list[str]:
-    """Return the links of a mechanism, parents before children."""
+    """Return the links of a mechanism in an order in which parents precede children."""
     ordered: list[str] = []
     waiting = [mechanism]
     while waiting:
@@ -113,7 +113,7 @@ def _part(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Seq
 
 
 def _feature(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Feature:
-    """Return a feature, named by the part of its IRI after the last dot."""
+    """Return a feature, named after the last part of its IRI behind a dot."""
     return Feature(
         names(node).rsplit(".", 1)[-1],
         facts.position(node, "0"),

@@ -1,4 +1,4 @@
-"""Reach facts: computed from the robot's geometry by `confab.sim.reach`, stored in a file beside the scene."""
+"""Reach facts (which hand reaches which place), calculated by `confab.sim.reach` and stored in a file beside the scene."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def reach_relation(graph: KnowledgeGraph) -> str:
     Raises
     ------
     KnowledgeError
-        The domain declares none, or several.
+        The domain declares no such relation, or several.
     """
     found = [row[0].value for row in graph.select(RELATIONS) if isinstance(row[0], ox.NamedNode)]
     if len(found) != 1:
@@ -31,7 +31,7 @@ def reach_relation(graph: KnowledgeGraph) -> str:
 
 
 def reach_hash(graph: KnowledgeGraph) -> str | None:
-    """Return the hash of the inputs of the scene's reach file, or None if there is no such file."""
+    """Return the hash of the inputs from which the scene's reach file was calculated, or None if the file doesn't exist."""
     rows = graph.select(HASHES, ("reach",))
     return rows[0][0].value if rows and isinstance(rows[0][0], ox.Literal) else None
 
@@ -49,9 +49,9 @@ def save_reach(
         The scene.
     names : Names
     pairs : iterable of (hand, place)
-        Short names.
+        Short names of each hand and a place that it reaches.
     inputs_hash : str
-        Hash of the geometry and the settings; a different one means that the file is outdated.
+        Hash of the geometry and the settings; if it changes, the file is outdated.
     """
     relation = ox.NamedNode(reach_relation(graph))
     iri = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach")

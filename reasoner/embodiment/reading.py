@@ -1,4 +1,4 @@
-"""Read an `Embodiment` from the knowledge graph: bodies, places, robots, skills and perceivers."""
+"""Reading of an `Embodiment` from the graph: bodies, places, robots, skills and perceivers."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ PALETTE: tuple[Color, ...] = (
     (0.20, 0.55, 0.90, 1.0),
     (0.55, 0.75, 0.20, 1.0),
 )
-"""Colours of the fillings that declare none, in declared order."""
+"""Colours of the fillings without a stated colour, in declared order."""
 
 
 def read_embodiment(
     store: ox.Store, names: Callable[[str], str], folders: Sequence[Path] = (ontology.ROOT,)
 ) -> Embodiment:
-    """Return the embodiment that the graph describes.
+    """Return the embodiment that a graph describes.
 
     Parameters
     ----------
     store : pyoxigraph.Store
-        The scene with its imports; all named graphs are read as one.
+        The scene with its imports; the union of all named graphs is read.
     names : callable
-        Function from an IRI to the short name that plans use.
+        Returns the short name of an IRI, as used in plans.
     folders : sequence of Path
         Folders in which URDF files and meshes are searched.
 
     Raises
     ------
     EmbodimentError
-        An attribute is missing or of the wrong kind, or a file is missing.
+        An attribute is missing or invalid, or a file is missing.
     """
     facts = BodyFacts.read(store)
     return Embodiment(
@@ -82,7 +82,7 @@ def _fixture(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Fixtur
 
 
 def _places(facts: BodyFacts) -> list[str]:
-    """Return the nodes with coordinates or a carrier that are neither robots, stands nor furniture, nor belong to a mechanism."""
+    """Return the nodes that are places: they have coordinates or a carrier, and aren't robots, stands or parts of furniture."""
     other = {
         node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
     }
@@ -107,7 +107,7 @@ def _stand(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Stand:
 
 
 def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
-    """Return individuals with their shapes: an individual's own shape, otherwise the shape of the nearest class that has one."""
+    """Return each individual with its shape: its own shape, or the shape of the most specific class that has one."""
     found = []
     for node in facts.ordered(facts.classes):
         if node in facts.supers or any(node in kinds for kinds in facts.classes.values()):
@@ -140,7 +140,7 @@ def _body(facts: BodyFacts, node: str, shape: str, names: Callable[[str], str]) 
 
 
 def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Filling]:
-    """Return the fillings: individuals for which beads are stated, directly or for their nearest class."""
+    """Return the fillings: individuals with stated beads, possibly stated for their most specific class."""
     found: dict[str, Filling] = {}
     for node in facts.ordered(facts.classes):
         kinds = [kind for kind in facts.nearest_first(node) if "serving_beads" in facts.attributes.get(kind, {})]
@@ -164,7 +164,7 @@ def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Fillin
 
 
 def _robots(facts: BodyFacts) -> list[str]:
-    """Return the nodes with a URDF that are no mechanisms."""
+    """Return the nodes with a URDF file that aren't mechanisms."""
     return [node for node in facts.having("urdf") if node not in facts.members("Mechanism")]
 
 

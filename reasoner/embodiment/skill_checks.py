@@ -1,4 +1,4 @@
-"""Rules of validation on skills that are described in phases: see `RULES` at the end.
+"""Validation rules on skills that are described by phases (`RULES`).
 
 `confab.sim.phases` also calls `unplayed`, `unset` and `endless` before it executes a skill.
 """
@@ -12,10 +12,10 @@ from confab.reasoner.embodiment.skills import TERM
 from confab.reasoner.embodiment.values import Embodiment, Flaw, Phase, SkillUse
 
 JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
-"""Numbers of a joint that an expression may name."""
+"""Numbers of a joint that an expression may contain."""
 
 WITHOUT_ROLE = {"hand", "supports"}
-"""Words that may stand in place of a role and need no term."""
+"""Words that may replace a role and need no term of the behaviour."""
 
 
 def roles_of(use: SkillUse) -> set[str]:
@@ -24,7 +24,7 @@ def roles_of(use: SkillUse) -> set[str]:
 
 
 def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases that name a role without a term of the behaviour, and the role."""
+    """Yield each phase that mentions a role without a term of the behaviour, with the role."""
     for phase in use.phases:
         for word in (*phase.to.split(), *phase.touches):
             role = word.partition(".")[0]
@@ -33,7 +33,7 @@ def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases with an expression that names neither a number nor a setting, and the name."""
+    """Yield each phase with an expression that contains an unknown name, with the name."""
     for phase in use.phases:
         bounds = [guard.bound for guard in (*phase.until, *phase.checks)]
         for expression in (*phase.offset, phase.above, phase.value, phase.speed, phase.wait, *bounds):
@@ -43,7 +43,7 @@ def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases whose motion has no stated end, and the missing attribute."""
+    """Yield each phase whose motion has no stated end, with the missing attribute."""
     for phase in use.phases:
         if phase.motion in ("free", "line", "yielding", "joint", "over", "drive") and not phase.to:
             yield phase, "to"
@@ -54,7 +54,7 @@ def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield phases that name a role without a term of the behaviour."""
+    """Yield phases that mention a role without a term of the behaviour."""
     for use in embodiment.skills.values():
         for phase, role in unplayed(use):
             yield (
@@ -66,7 +66,7 @@ def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def unknown_setting(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield phases with an expression that cannot be evaluated."""
+    """Yield phases with an expression that contains an unknown name."""
     for use in embodiment.skills.values():
         for phase, term in unset(use):
             yield (
@@ -91,7 +91,7 @@ def phase_without_end(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def unknown_feature(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield links that can play the role of a phase's goal but lack the feature that the phase names."""
+    """Yield links that may be the goal of a phase but lack the feature that the phase mentions."""
     links = {link.name: link for mechanism in embodiment.mechanisms for link in mechanism.links}
     for use in embodiment.skills.values():
         needed = {tuple(word.split(".")): phase for phase in use.phases for word in phase.to.split() if "." in word}

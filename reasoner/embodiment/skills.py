@@ -1,4 +1,4 @@
-"""Read skills from the graph: the skill of each primitive behaviour, its roles, numbers and phases."""
+"""Reading of skills from the graph: the skill of each primitive behaviour, with its roles, numbers and phases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FINGERS = ("", "open", "shut", "grasp")
 BROUGHT = ("", "base")
 CONDITIONS = ("empty", "holding", "place", "thing")
 QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
-"""The words that phases may use; `confab.sim.phases`, `confab.sim.touch` and `confab.sim.measuring` have a table for each kind."""
+"""Words that phases may contain; `confab.sim.phases`, `confab.sim.touch` and `confab.sim.measuring` implement them."""
 VERDICTS = (
     "unreachable",
     "goal in collision",
@@ -39,14 +39,14 @@ VERDICTS = (
     "ill-defined",
     "unexpected",
 )
-"""The failure codes that a guard may name after ``else``; `confab.sim.verdict.CODES` explains them."""
+"""Failure codes that may follow ``else`` in a guard; `confab.sim.verdict.CODES` explains them."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
 TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")
 
 
 def skill_uses(facts: BodyFacts, names: Callable[[str], str], store: ox.Store) -> dict[str, SkillUse]:
-    """Return the skill of each primitive behaviour that has one."""
+    """Return the skill of each primitive behaviour that has a skill."""
     variables = grouped(rows(store, VARIABLES))
     roles = {term: local_name(links["role"][0]) for term, links in facts.links.items() if "role" in links}
     found = {}
@@ -66,7 +66,7 @@ def skill_uses(facts: BodyFacts, names: Callable[[str], str], store: ox.Store) -
 
 
 def _links(facts: BodyFacts, terms: Sequence[str], names: Callable[[str], str]) -> dict[str, tuple[str, ...]]:
-    """Return for each role the links that its terms can denote."""
+    """Return, for each role, the links that a term with this role can denote."""
     found = {}
     links = facts.ordered(node for node, linked in facts.links.items() if "part_of" in linked)
     for term in terms:
@@ -77,7 +77,7 @@ def _links(facts: BodyFacts, terms: Sequence[str], names: Callable[[str], str]) 
 
 
 def phases(facts: BodyFacts, skill: str) -> tuple[Phase, ...]:
-    """Return the phases of a skill in order; none if it is a Python function."""
+    """Return the phases of a skill in order; a skill that is a Python function has no phases."""
     return tuple(_phase(facts, node) for node in facts.ordered(facts.linked(skill, "phase")))
 
 
@@ -134,7 +134,7 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
 
 
 def guards(node: str, text: str) -> tuple[Guard, ...]:
-    """Return the guards of a text such as ``force >= 30; slip <= slip else slip or drop``."""
+    """Parse guards in a text such as ``force >= 30; slip <= slip else slip or drop``."""
     guards = []
     for piece in (piece.strip() for piece in text.split(";")):
         match = GUARD.fullmatch(piece)

@@ -1,7 +1,7 @@
-"""Rules of validation on overlapping solids: joints swept through their range, and objects in the initial state.
+"""Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
-Each joint of a mechanism is swept from `lower` to `upper`, and checked against its own case, its neighbours and all furniture.
-A neighbour that moves may be shut or wide open; an overlap is a fault only if it occurs in both cases.
+Each joint of a mechanism is moved from `lower` to `upper`. Its links must not overlap their own case, neighbouring links or
+furniture. A neighbouring link that moves may be shut or fully open; an overlap is a fault only if it occurs in both cases.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from confab.reasoner.possible import PLACE
 from confab.reasoner.symbols import TRUE, State
 
 JOINT = "perceive_joint"
-"""The perceiver that distinguishes open from shut."""
+"""The perceiver that distinguishes an open joint from a shut joint."""
 
 DEEP = 0.0015
-"""Maximum overlap in metres of two solids that count as touching."""
+"""Maximum overlap in metres of two solids that are considered to be only in contact."""
 
 SAMPLES = 33
-"""Number of joint values at which a link is checked."""
+"""Number of joint values at which the links are checked."""
 
 Met = tuple[float, float, Block, Block]
-"""The depth of an overlap, the joint value, and the two solids."""
+"""Depth of an overlap in metres, the joint value, and the two solids."""
 
 
 def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield links that pass through solids of their own mechanism, of another one or of furniture."""
+    """Yield links that pass through solids of their own mechanism, of another mechanism or of furniture."""
     own = [mechanism for mechanism in embodiment.mechanisms if not mechanism.urdf]
     for mechanism in own:
         around = [fixture_block(fixture) for fixture in embodiment.fixtures]
@@ -41,14 +41,14 @@ def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _base_inside(mechanism: Mechanism, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield the deepest overlap of a mechanism's base with its neighbours."""
+    """Yield the deepest overlap of a mechanism's base with each neighbouring body."""
     base = [block for block in blocks_of(mechanism, {}) if block.owner == mechanism.name]
     for _, _, one, other in _deepest(_meeting(base, around, 0.0)):
         yield _flaw(one, other, overlap(one, other), "", f"move {mechanism.name} or {other.owner} apart")
 
 
 def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield the deepest overlap with each object that a link passes through."""
+    """Yield the deepest overlap of a link with each body that it passes through."""
     taken = _taken_along(mechanism, link)
     values = np.linspace(link.lower, link.upper, SAMPLES) if link.kind != "fixed" else np.zeros(1)
     met: list[Met] = []
@@ -77,13 +77,13 @@ def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterato
 
 
 def _still(mechanism: Mechanism, shut: Sequence[Block], link: Link, opened: Mapping[str, float]) -> Iterator[Block]:
-    """Yield the solids of a mechanism that move with no other joint than those of a link's parents."""
+    """Yield the solids of a mechanism that remain at rest while a link and its neighbours move."""
     taken = _taken_along(mechanism, link)
     return (block for block in shut if block.owner not in taken and block.owner not in opened)
 
 
 def _taken_along(mechanism: Mechanism, link: Link) -> set[str]:
-    """Return a link and those below it."""
+    """Return a link and all links that it carries."""
     found = {link.name}
     for one in mechanism.links:  # parents come before children
         if one.parent in found:
@@ -92,7 +92,7 @@ def _taken_along(mechanism: Mechanism, link: Link) -> set[str]:
 
 
 def _meeting(ones: Sequence[Block], others: Sequence[Block], value: float) -> Iterator[Met]:
-    """Yield the pairs of solids that overlap."""
+    """Yield the overlapping pairs of solids, with the depth of the overlap and the given joint value."""
     if not ones or not others:
         return
     boxes = [
@@ -107,7 +107,7 @@ def _meeting(ones: Sequence[Block], others: Sequence[Block], value: float) -> It
 
 
 def _deepest(met: Iterator[Met] | Sequence[Met]) -> list[Met]:
-    """Return the deepest overlap of the solids of each pair of owners."""
+    """Return the deepest overlap for each pair of bodies."""
     found: dict[tuple[str, str], Met] = {}
     for one in met:
         key = one[2].owner, one[3].owner
@@ -126,9 +126,9 @@ def _flaw(one: Block, other: Block, deep: float, where: str, remedy: str) -> Fla
 
 
 def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Flaw]:
-    """Yield objects that overlap another one, furniture or a mechanism in the initial state.
+    """Yield objects that overlap another object, furniture or a mechanism in the initial state.
 
-    Two objects at one place are left to the rules on exclusive values.
+    Two objects at the same place are checked by the rules on exclusive values instead.
     """
     where, values = _initially(embodiment, initial)
     standing: dict[str, list[Block]] = {}
@@ -156,7 +156,7 @@ def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Fla
 
 
 def _initially(embodiment: Embodiment, initial: State) -> tuple[dict[str, str], dict[str, float]]:
-    """Return the places of objects and the values of joints in a state."""
+    """Return the place of each object and the value of each joint in a state."""
     where: dict[str, str] = {}
     values: dict[str, float] = {}
     links = {link.name: link for mechanism in embodiment.mechanisms for link in mechanism.links}

@@ -1,6 +1,6 @@
-"""Solids of furniture, mechanisms and objects: their positions for given joint values, and the depth of an overlap.
+"""Solids of furniture, mechanisms and objects: their positions for given joint values, and the depth of overlaps.
 
-Lengths in metres, angles in radians. Meshes, and mechanisms with a URDF file of their own, have no solids here.
+Lengths are in metres, angles in radians. Meshes and mechanisms with their own URDF file are ignored.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ from confab.reasoner.embodiment.values import Body, Embodiment, Fixture, Link, M
 
 Array = NDArray[np.float64]
 Frame = tuple[Array, Array]
-"""Rotation (3, 3) and origin (3,)."""
+"""Rotation matrix (3, 3) and origin (3,)."""
 
 AROUND = np.linspace(0.0, np.pi, 16, endpoint=False)
-"""Angles about the axis of a cylinder at which directions of separation are tried."""
+"""Angles about a cylinder's axis at which directions of separation are tested."""
 
 REFINED = 24
-"""Number of steps in which the direction of separation is improved."""
+"""Number of steps in which the direction of separation is refined."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A box (half extents), cylinder (radius, radius, half height) or sphere (radius three times) of an owner, in the world."""
+    """A box, cylinder or sphere in the world frame that belongs to an object, a link or furniture (`owner`).
+
+    `half` contains the half extents of a box; radius, radius and half height of a cylinder; or three times the radius of a sphere.
+    """
 
     owner: str
     part: str
@@ -38,11 +41,11 @@ class Block:
 
     @property
     def name(self) -> str:
-        """The owner, with the part if it has a name of its own."""
+        """The name of the owner, preceded by the solid's name if it is different."""
         return self.owner if self.part in ("", self.owner) else f"{self.part} ({self.owner})"
 
     def extent(self, directions: Array) -> Array:
-        """Return half the width (n,) along unit directions (n, 3)."""
+        """Return the half widths (n,) of the solid along unit directions (n, 3)."""
         local = np.abs(directions @ self.rotation)
         if self.kind == "sphere":
             return np.full(len(directions), self.half[0])
@@ -53,7 +56,7 @@ class Block:
         return flat
 
     def farthest(self, direction: Array) -> Array:
-        """Return the farthest point (3,) from the centre along a direction (3,)."""
+        """Return the point (3,) of the solid that is farthest along a direction (3,), relative to its centre."""
         local = direction @ self.rotation
         if self.kind == "sphere":
             ahead: Array = direction * self.half[0]
@@ -65,7 +68,7 @@ class Block:
         return turned
 
     def directions(self) -> Array:
-        """Return the normals (n, 3) of the surface, which are the first directions of separation."""
+        """Return normals (n, 3) of the surface, which are tested as directions of separation."""
         if self.kind != "cylinder":
             normals: Array = self.rotation.T
             return normals
@@ -75,7 +78,7 @@ class Block:
 
 
 def overlap(one: Block, other: Block) -> float:
-    """Return the distance in metres by which one of two solids has to be moved to separate them; a gap is negative."""
+    """Return the distance in metres by which a solid must be moved to be separated from another; negative for a gap."""
     apart = other.center - one.center
     if not apart.any():
         apart = np.array([1e-9, 0.0, 0.0])
@@ -99,7 +102,7 @@ def overlap(one: Block, other: Block) -> float:
 
 
 def rotation(turned: Vector) -> Array:
-    """Return the rotation matrix of fixed-axis roll, pitch and yaw."""
+    """Return the rotation matrix for roll, pitch and yaw about fixed axes."""
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     found = np.eye(3)
     for axis, angle in zip(axes, turned, strict=True):
@@ -115,7 +118,7 @@ def _about(axis: Vector, angle: float) -> Array:
 
 
 def frames(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, Frame]:
-    """Return the frames of a mechanism's base and links in the world, with the joints at `values` (by link, default 0)."""
+    """Return the world frames of a mechanism's base and links for given joint values (by link, 0 by default)."""
     found: dict[str, Frame] = {
         mechanism.name: (rotation((0.0, 0.0, mechanism.yaw)), np.array(mechanism.position, dtype=float))
     }
@@ -133,7 +136,7 @@ def frames(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, Frame
 
 
 def blocks_of(mechanism: Mechanism, values: Mapping[str, float]) -> list[Block]:
-    """Return the solids of a mechanism with its joints at `values`."""
+    """Return the solids of a mechanism for given joint values."""
     placed = frames(mechanism, values)
     owners: list[Mechanism | Link] = [mechanism, *mechanism.links]
     return [_placed(part, owner.name, *placed[owner.name]) for owner in owners for part in owner.parts if _solid(part)]
@@ -149,13 +152,13 @@ def _placed(part: Part, owner: str, turned: Array, origin: Array) -> Block:
 
 
 def fixture_block(fixture: Fixture) -> Block:
-    """Return a fixture as a solid."""
+    """Return the solid of a fixture."""
     turned = rotation((0.0, 0.0, fixture.yaw))
     return Block(fixture.name, "", "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
 
 
 def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
-    """Yield the solids of an object, given the frame of the middle of its base; a vessel counts as full."""
+    """Yield the solids of an object whose base centre has the given frame; the inside of a vessel is treated as solid."""
     turned, base = frame
     numbers, shape = body.shape.numbers, body.shape
     wall = numbers.get("wall", 0.004) if shape.kind == "vessel" else 0.0
@@ -176,9 +179,9 @@ def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
 def place_frame(
     embodiment: Embodiment, name: str, where: Mapping[str, str], values: Mapping[str, float]
 ) -> Frame | None:
-    """Return the frame of a place in the world, with objects at the places `where` and joints at `values`.
+    """Return the world frame of a place for given places of objects (`where`) and joint values; return None if it is unknown.
 
-    None if the frame is unknown. A carrier that is an object stands at a place itself.
+    The carrier of a place may be an object, which is at a place itself.
     """
     passed: list[str] = []
     shift = np.zeros(3)

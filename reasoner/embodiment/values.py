@@ -1,8 +1,8 @@
-"""The embodiment that the ontology describes for `sim/`: robots, fixtures, places, objects, skills and perceivers.
+"""Dataclasses of the embodiment for `sim/`: robots, fixtures, places, objects, skills and perceivers, without RDF.
 
-Frozen values without RDF. Lengths are in metres, masses in kilograms, angles in radians, forces in newtons; frames are the
-world's (z up). `confab.reasoner.embodiment.reading` reads them from the graph; `sim/` builds a physical world from them.
-Every name of the domain (an object, a behaviour, a situation type) that `sim/` uses comes from here or from the plan.
+Lengths are in metres, masses in kilograms, angles in radians, forces in newtons. Positions are in the world frame with z up, unless
+stated otherwise. `confab.reasoner.embodiment.reading` reads the data from the graph, and `sim/` builds a physical world from them.
+Every name of an object, behaviour or situation type in `sim/` is from these data or from the plan.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ from typing import TypeAlias
 Vector: TypeAlias = tuple[float, float, float]
 Color: TypeAlias = tuple[float, float, float, float]
 Flaw: TypeAlias = tuple[str, str, str, str]
-"""A finding of validation: IRI or short name of the node, the fault, its effect, and the remedy."""
+"""A fault: IRI or short name of the node, the description, the consequence, and the remedy."""
 
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand of a robot: the arm that carries it and the fingers that close it.
+    """A hand of a robot, with the arm that carries it and its fingers.
 
-    `tip` is the URDF link whose frame, `turned` by roll, pitch and yaw, is the hand's: x points where the fingers point, y from
-    finger to finger, z up when the hand is upright. `arm` and `fingers` are joint names; a finger joint grows as the hand
-    opens. `home` is the arm's rest posture, one angle per arm joint. `opening` is the finger joints' open position and `grip`
-    the force of each finger. A `gripper` is a URDF file that is mounted on the link `flange` of the arm, at `mounting` there
-    (x, y, z, roll, pitch, yaw); its names begin with the hand's.
+    - `tip` is the URDF link whose frame, rotated by `turned` (roll, pitch, yaw), is the hand's frame. Its x axis is the direction
+      of the fingers, y leads from finger to finger, and z is up if the hand is upright.
+    - `arm` and `fingers` are joint names; the value of a finger joint increases when the hand opens.
+    - `home` is the rest posture, one angle per arm joint; `opening` is the open position of a finger joint; `grip` is the force of
+      each finger.
+    - `gripper` is a URDF file that is mounted on the arm's link `flange` at `mounting` (x, y, z, roll, pitch, yaw). Names of its
+      links and joints begin with the hand's name.
     """
 
     name: str
@@ -43,9 +45,9 @@ class Hand:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot: its URDF file, the position of its base, the acceleration of its joints (rad/s²), and its hands in declared order.
+    """A robot: its URDF file, the position of its base, the acceleration of its joints in rad/s², and its hands in declared order.
 
-    A mobile base drives at `driving` metres and turns at `turning` radians per second; `driving` 0 means a fixed base.
+    `driving` is the speed of a mobile base in m/s (0 for a fixed base), `turning` its angular speed in rad/s.
     """
 
     name: str
@@ -60,7 +62,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Stand:
-    """A position and heading (`yaw`) of a mobile robot's base, from which it reaches some places."""
+    """A position and heading (`yaw`) of a mobile robot's base from which the robot reaches some places."""
 
     name: str
     position: Vector
@@ -69,7 +71,7 @@ class Stand:
 
 @dataclass(frozen=True)
 class Fixture:
-    """Furniture: a box that does not move. `size` is its full extent, `position` its centre."""
+    """Immovable furniture with the shape of a box; `size` is its full extent and `position` its centre."""
 
     name: str
     size: Vector
@@ -81,10 +83,10 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Place:
-    """A location for objects: a point on the supporting surface, in the frame of the `carrier` if it has one.
+    """A point on a supporting surface at which objects can be, in the frame of `carrier` if it has one.
 
-    The carrier is a link or an object: a place in a drawer moves with the drawer. A mobile robot reaches the place from the
-    `stand`. `height` is the grasp height of objects at the place, if the scene states one.
+    A carrier is a link or an object, which moves the place: a place in a drawer moves with the drawer. `stand` is the position from
+    which a mobile robot reaches the place. `height` is the grasp height of objects at the place, if the scene states it.
     """
 
     name: str
@@ -96,9 +98,9 @@ class Place:
 
 @dataclass(frozen=True)
 class Part:
-    """A solid of a link: its kind (box, cylinder, sphere or mesh), extent along its axes, and position in the link's frame.
+    """A solid of a link or mechanism: its kind (box, cylinder, sphere or mesh), full extents, and position in the owner's frame.
 
-    `turned` is roll, pitch and yaw. A mesh is a `file` with one convex shape per object in it.
+    `turned` is roll, pitch and yaw. A mesh is read from `file`, which contains convex shapes.
     """
 
     name: str
@@ -112,9 +114,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Feature:
-    """A frame on a link at which a hand acts: x is the fingers' direction, y leads from finger to finger, z along a bar.
+    """A frame on a link at which a hand acts: x is the direction of the fingers, y leads from finger to finger, z is along a bar.
 
-    The hand may turn about z from `low` to `high` radians. `parts` are the solids that the fingers touch.
+    The hand may be rotated about z by `low` to `high`. `parts` are the solids that the fingers touch.
     """
 
     name: str
@@ -127,12 +129,14 @@ class Feature:
 
 @dataclass(frozen=True)
 class Link:
-    """A link of a mechanism: its solids, its features, and the joint that connects it to its parent ("": the base).
+    """A link of a mechanism: its solids and features, and the joint that connects it to its parent (the base if empty).
 
-    `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame, which is the
-    link's own frame when the joint's value is 0. From `opened` on the joint counts as open or switched on, up to `shut` as shut.
-    `friction` (newtons or newton metres) and `damping` resist; a `spring` pushes back to 0 with a force. A joint that `latches`
-    stays at `opened` after a push beyond it, until the next push. `urdf_link` is the link's name in a URDF of the mechanism.
+    - `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame; it is the link's
+      frame if the joint value is 0.
+    - The joint counts as open (or switched on) from `opened` on, and as shut up to `shut`.
+    - `friction` (newtons or newton metres) and `damping` resist a motion; a `spring` pushes towards 0.
+    - A joint that `latches` stays at `opened` after a push beyond it, until the next push.
+    - `urdf_link` is the link's name in the mechanism's URDF file.
     """
 
     name: str
@@ -158,7 +162,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Furniture with moving links: its position, the solids of its base, and its links; or a URDF file if `urdf` names one."""
+    """Furniture with moving links: its position, the solids of its base, and its links, or a URDF file."""
 
     name: str
     position: Vector
@@ -173,9 +177,9 @@ class Mechanism:
 class Shape:
     """The shape, mass and colour of an object.
 
-    `kind` is `vessel` (a wall of revolution around `profile`, open at the top), `cylinder`, `box` or a kind that another
-    package registers. `profile` lists (height, inner radius) from the bottom up; `numbers` are the kind's other parameters,
-    such as `wall` or `height`. `grasp_height` is the height above the base at which a hand grasps the object.
+    `kind` is `cylinder`, `box`, `vessel` (a wall of revolution around `profile`, open at the top) or a kind that another package
+    registers. `profile` lists (height, inner radius) from the bottom to the top. `numbers` contains further parameters such as
+    `wall` or `height`. `grasp_height` is the height above the base at which a hand grasps the object.
     """
 
     kind: str
@@ -189,7 +193,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Body:
-    """An object of the scene with its shape. `servings` is the initial content of a filled vessel."""
+    """An object with its shape; `servings` is the initial content of a filled vessel."""
 
     name: str
     shape: Shape
@@ -198,7 +202,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Filling:
-    """A content of vessels, simulated by beads. `serving` is the number of beads in one serving."""
+    """A content of vessels that is simulated by beads; `serving` is the number of beads in one serving."""
 
     name: str
     serving: int
@@ -210,11 +214,10 @@ class Filling:
 
 @dataclass(frozen=True)
 class Guard:
-    """A bound on a measured quantity, ``force >= 30``, that ends a motion or must hold after it.
+    """A bound on a measured quantity, such as ``force >= 30``, that ends a motion or must hold after it.
 
-    If it doesn't hold, the skill fails with `code`.
-
-    `sign` is 1 for ``>=`` and -1 for ``<=``; the bound is an expression (see `Phase`).
+    `sign` is 1 for ``>=`` and -1 for ``<=``. `bound` is an expression (see `Phase`). If a required bound doesn't hold, the skill
+    fails with `code`.
     """
 
     quantity: str
@@ -228,16 +231,16 @@ class Guard:
 
 @dataclass(frozen=True)
 class Phase:
-    """One motion of a skill, relative to a feature of a thing.
+    """One motion of a skill, relative to a feature of an object or link.
 
-    `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or
-    another key of `confab.sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or
-    for the point that `bring` names. `offset` is a shift from the goal in the hand's frame, `above` a shift upwards. `offset`,
-    `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, for example ``raised-slip``.
-
-    `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles or features that the hand may touch. The motion
-    ends early when one of the guards in `until` holds; after it all `checks` must hold. A phase is executed only if all conditions
-    in `when` hold. A `foreseen` phase is only checked to be feasible before the hand moves.
+    - `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
+      key of `confab.sim.phases.MOTIONS`.
+    - `to` is the goal, a role with a feature such as ``target.grip``. The hand's tip, or the point that `bring` names, moves there.
+    - `offset` is a shift of the goal in the hand's frame, `above` an upward shift.
+    - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
+    - `fingers` (open, shut or grasp) move before the hand. `touches` contains roles or features that the hand may touch.
+    - The motion ends early if a guard in `until` holds. After it, all `checks` must hold.
+    - The phase is executed only if all conditions in `when` hold. A `foreseen` phase is only checked for feasibility in advance.
     """
 
     name: str
@@ -262,9 +265,9 @@ class Phase:
 class SkillUse:
     """The skill that executes a primitive behaviour.
 
-    `parameters` has the roles of the behaviour's parameters, in their order; `variables` those of its determined variables.
-    `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python
-    function. `links` has for each role the links of the scene that can play it.
+    `parameters` contains the roles of the behaviour's parameters in order, `variables` the roles of its determined variables.
+    `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python function.
+    `links` maps each role to the links that can have it.
     """
 
     behavior: str
@@ -278,10 +281,10 @@ class SkillUse:
 
 @dataclass(frozen=True)
 class PerceiverUse:
-    """The perceiver that measures a situation type, its thresholds, and the individuals of special values.
+    """The perceiver that measures a situation type, with its thresholds and special values.
 
-    `choices` are the situation type's values in declared order; `links` are the links that have this situation type. A measured
-    type holds within the bounds `holds`; `asked` has the arguments of its symbols if these are true or false.
+    `choices` are the situation type's values in declared order, `links` the links that have the situation type. A measured type is
+    true within the bounds `holds`; `asked` contains the arguments of its symbols if they are boolean.
     """
 
     situation: str
@@ -296,7 +299,7 @@ class PerceiverUse:
 
 @dataclass(frozen=True)
 class Embodiment:
-    """The robots, furniture, objects, skills and perceivers of a scene. The mappings are by name, in declared order."""
+    """The robots, furniture, objects, skills and perceivers of a scene; the keys of mappings are names in declared order."""
 
     robots: tuple[Robot, ...]
     fixtures: tuple[Fixture, ...]
@@ -310,7 +313,7 @@ class Embodiment:
     cameras: tuple[Vector, ...] = ()
 
     def hand(self, name: str) -> tuple[Robot, Hand]:
-        """Return the robot and the hand of that name; raise `KeyError` with the known hands if there is none."""
+        """Return the robot and the hand with a name; raise `KeyError` if there is no such hand."""
         for robot in self.robots:
             for hand in robot.hands:
                 if hand.name == name:
