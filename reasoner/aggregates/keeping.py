@@ -10,7 +10,8 @@ If the aggregated number is linear in the changing amounts (only additions and s
 the total for every tuple that satisfies the conditions after the behaviour. These changes are independent of each other.
 
 If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound. So
-nothing is subtracted from such a count, and a tuple may be counted for several pairs.
+nothing is subtracted from such a count, and a tuple may be counted for several pairs. A tuple that only loses a value doesn't
+start to contribute, unless the condition on this value is negated.
 """
 
 from __future__ import annotations
@@ -31,13 +32,14 @@ from confab.reasoner.afterwards import (
 )
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
-from confab.reasoner.language import DomainError, is_variable, mentions, walk
+from confab.reasoner.language import DomainError, groups, is_variable, mentions, walk
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     Aggregate,
     AmountEffect,
     Behavior,
     Comparison,
+    Condition,
     Effect,
     Parameter,
     SituationType,
@@ -166,10 +168,11 @@ class _Keeping:
 
     def _candidates(self) -> Iterator[_Candidate]:
         """Yield a candidate for each pair of an effect and a symbol in the aggregate that the effect may change."""
-        for condition in (inner for c in self.conditions for inner in walk(c)):
+        for condition, wanted in (pair for c in self.conditions for pair in _signed(c)):
             if isinstance(condition, ValueCondition):
+                only_after = condition.value not in self.names or (self.forbidden and wanted)
                 for effect in (e for e in self.own.effects if e.situation == condition.situation):
-                    for before in (False, True) if condition.value in self.names else (False,):
+                    for before in (False,) if only_after else (False, True):
                         yield self._candidate(effect, condition.arguments, condition.value, before)
             elif isinstance(condition, Comparison):
                 yield from self._of_amounts(condition.left)
@@ -336,6 +339,15 @@ class _Keeping:
             asked = both(formulas)
             if asked is not None:
                 yield AmountEffect(self.aggregate.situation, arguments, operation, by, asked, each)
+
+
+def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Condition, bool]]:
+    """Yield a condition and all conditions inside it, each with whether the whole needs it to hold rather than not to hold."""
+    wanted = wanted is not condition.negated
+    yield condition, wanted
+    for group in groups(condition):
+        for inner in group:
+            yield from _signed(inner, wanted)
 
 
 def _parts(conjunction: Conjunction) -> Sequence[Formula]:
