@@ -39,7 +39,7 @@ from confab.reasoner.symbols import (
 
 Formula: TypeAlias = "Condition | bool"
 Conjunction: TypeAlias = "tuple[Condition, ...] | None"
-"""A conjunction of conditions; None if it is contradictory."""
+"""A conjunction of conditions; None stands for a contradictory conjunction."""
 Scaled: TypeAlias = "Callable[[Expression], Expression]"
 Term: TypeAlias = "tuple[Amount, str, Scaled]"
 OPPOSITE: Mapping[str, str] = {"increase": "decrease", "decrease": "increase"}
@@ -52,7 +52,7 @@ class TooManyCasesError(ValueError):
 
 
 def both(formulas: Iterable[Formula]) -> Conjunction:
-    """Return the conjunction of formulas without always true conjuncts; return None if it is contradictory."""
+    """Return the conjunction of formulas without conjuncts that are always true; return None for a contradiction."""
     found: dict[Condition, None] = {}
     for formula in formulas:
         if formula is False:
@@ -213,7 +213,7 @@ class Afterwards:
         return EqualityCondition(one, other)
 
     def before(self, condition: Condition) -> Formula:
-        """Return the equivalent of a condition in the state before the behaviour, simplified by the preconditions."""
+        """Return a condition on the state before the behaviour, simplified by means of the preconditions."""
         if isinstance(condition, ValueCondition):
             found = self.value(condition.situation, condition.arguments, condition.value)
             return negation(found) if condition.negated else found
@@ -233,7 +233,7 @@ class Afterwards:
         return term, (ValueCondition(situation, arguments, term),)
 
     def fires(self, effect: Effect, arguments: Sequence[str]) -> Conjunction:
-        """Return the conditions under which an effect with unique variables changes a symbol."""
+        """Return the conditions under which an effect changes a symbol; variables of the effect must have unique names."""
         if effect.each is not None:
             at = effect.arguments.index(effect.each.name)
             member = self.among(arguments[at], effect.each.kind)
@@ -251,7 +251,7 @@ class Afterwards:
         return any(situations_of(inner) & self.behavior.changes for inner in walk(condition))
 
     def condition(self, condition: Condition) -> Formula:
-        """Return the equivalent of a condition after the behaviour in the state before it.
+        """Translate a condition on the state after the behaviour to an equivalent condition on the state before the behaviour.
 
         All variables of the condition must be bound, by other conditions or by its own witnesses.
         """

@@ -17,7 +17,7 @@ from typing import TypeAlias
 Number: TypeAlias = "Fraction | float"
 """A fraction, or `NOTHING`, which is the only allowed float."""
 NOTHING = float("nan")
-"""The amount of a symbol without an amount (NaN). Calculations with it result in `NOTHING`; comparisons with it are false."""
+"""The amount of a symbol without an amount (NaN): calculations with NaN result in NaN, and comparisons with NaN are false."""
 
 
 LARGEST = 10**60
@@ -236,7 +236,7 @@ def towards(amount: str | None, wanted: str) -> str:
 
 
 def nearer(before: str | None, after: Number, wanted: str) -> bool:
-    """Return whether a change brings an amount closer to the bounds of its goal or within them."""
+    """Return whether a change brings an amount closer to the bounds of its goal, or within these bounds."""
     if before is None or not isinstance(after, Fraction):
         return False
     limits, old = bounds(wanted), number(before)

@@ -389,7 +389,7 @@ class NodeReader:
         self.inside.append(iri)
 
     def condition(self, iri: str) -> Condition:
-        """Return the condition of a node; raise an error if it contains itself or is nested too deeply."""
+        """Return the condition of a node; raise an error for a node that contains itself or is nested too deeply."""
         self.entered(iri, "condition")
         self.count[0] = self.count[0] + 1 if len(self.inside) > 1 else 0
         if self.count[0] > MOST_CONDITIONS:
@@ -429,7 +429,7 @@ class NodeReader:
         return self.in_order(condition for value in self.values(iri, name) for condition in self.group(value))
 
     def group(self, iri: str) -> tuple[Condition, ...]:
-        """Return the conjuncts of a conjunction, or another condition as the only conjunct."""
+        """Return the conjuncts of a conjunction node; for any other node, return the node's condition alone."""
         found = self.condition(iri)
         if self.is_a(iri, "AllOf") and isinstance(found, AnyOf) and not found.negated:
             return found.alternatives[0]

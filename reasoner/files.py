@@ -38,7 +38,7 @@ def write_whole(
     path : Path
     content : str, bytes or iterable of str
     check : callable, optional
-        Is called with the temporary file; if it raises an error, the old file is kept.
+        Called with the path of the temporary file; if `check` raises an error, the old file is kept.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     if path == STDOUT:

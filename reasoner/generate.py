@@ -211,7 +211,7 @@ def _crowded(objects: int, hands: int, random: Random) -> Layout:
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
     """Return a layout with objects at places that only the first or only the last hand reaches, and goals on the other side.
 
-    Further objects remain in between.
+    Objects without a place on these sides stay at places in the middle.
     """
     places = range(1, 2 * objects + 1)
     reach = strips(objects, hands, places)

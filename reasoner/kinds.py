@@ -54,7 +54,7 @@ class Kind:
     foreign : bool
         Whether Confab doesn't write such files; foreign files are never overwritten.
     columns : tuple of str, optional
-        The columns of query results; None if they are unknown or don't exist.
+        The columns of query results; None for unknown columns, and for files without columns.
     """
 
     name: str

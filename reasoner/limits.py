@@ -1,4 +1,4 @@
-"""The deadline of a call, stored in a context variable so that it needn't be passed as a parameter.
+"""The deadline of a call, stored in a context variable and therefore not passed as a parameter.
 
 The caller sets the deadline by `within`; loops call `check` or read `left`. In nested blocks the earliest deadline applies, so
 that a part of a call can have a share of the time.

@@ -1,7 +1,7 @@
 """Dataclasses for planning problems: symbols, facts, conditions, effects, behaviours, rules and domains.
 
 The module is independent of RDF, search and physics. Every name is a string that is unique in the scene (`cup1`, `B1_MOVE`,
-`LOCATION`); `Names` maps it to an IRI. A term that starts with ``?`` is a parameter or variable; any other term is an individual.
+`LOCATION`); `Names` maps names to IRIs. A term that starts with ``?`` is a parameter or variable; any other term is an individual.
 
 ============================  =========================================  =====================
 in the paper                  standard term                              class
@@ -90,7 +90,7 @@ class SituationType:
     - `level` is the first level on which the symbols exist.
     - `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
     - With a `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
-    - `perceived` states how the values are perceived in physics; None if they aren't.
+    - `perceived` states how the values are perceived in physics; None for values that aren't perceived.
     """
 
     name: str
@@ -151,7 +151,7 @@ class EqualityCondition:
 class Witness:
     """The condition that some individual of class `kind`, denoted by `variable`, satisfies all `conditions`.
 
-    If negated, no individual satisfies them. "The location is free" is
+    A negated witness is the condition that no individual satisfies all `conditions`. "The location is free" is
     ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
     """
 
@@ -176,7 +176,8 @@ class Constraint:
 class AnyOf:
     """The condition that at least one alternative (a conjunction) is true; if negated, no alternative is true.
 
-    It binds no variables outside itself. `constraint` is the constraint that a precondition enforces; it is used only in messages.
+    A disjunction binds no variables outside itself. `constraint` is used only in messages: the constraint that a precondition
+    enforces.
     """
 
     alternatives: tuple[tuple[Condition, ...], ...]
@@ -186,7 +187,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`); false if one of them has no value."""
+    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`); false if a value is missing."""
 
     left: Expression
     operator: str
@@ -264,11 +265,11 @@ class Timing:
     effects: tuple[tuple[Span, Effect], ...] = ()
 
     def asked(self, span: Span) -> tuple[Condition, ...]:
-        """Return the conditions with a span."""
+        """Return the conditions that have the given span."""
         return tuple(condition for at, condition in self.conditions if at is span)
 
     def made(self, span: Span) -> tuple[Effect, ...]:
-        """Return the effects with a span."""
+        """Return the effects that have the given span."""
         return tuple(effect for at, effect in self.effects if at is span)
 
 
@@ -510,7 +511,7 @@ class Problem:
     goal : State
         Goal values of some symbols.
     parents : mapping of class to its direct superclasses
-        Used by statistics that generalise over classes; the search doesn't use it.
+        Used by statistics that generalise over classes, and not by the search.
     value_levels : mapping of individual to level
         The first level on which a value exists, if it isn't 1.
     times : Times, optional
@@ -665,7 +666,8 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
     """Return preconditions that ensure the bounds of the amounts that a behaviour changes, as far as conditions can express them.
 
-    Each precondition negates the violation of a bound. It therefore holds for amounts that don't exist, which effects don't change.
+    Each precondition negates the violation of a bound. The precondition therefore holds for amounts that don't exist, which effects
+    don't change.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

@@ -60,7 +60,7 @@ def projected(
 def only_during(problem: Problem) -> frozenset[str]:
     """Return the behaviours that give a symbol a value only while they last, if another behaviour or the goal may need it.
 
-    Such plans need concurrency: in a sequence of steps, the value never holds for another step.
+    A plan with such a behaviour needs concurrency: in a sequence of steps, no other step ever finds the value.
     """
     found = set[str]()
     for behavior in problem.domain.behaviors.values():
@@ -112,7 +112,7 @@ def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
 
 
 def on_each(effects: Sequence[Effect], classes: Mapping[str, Sequence[str]]) -> tuple[Effect, ...]:
-    """Return effects in which each effect on all members of a class is replaced by one effect per member."""
+    """Return effects with one effect per member in place of each effect on all members of a class."""
     found: list[Effect] = []
     for effect in effects:
         every = () if effect.each is None else classes.get(effect.each.kind, ())

@@ -1,7 +1,7 @@
 """Child processes that end together with their parent process, even if it is killed, and have their own limit of CPU time.
 
 Each process has one end of a pipe whose other end belongs to the parent process. When the parent's end is closed, the Linux
-kernel kills the process and its children. This needs no code in the parent, so it also works after ``kill -9`` or a crash.
+kernel kills the process and its children. No code has to run in the parent, even after ``kill -9`` or a crash.
 """
 
 from __future__ import annotations

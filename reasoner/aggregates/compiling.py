@@ -42,11 +42,11 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
 
 
 def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour with preconditions that prevent violations of constraints.
+    """Return a behaviour with additional preconditions that prevent violations of constraints.
 
-    The state before the behaviour has no violation, so the behaviour can only add violations. The condition for adding one becomes
-    a negated precondition. A durative behaviour keeps its effects on the number of violations instead, because the schedule checks
-    the bound of this number.
+    No constraint is violated before the behaviour, so the behaviour can only add violations. The condition for adding a violation
+    becomes a negated precondition. A durative behaviour keeps its effects on the number of violations instead, because the schedule
+    checks the bound of this number.
     """
     if behavior.timing is not None or not behavior.changes & domain.constraints.keys():
         return behavior

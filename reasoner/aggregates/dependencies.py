@@ -24,12 +24,12 @@ from confab.reasoner.symbols import (
 
 
 def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
-    """Return aggregates in order of dependency: each one follows the aggregates that it reads.
+    """Return aggregates in order of dependency: an aggregate follows all aggregates that it reads.
 
     Raises
     ------
     DomainError
-        An aggregate depends on itself; the message names it.
+        An aggregate depends on itself; the message names the aggregate.
     """
     found: dict[str, Aggregate] = {}
     waiting = dict(aggregates)
@@ -65,12 +65,12 @@ def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -
 
 
 def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
-    """Return an aggregate in whose conditions the definitions replace derived situation types.
+    """Return an equivalent aggregate whose conditions contain no derived situation types, but their definitions.
 
     Raises
     ------
     DomainError
-        The definition of such a situation type is recursive; the message names both.
+        The definition of a derived situation type is recursive; the message names the aggregate and the situation type.
     """
     if not read_by(aggregate) & rules.keys():
         return aggregate
@@ -107,7 +107,7 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
 
 
 def existing(aggregate: Aggregate) -> tuple[Condition, ...]:
-    """Return the condition that the number of an aggregate is defined; return no condition if it always is."""
+    """Return the condition that the number of an aggregate is defined; return no condition for a number that is always defined."""
     whole = aggregate.amount
     amounts = [part for part in inside(whole) if isinstance(part, Amount | Measure)]
     return (Comparison(whole, "=", whole),) if amounts or divides(whole) else ()

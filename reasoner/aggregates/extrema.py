@@ -27,7 +27,10 @@ from confab.reasoner.symbols import (
 
 
 def with_extrema(conditions: Sequence[Condition], aggregates: Mapping[str, Aggregate]) -> tuple[Condition, ...]:
-    """Return conditions in which a witness that no individual exceeds replaces each comparison with a maximum or minimum."""
+    """Return equivalent conditions without comparisons with maxima and minima.
+
+    Each comparison becomes a witness: an individual that no other individual exceeds satisfies the comparison.
+    """
     return tuple(_with_extremum(condition, aggregates) for condition in conditions)
 
 
@@ -53,7 +56,7 @@ def _extrema(expression: Expression, aggregates: Mapping[str, Aggregate]) -> lis
 
 
 def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, Aggregate]) -> Condition:
-    """Return a comparison in which the number of an individual that no other exceeds replaces a maximum or minimum."""
+    """Return a witness that is equivalent to a comparison with a maximum or minimum."""
     aggregate = aggregates[read.situation]
     taken = {*mentions(condition), *read.arguments}
     best, other = (_solution(aggregate, read.arguments, suffix, taken) for suffix in ("", "_other"))
@@ -107,7 +110,7 @@ def _in_place(expression: Expression, old: Expression, new: Expression) -> Expre
 
 
 def extrema_replaced(domain: Domain) -> Domain:
-    """Return a domain in which no condition reads a maximum or minimum.
+    """Return an equivalent domain in which no condition reads a maximum or minimum.
 
     Raises
     ------

@@ -1,17 +1,18 @@
 """Effects by which a behaviour updates a sum or a count.
 
-Soundness: A tuple of individuals contributes to a total if it satisfies the aggregate's conditions. Its contribution can change
-only if an effect changes a symbol in these conditions or in the aggregated number. Therefore, each such tuple is a *candidate* of
-a pair of an effect and a symbol in the aggregate: it agrees with the effect in the arguments, and in the value before or after
-the effect. The number of a candidate is added if the conditions hold only after the behaviour (`confab.reasoner.afterwards`), and
-subtracted if they hold only before it. A tuple that is a candidate of several pairs is counted for the first pair only.
+Soundness: A tuple of individuals contributes to a total if the tuple satisfies the aggregate's conditions. The contribution of a
+tuple can change only if an effect changes a symbol in these conditions or in the aggregated number. Each tuple whose contribution
+may change is a *candidate* of a pair of an effect and a symbol in the aggregate: the tuple agrees with the effect in the
+arguments, and in the value before or after the effect. The number of a candidate is added if the conditions hold only after the
+behaviour (`confab.reasoner.afterwards`), and subtracted if the conditions hold only before the behaviour. A tuple that is a
+candidate of several pairs is counted for the first pair only.
 
 If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount is added to
-the total for every tuple that satisfies the conditions after the behaviour. These changes are independent of each other.
+the total for every tuple that satisfies the conditions after the behaviour. The changes are independent of each other.
 
-If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound. So
-nothing is subtracted from such a count, and a tuple may be counted for several pairs. A tuple that only loses a value doesn't
-start to contribute, unless the condition on this value is negated.
+If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
+Therefore, nothing is subtracted from a count with maximum 0, and a tuple may be counted for several pairs. A tuple that only loses
+a value doesn't start to contribute, unless the condition on this value is negated.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ from confab.reasoner.symbols import (
 MOST_CONDITIONS = 5_000
 """Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts.
 
-This number of conditions takes about a second to compile.
+A behaviour with this number of conditions takes about a second to compile.
 """
 
 

@@ -43,9 +43,9 @@ def with_totals(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return a state together with the sums and counts that it implies.
+    """Return a state extended by the sums and counts that follow from the state.
 
-    The number of violations of a constraint is included only if effects change it.
+    The number of violations of a constraint is included only if effects change this number.
     """
     found = dict(state)
     changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}

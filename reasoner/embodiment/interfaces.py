@@ -84,7 +84,7 @@ class Reading:
 class Interface:
     """The interface of a robot, with its calls by behaviour and the meanings of its result statuses.
 
-    `robot_names` maps individuals to the robot's names for them, if these are different.
+    `robot_names` maps individuals to the robot's names for these individuals, if the names are different.
     """
 
     iri: str

@@ -21,7 +21,7 @@ FINGERS = ("", "open", "shut", "grasp")
 BROUGHT = ("", "base")
 CONDITIONS = ("empty", "holding", "place", "thing")
 QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
-"""Words that phases may contain; `confab.sim.phases`, `confab.sim.touch` and `confab.sim.measuring` implement them."""
+"""Words that phases may contain, implemented by `confab.sim.phases`, `confab.sim.touch` and `confab.sim.measuring`."""
 VERDICTS = (
     "unreachable",
     "goal in collision",
@@ -39,7 +39,7 @@ VERDICTS = (
     "ill-defined",
     "unexpected",
 )
-"""Failure codes that may follow ``else`` in a guard; `confab.sim.verdict.CODES` explains them."""
+"""Failure codes that may follow ``else`` in a guard, explained in `confab.sim.verdict.CODES`."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
 TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")

@@ -1,6 +1,6 @@
 """Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
-Each joint of a mechanism is moved from `lower` to `upper`. Its links must not overlap their own case, neighbouring links or
+Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap their own case, neighbouring links or
 furniture. A neighbouring link that moves may be shut or fully open; an overlap is a fault only if it occurs in both cases.
 """
 

@@ -41,7 +41,7 @@ class Block:
 
     @property
     def name(self) -> str:
-        """The name of the owner, preceded by the solid's name if it is different."""
+        """The name of the owner, preceded by the name of the solid if the names are different."""
         return self.owner if self.part in ("", self.owner) else f"{self.part} ({self.owner})"
 
     def extent(self, directions: Array) -> Array:
@@ -179,9 +179,9 @@ def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
 def place_frame(
     embodiment: Embodiment, name: str, where: Mapping[str, str], values: Mapping[str, float]
 ) -> Frame | None:
-    """Return the world frame of a place for given places of objects (`where`) and joint values; return None if it is unknown.
+    """Return the world frame of a place for given places of objects (`where`) and joint values; None for an unknown frame.
 
-    The carrier of a place may be an object, which is at a place itself.
+    The carrier of a place may be an object, which is itself at a place.
     """
     passed: list[str] = []
     shift = np.zeros(3)

@@ -239,7 +239,7 @@ class Phase:
     - `offset` is a shift of the goal in the hand's frame, `above` an upward shift.
     - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
     - `fingers` (open, shut or grasp) move before the hand. `touches` contains roles or features that the hand may touch.
-    - The motion ends early if a guard in `until` holds. After it, all `checks` must hold.
+    - The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold.
     - The phase is executed only if all conditions in `when` hold. A `foreseen` phase is only checked for feasibility in advance.
     """
 
@@ -267,7 +267,7 @@ class SkillUse:
 
     `parameters` contains the roles of the behaviour's parameters in order, `variables` the roles of its determined variables.
     `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python function.
-    `links` maps each role to the links that can have it.
+    `links` maps each role to the links that can play this role.
     """
 
     behavior: str

@@ -25,7 +25,7 @@ from confab.reasoner.vocabulary import OWL
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0
-"""Maximum number of seconds for a download; a fifth of it is the limit for the connection."""
+"""Maximum number of seconds for a download; the limit for the connection is a fifth of this number."""
 REDIRECTS = 5
 ACCEPT = "text/turtle, application/n-triples;q=0.9, application/rdf+xml;q=0.8, */*;q=0.1"
 SUFFIX = {
@@ -138,7 +138,7 @@ def _guessed(url: str, content: bytes) -> str:
 
 
 def _declared(url: str, said: str, triples: Sequence[ox.Triple]) -> str:
-    """Return the IRI of the ontology in a document; raise `KnowledgeError` if it isn't the requested ontology."""
+    """Return the IRI of the ontology that a document contains; raise `KnowledgeError` unless it is the requested ontology."""
     kind = ox.NamedNode(OWL + "Ontology")
     found = [t.subject.value for t in triples if t.object == kind and isinstance(t.subject, ox.NamedNode)]
     if len(found) != 1:

@@ -58,14 +58,14 @@ def needed(graph: KnowledgeGraph) -> bool:
 def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
     """Write the inferences of OWL 2 RL into the graph `inferred`, and return the number of new triples.
 
-    Only types, subclasses and rows of static relations are inferred.
+    Inferences are restricted to types, subclasses and rows of static relations.
 
     Parameters
     ----------
     graph : KnowledgeGraph
         Its graph `inferred` is cleared first.
     always : bool
-        Whether to run the reasoner even if it isn't `needed`.
+        Whether to run the reasoner even if `needed` returns False.
 
     Raises
     ------

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 DERIVED = "derived"
-"""Graph of the facts that are derived in the initial state. It is for users' queries; planning derives the facts in each state."""
+"""Graph of the facts that are derived in the initial state, used only by users' queries."""
 SCENE = ("asserted", "inferred", "reach")
 """Graphs that planning reads."""
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
@@ -446,8 +446,8 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
 def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
     """Return the file of an imported ontology.
 
-    It is looked up in the catalog beside the importing file, then in the shipped catalog, then by its name beside the importing
-    file.
+    The ontology is looked up in the catalog beside the importing file, then in the shipped catalog, then by its name beside the
+    importing file.
     """
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):

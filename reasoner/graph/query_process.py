@@ -108,8 +108,8 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 class QueryWorker:
     """A process that executes queries on a copy of a graph.
 
-    The process starts, and copies the graph, at the first query. It ends with the ``with`` block or with this process. An
-    interrupted query, or a query that exceeds its limits, doesn't end the process.
+    The process starts, and copies the graph, at the first query. The process ends with the ``with`` block or with its parent
+    process. An interrupted query, or a query that exceeds its limits, doesn't end the process.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class QueryWorker:
         self.close()
 
     def close(self) -> None:
-        """End the process and its running query, if it has started."""
+        """End the process and its running query; do nothing if the process hasn't started."""
         if self._process is not None:
             end(self._process)
             self._process = None

@@ -1,6 +1,6 @@
 """Main program of the process that executes queries for `confab.reasoner.graph.query_process`.
 
-The process imports no other module of this project. It stores a graph and forks for each query. The fork limits its own memory,
+The process imports no other module of this project, stores a graph and forks for each query. The fork limits its own memory,
 time and number of files (which also prevents connections), and ends after its answer. The next message, or the end of the parent
 process, stops the fork.
 """

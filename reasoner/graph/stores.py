@@ -1,7 +1,7 @@
 """Stores for a scene's triples besides memory: an Oxigraph store on disk, and any SPARQL 1.1 endpoint.
 
 A store on disk is filled from the files once, and again after a file has changed. An endpoint is only read, by a few large
-queries. It contains all triples in one default graph, or has a named graph for each ontology with the ontology's IRI.
+queries. An endpoint contains all triples in one default graph, or a named graph for each ontology with the ontology's IRI.
 """
 
 from __future__ import annotations
@@ -310,7 +310,7 @@ def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
     source : str or Path
         Name or file of the scene, as in `confab.reasoner.graph.knowledge.load`.
     folder : Path
-        Folder of the store, created if missing. Only one process at a time can use it.
+        Folder of the store, created if missing. Only one process at a time can use the folder.
 
     Raises
     ------

@@ -1,9 +1,10 @@
 """Files and stores of experience: learned items as triples and tallies as annotated axioms, in Turtle that Protégé can open.
 
-Each learned item is written once (`confab.reasoner.memory.rules_file`). There is a counter for each replica, epoch and item
-(`:countsFor`). It is `:associatedWith` the item itself and with the lifted facts that held. An ``owl:Axiom`` on each of these links
-has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never share a counter, and other
-items are named by their content, so that the union of two files contains both memories. An edited rule keeps its tallies.
+Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and item
+(`:countsFor`). The counter is `:associatedWith` the item itself and with the lifted facts that held. An ``owl:Axiom`` on each of
+these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never share a
+counter, and other items are named by their content, so that the union of two files contains both memories. An edited rule keeps
+its tallies.
 
 Each link is written as one line, which is read by a regular expression. Files in another layout, such as that of Protégé, are read
 by the Turtle parser.
@@ -285,7 +286,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
 
 
 def _count(text: str, what: str) -> int:
-    """Return a number as an integer; raise `ValueError` if it is out of range."""
+    """Return a text as a whole number; raise `ValueError` for a number that is out of range."""
     if not 0 <= (number := int(text)) < MOST:
         raise ValueError(f":{what} {number}; wanted a number from 0 to {MOST}")
     return number

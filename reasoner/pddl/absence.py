@@ -1,7 +1,7 @@
 """Extra predicates of an exported domain that express "no individual of a class has this value" without quantifiers.
 
-A predicate ``no_CLASS_has_TYPE`` of the value is used if at most one individual can have the value. Otherwise, the predicate
-``not_TYPE`` of an individual and a value states that the individual doesn't have the value.
+A predicate ``no_CLASS_has_TYPE`` of the value is used if at most one individual can have the value. For other values, the
+predicate ``not_TYPE`` of an individual and a value states that the individual doesn't have the value.
 """
 
 from __future__ import annotations

@@ -135,7 +135,7 @@ def _text(form: Word | Form) -> str:
 
 
 def _put(form: Form, duration: Word | Form) -> Form:
-    """Return a copy of a form in which `duration` replaces the variable ``?duration``."""
+    """Return a copy of a form with `duration` substituted for the variable ``?duration``."""
     return replace(
         form,
         items=tuple(

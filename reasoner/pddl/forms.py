@@ -119,7 +119,7 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
 
 
 def _with(form: Form, terms: Mapping[str, str]) -> Form:
-    """Return a copy of a form in which terms replace the free variables."""
+    """Return a copy of a form with terms substituted for free variables."""
     if form.head in ("exists", "forall"):
         assert isinstance(form.items[1], Form)
         own = {one.name for one in typed_in(form.items[1])}
@@ -134,7 +134,7 @@ def _with(form: Form, terms: Mapping[str, str]) -> Form:
 
 
 def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
-    """Return whether a condition without variables always holds (True) or never holds (False); None if its truth may change."""
+    """Return whether a condition without variables always holds (True), never holds (False) or may change (None)."""
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head in ("and", "or"):
         found = {_known(item, holds) for item in rest}

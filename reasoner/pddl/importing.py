@@ -86,8 +86,8 @@ BASE = "https://w3id.org/confab/pddl/"
 class Place:
     """The translation of a predicate to a situation type and a value.
 
-    `part` states which argument is the symbol's object and which one is the value; it is None for a boolean situation type.
-    `value` is used if no argument is the value.
+    `part` states which argument is the symbol's object and which argument is the value; `part` is None for a boolean situation
+    type. `value` is used if no argument is the value.
     """
 
     situation: str
@@ -352,12 +352,12 @@ class _Import:
         return goal, reach
 
     def preferences(self, situations: Mapping[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
-        """Add the soft goals to the goal, and return their weights in the metric; those without a weight are left out.
+        """Add the soft goals to the goal, and return their weights in the metric; soft goals without a weight are omitted.
 
         Raises
         ------
         PddlError
-            A soft goal isn't equivalent to one fact, or has the symbol of another goal.
+            A soft goal isn't equivalent to a single fact, or another goal has the same symbol.
         """
         found: dict[Symbol, Fraction] = {}
         for name, form in self.pddl.preferences.items():
@@ -380,11 +380,10 @@ class _Import:
         return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to the facts in `found` if it is equivalent to a fact; return whether it is.
+        """Add a conjunct of the goal to the facts in `found` if the conjunct is equivalent to a fact; return whether it is.
 
         Facts include negated atoms of boolean situation types, and comparisons of a changing function with a number. A conjunct
-        that
-        contradicts an earlier one isn't added.
+        that contradicts an earlier fact isn't added.
         """
         if part.head in COMPARISONS and part.items[1:] and isinstance(part.items[1], Form):
             function, limit = part.items[1:]

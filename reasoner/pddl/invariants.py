@@ -1,9 +1,9 @@
 """Invariant synthesis for a PDDL domain.
 
-An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. Its predicates form
-one state variable of the object. An invariant starts as a guess with one changing predicate. It is proved if every action that
-adds a fact of the invariant also deletes one. If the proof fails, a predicate that the action deletes is added to the guess, for
-example *in* to *at*.
+An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. The predicates of an
+invariant form one state variable of the object. An invariant starts as a guess with one changing predicate. The guess is proved if
+every action that adds a fact of the invariant also deletes a fact of the invariant. If the proof fails, a predicate that the
+action deletes is added to the guess, for example *in* to *at*.
 """
 
 from __future__ import annotations

@@ -174,9 +174,10 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return the formula that a boolean symbol is true: an atom if the symbol isn't derived or its rules are recursive.
+        """Return the formula that a boolean symbol is true.
 
-        Otherwise, return the disjunction of the conditions of its rules.
+        The formula is an atom if the symbol isn't derived or its rules are recursive, and the disjunction of the rules' conditions
+        otherwise.
         """
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
@@ -269,7 +270,7 @@ class Lowering:
         return Action(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
 
     def parameter(self, wanted: str, members: Iterable[str], scope: Scope) -> Term:
-        """Add a parameter to an action for a value that the preconditions determine, and return it."""
+        """Add a parameter for a value that the preconditions determine to an action, and return the parameter."""
         term = Term(scope.fresh(wanted), "object", frozenset(members))
         scope.parameters.append(term)
         return term
@@ -463,7 +464,8 @@ class Lowering:
     def within_bounds(self, scope: Scope) -> Iterator[Formula]:
         """Yield the formulas that all totals are within their bounds.
 
-        They are preconditions of every action and part of the goal. A state with a total out of bounds is thereby a dead end.
+        The formulas are preconditions of every action and part of the goal. A state with a total out of bounds is thereby a dead
+        end.
         """
         for situation in self.totals:
             kind = self.words.situations[situation]

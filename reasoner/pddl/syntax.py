@@ -4,8 +4,8 @@ The supported subset contains types, constants, predicates, functions, actions w
 actions, derived predicates, action costs, timed initial literals and ``always`` constraints. Other constructs are rejected by
 name. Every error states file, line and column.
 
-The parser of unified-planning isn't used. It reports an undefined type as a ``KeyError`` without a message, states no position for
-half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
+The parser of unified-planning isn't used, because that parser reports an undefined type as a ``KeyError`` without a message,
+states no position for half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
 
 McDermott et al., "PDDL: the planning domain definition language", 1998; Fox and Long, "PDDL2.1", JAIR 20 (2003).
 """

@@ -95,10 +95,11 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which two actions, for its start and its end, replace each durative action; with the actions' effects.
+    """Return a domain with two actions, the start and the end, for each durative action; and the effects of all actions.
 
-    Invariant synthesis uses this domain. It accepts a deletion if the same action requires the deleted fact. For an end that adds a
-    fact after the start deleted one, the deletion and its condition are moved to the end, unless the start also adds a fact.
+    Invariant synthesis uses this domain. The synthesis accepts a deletion if the same action requires the deleted fact. If the end
+    adds a fact in place of a fact that the start deleted, the deletion and its condition are moved to the end, unless the start
+    also adds a fact.
     """
     actions: dict[str, Action] = {}
     found: dict[str, tuple[Effect, ...]] = {}

@@ -28,7 +28,7 @@ sometime sometime-after sometime-before start total-cost total-time types undefi
 class Vocabulary:
     """Mapping from the names of a problem to PDDL names.
 
-    Two PDDL names are different even if they denote a type and an object, because some parsers have one table for all names.
+    No PDDL name denotes both a type and an object, because some parsers have one table for all names.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -118,7 +118,7 @@ class Vocabulary:
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
 
     def is_a(self, term: Term, kind: str) -> Formula:
-        """Return the formula that a term denotes a member of a class; it is constant if this is known."""
+        """Return the formula that a term denotes a member of a class; the formula is constant if its truth is known."""
         members = self.problem.members(kind)
         if term.members <= members:
             return ALWAYS
@@ -127,7 +127,7 @@ class Vocabulary:
         return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
 
     def guard(self, term: Term, kind: str) -> Formula:
-        """Return the formula that a variable denotes a member of its class; it is always true if the class is a PDDL type."""
+        """Return the formula that a variable denotes a member of its class; the formula is constant if the class is a PDDL type."""
         if kind in self.types:
             return ALWAYS
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
@@ -214,7 +214,7 @@ class Vocabulary:
             kind = self.above[kind]
 
     def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
-        """Return the PDDL expression for a numeric expression, in which terms replace variables."""
+        """Return the PDDL expression for a numeric expression, with PDDL terms substituted for variables."""
         match expression:
             case Amount(situation, arguments):
                 return self.amount(situation, self.terms(arguments, terms))

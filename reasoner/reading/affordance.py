@@ -195,7 +195,8 @@ def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
     """Yield the preconditions that keep amounts within their bounds if several effects of a behaviour change the same amount.
 
-    The arguments of two effects may or may not denote the same symbol. There is one condition for each combination of these cases.
+    The arguments of two effects may denote the same symbol or different symbols; each combination of these cases has its own
+    condition.
     """
     for effect in behavior.amounts:
         quantity = situations[effect.situation].quantity

@@ -153,7 +153,7 @@ class Definitions:
     def _closed(self) -> frozenset[str]:
         """The classes whose members OWL 2 RL can't infer because their definitions contain `CLOSED` constructs.
 
-        Only definitions of the form *Base and …* with known properties are included.
+        A definition is included only if it has the form *Base and …* with known properties.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -449,7 +449,7 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return the condition that a term has a value in a class, and `others` further values different from it.
+        """Return the condition that a term has a value in a class, and `others` further different values in the class.
 
         If `outside`, return the condition that no value of the term is outside the class.
         """
@@ -469,7 +469,7 @@ class Definitions:
         return Witness(variable, kind, (self.related(prop, term, variable), *inside), negated=outside)
 
     def _range(self, prop: str) -> str:
-        """Return the class of a property's values; for a value property, it is the situation type."""
+        """Return the class of a property's values, which is the situation type for a value property."""
         iri, inverse = self._named(prop)
         kind = self.kinds.get(iri, ("", ""))[not inverse]
         if not kind:

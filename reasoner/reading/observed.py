@@ -1,7 +1,7 @@
 """Observed facts of a scene, stored in a separate file.
 
-Each observed fact is a situated object instance, an individual with an object, a situation type and a value. It isn't a property
-assertion, because the observed place of a cup would contradict its place in the scene. A planning call that starts from
+Each observed fact is a situated object instance, an individual with an object, a situation type and a value. Property assertions
+aren't used, because the observed place of a cup would contradict the cup's place in the scene. A planning call that starts from
 observations replaces the scene's values by the observed values.
 """
 
@@ -53,7 +53,7 @@ def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:
-    """Return a reading in whose initial state the observed facts of a file replace the scene's facts.
+    """Return a reading with the observed facts of a file instead of the scene's facts in the initial state.
 
     Raises
     ------

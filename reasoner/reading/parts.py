@@ -85,7 +85,7 @@ class Parts(NodeReader):
             cost = float(said)
         except ValueError:
             cost = -1.0
-        if not 0 <= cost <= HIGHEST_COST:  # not a number is neither
+        if not 0 <= cost <= HIGHEST_COST:  # NaN fails both comparisons
             raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
         return cost
 

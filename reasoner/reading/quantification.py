@@ -94,7 +94,7 @@ def _select(reading: Reading, parameter: Parameter) -> str:
 
 
 def _typed(reading: Reading, term: str, kind: str) -> str:
-    """Return the pattern that a term is a member of a class, or one of the class's individuals in a part of a scene."""
+    """Return the graph pattern for members of a class; for a part of a scene, return a VALUES clause with the members."""
     if not reading.whole:
         members = (reading.names.iri(member) for member in reading.problem.classes.get(kind, ()))
         return f"VALUES {term} {{ {' '.join(str(ox.NamedNode(iri)) for iri in members)} }}"

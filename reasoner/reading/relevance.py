@@ -249,7 +249,8 @@ class _Scope:
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
     """Return the conjunctions in nested conditions.
 
-    The first conjunction contains the positive conditions. Each further one adds an alternative or a negated conjunction to them.
+    The first conjunction contains the positive conditions. Each further conjunction consists of the positive conditions and an
+    alternative or a negated conjunction.
     """
     leaves: list[Condition] = []
     groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []
@@ -433,10 +434,10 @@ class _Search(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return the IRIs in known namespaces with the local name of a read individual or class.
+    """Return the IRIs in known namespaces with the local name of an individual or class that has been read.
 
-    Each candidate IRI is looked up by itself. As in a whole scene, an individual is included only if it has a class, and a class
-    only if it has individuals that aren't nodes of the schema.
+    Each candidate IRI is looked up separately. An individual is included only if a class of it is stated. A class is included only
+    if it has individuals that aren't nodes of the schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}

@@ -1,7 +1,7 @@
 """A part of a scene that is extended by the lookups of a check, independently of the routes of task recognition.
 
-A checker states the individuals that it looks up as members of a class that initially satisfy conditions. One query finds all of
-them, and their values are read. This is repeated until the lookups find no new individual.
+A checker looks up individuals: members of a class that initially satisfy conditions. One query finds all looked-up individuals,
+and their values are read. The lookups are repeated until they find no new individual.
 """
 
 from __future__ import annotations

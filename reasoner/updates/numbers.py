@@ -58,7 +58,7 @@ class Numbers:
         return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
 
     def expression(self, tree: Any, known: Collection[str], at: int) -> Side:
-        """Return the compiled form of a numeric expression, in which amounts replace the variables that denote them."""
+        """Return the compiled form of a numeric expression, with amounts substituted for the variables that denote amounts."""
         one = unwrapped(tree)
         if isinstance(one, Number):
             return one

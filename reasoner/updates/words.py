@@ -246,7 +246,7 @@ def _stuck(unit_name: str, text: str) -> int:
 
     for element in unit.visit_all():
         element.set_fail_action(failed)
-    with suppress(pyparsing.ParseBaseException, TypeError):  # of -0.5, which is no fault
+    with suppress(pyparsing.ParseBaseException, TypeError):  # rdflib raises TypeError for -0.5
         unit.parse_string(text, parse_all=True)
     return _skipped(text, farthest)
 
@@ -320,7 +320,7 @@ def triples(block: Sequence[Any]) -> Iterator[Triple]:
 
 
 def _value(value: Any, cells: Mapping[object, list[Any]], at: int) -> Value:
-    if not isinstance(value, Hashable) or value not in cells:  # a text is a part of the tree, which has no hash
+    if not isinstance(value, Hashable) or value not in cells:  # literals are unhashable parts of the tree
         return term(value, at)
     found = []
     while str(value) != NIL:

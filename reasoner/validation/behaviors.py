@@ -227,13 +227,13 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
 
 
 def _words(condition: Condition, behavior: Behavior) -> str:
-    """Return a condition in words, in which classes replace the variables."""
+    """Return a condition in words, with classes substituted for variables."""
     kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
     return said(substituted(condition, kinds)).replace("?", "")
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects whose values are never produced by a behaviour of the next level, although it changes the situation type."""
+    """Find effects with values that no behaviour of the next level produces although it changes the situation type."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -3,8 +3,8 @@
 One run of the reasoner determines whether the ontology is consistent, which named classes are empty in every model, and which
 behaviours have a precondition that no individual can satisfy. For the last question, each term of a behaviour becomes a class,
 its *prototype*, defined by the conditions on the term; variables become nested class expressions. If a prototype is empty, the
-conditions contradict the ontology. Two conditions on one nested variable are examined separately, so that some contradictions
-aren't found.
+conditions contradict the ontology. Two conditions on the same nested variable are examined separately, so that some
+contradictions aren't found.
 
 HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Therefore, each member
 gets a different number as the value of one functional property instead. The conclusions are the same, and take seconds.
@@ -178,7 +178,7 @@ def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
 
 
 def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
-    """Yield triples in which different values of a functional property replace each ``owl:AllDifferent``."""
+    """Yield triples with different values of a functional property instead of each ``owl:AllDifferent``."""
     all_different = ox.NamedNode(OWL + "AllDifferent")
     groups = {triple.subject for triple in triples if triple.predicate == TYPE and triple.object == all_different}
     first: dict[Any, Any] = {triple.subject: triple.object for triple in triples if triple.predicate == FIRST}

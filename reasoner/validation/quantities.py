@@ -112,7 +112,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals without a number that a behaviour reads for all members of their class; it isn't applicable to them."""
+    """Find individuals without a number that a behaviour reads; the behaviour isn't applicable to these individuals."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

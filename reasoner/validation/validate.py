@@ -366,7 +366,7 @@ def _shapes() -> rdflib.Graph:
 
 
 def _short(text: str) -> str:
-    """Return a text in which local names replace IRIs."""
+    """Return a text with local names instead of IRIs."""
     words = (
         local_name(word.strip("<>,")) + ("," if word.endswith(",") else "") if "://" in word else word
         for word in text.split(" ")
