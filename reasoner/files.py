@@ -29,9 +29,7 @@ PATIENCE = 600.0
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file atomically, so that a reader sees either the old or the new content, even after a crash.
-
-    The errors are those of `written_whole`.
+    """Write a file atomically: readers see the old or the new content, even after a crash. Errors as in `written_whole`.
 
     Parameters
     ----------

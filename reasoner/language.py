@@ -1,7 +1,4 @@
-"""Traversal of conditions: terms, variables and nested conditions.
-
-A new kind of condition must be added here and in the independent plan checker.
-"""
+"""Traversal of conditions: terms, variables, nested conditions. A new kind of condition is added here and in the checker."""
 
 from __future__ import annotations
 

@@ -14,10 +14,7 @@ from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact,
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with its arguments, the facts that make it impossible, and the reason.
-
-    An empty argument stands for any individual.
-    """
+    """A behaviour with arguments (an empty one stands for any individual), the facts that make it impossible, and the reason."""
 
     behavior: str
     arguments: tuple[str, ...]

@@ -71,10 +71,7 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
 
 
 def _folded(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour in which the conditions of effects on derived amounts are simplified.
-
-    Parts of conditions that don't depend on the state are evaluated.
-    """
+    """Return a behaviour in which conditions of effects on derived amounts are evaluated as far as they don't need a state."""
     if not behavior.changes & domain.aggregates.keys():
         return behavior
     known = frozenset(behavior.preconditions) if behavior.timing is None else frozenset[Condition]()

@@ -27,10 +27,7 @@ from confab.reasoner.symbols import (
 
 
 def with_extrema(conditions: Sequence[Condition], aggregates: Mapping[str, Aggregate]) -> tuple[Condition, ...]:
-    """Return equivalent conditions without comparisons with maxima and minima.
-
-    Each comparison becomes a witness: an individual that no other individual exceeds satisfies the comparison.
-    """
+    """Return equivalent conditions in which witnesses express the comparisons with maxima and minima."""
     return tuple(_with_extremum(condition, aggregates) for condition in conditions)
 
 

@@ -52,10 +52,7 @@ from confab.reasoner.symbols import (
 )
 
 MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts.
-
-A behaviour with this number of conditions takes about a second to compile.
-"""
+"""Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts (one second to compile)."""
 
 
 def kept(
@@ -191,11 +188,7 @@ class _Keeping:
                     yield self._candidate(effect, part.arguments, None, False)
 
     def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
-        """Return the candidate of an effect and a symbol.
-
-        If the effect is on all members of a class and a witness binds the symbol's argument, the candidate isn't restricted to a
-        member.
-        """
+        """Return the candidate of an effect and a symbol, without the member of a class if a witness binds this member."""
         effect = self.after.apart(effect)
         if effect.each is None:
             return _Candidate(effect, named, value, before)

@@ -51,10 +51,7 @@ TIME_LIMIT = 60.0
 
 @dataclass(frozen=True)
 class InterfaceCall:
-    """The robot's action that executes a behaviour.
-
-    Each argument of the action is a constant, or the position of a parameter of the behaviour, counted from 0.
-    """
+    """A robot's action that executes a behaviour; each argument is a constant or the position of a behaviour's parameter."""
 
     action: str
     arguments: Mapping[str, int | str]

@@ -1,7 +1,4 @@
-"""Validation rules on mechanisms: their joints, features, solids and places (`RULES`).
-
-Mechanisms with their own URDF file aren't checked.
-"""
+"""Validation rules on mechanisms without their own URDF file: joints, features, solids and places (`RULES`)."""
 
 from __future__ import annotations
 

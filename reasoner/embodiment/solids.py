@@ -27,10 +27,7 @@ REFINED = 24
 
 @dataclass(frozen=True)
 class Block:
-    """A box, cylinder or sphere in the world frame that belongs to an object, a link or furniture (`owner`).
-
-    `half` contains the half extents of a box; radius, radius and half height of a cylinder; or three times the radius of a sphere.
-    """
+    """A box, cylinder or sphere in the world frame, with its `owner`; `half` contains half extents, or radii of round kinds."""
 
     owner: str
     part: str

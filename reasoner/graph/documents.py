@@ -140,9 +140,7 @@ def as_trig(content: bytes, media_type: str, base: str) -> bytes:
 
 
 def plain_xml(content: bytes) -> bytes:
-    """Return an XML document whose document type contains only plain entities.
-
-    A document without a document type is returned unchanged.
+    """Return an XML document with only plain entities; a document without a document type is returned unchanged.
 
     >>> plain_xml(b'<!--<a>--><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
     b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'

@@ -444,11 +444,7 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
 
 
 def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
-    """Return the file of an imported ontology.
-
-    The ontology is looked up in the catalog beside the importing file, then in the shipped catalog, then by its name beside the
-    importing file.
-    """
+    """Return the file of an imported ontology: from the catalog beside the importer, the shipped catalog, or by its name."""
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):
         if catalog not in read:

@@ -1,8 +1,4 @@
-"""Extra predicates of an exported domain that express "no individual of a class has this value" without quantifiers.
-
-A predicate ``no_CLASS_has_TYPE`` of the value is used if at most one individual can have the value. For other values, the
-predicate ``not_TYPE`` of an individual and a value states that the individual doesn't have the value.
-"""
+"""Extra predicates of an exported domain that express "no individual of a class has this value" without quantifiers."""
 
 from __future__ import annotations
 
@@ -16,8 +12,9 @@ from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition
 class Kept:
     """The extra predicates that an export declares for the negative preconditions of its behaviours.
 
-    `contrary` maps a situation type to the values that need a ``not_TYPE`` predicate. `free` maps a class and a situation type
-    to the values that need a ``no_CLASS_has_TYPE`` predicate.
+    `contrary` maps a situation type to the values that need a predicate ``not_TYPE`` of an individual and the value. `free` maps a
+    class and a situation type to the values that need only a predicate ``no_CLASS_has_TYPE`` of the value, because at most one
+    individual can have the value.
     """
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
@@ -30,10 +27,7 @@ class Kept:
                     self.keep(behavior, *absent)
 
     def absent(self, condition: Condition) -> tuple[str, str, str] | None:
-        """Return class, situation type and value of a condition "no individual of the class has this value".
-
-        Return None for a condition of any other form.
-        """
+        """Return class, situation type and value of a condition "no individual of the class has this value"; else None."""
         match condition:
             case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
                 known = situation not in self.problem.domain.rules and not self.words.situations[situation].boolean

@@ -84,11 +84,7 @@ BASE = "https://w3id.org/confab/pddl/"
 
 @dataclass(frozen=True)
 class Place:
-    """The translation of a predicate to a situation type and a value.
-
-    `part` states which argument is the symbol's object and which argument is the value; `part` is None for a boolean situation
-    type. `value` is used if no argument is the value.
-    """
+    """The translation of a predicate: a situation type, the positions of object and value, and a value that is no argument."""
 
     situation: str
     part: Part | None = None
@@ -486,10 +482,7 @@ class _Import:
         return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
 
     def price(self, name: str) -> Expression | None:
-        """Return the cost of an action in the metric: the sum of its increases of functions, each times the function's weight.
-
-        Return None if the action increases no function of the metric.
-        """
+        """Return the cost of an action: the weighted sum of its increases of functions in the metric; None without increases."""
         found: Expression | None = None
         for effect in self.numeric[name]:
             if effect.function.head not in self.weights or effect.when or effect.variables:

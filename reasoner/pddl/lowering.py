@@ -71,10 +71,7 @@ CASES = 4
 
 @dataclass(frozen=True)
 class Action:
-    """A PDDL action for a behaviour.
-
-    `places` gives the position of each of the behaviour's parameters among the action's parameters. `needs` is the precondition.
-    """
+    """A PDDL action with the precondition `needs`; `places` are the positions of the behaviour's parameters in `parameters`."""
 
     behavior: Behavior
     parameters: tuple[Term, ...]
@@ -86,11 +83,7 @@ class Action:
 
 @dataclass
 class Scope:
-    """The variables of a behaviour or rule during its translation.
-
-    `names` are the used variable names, `parameters` the variables that become parameters, `values` the known values of symbols,
-    and `needs` the preconditions found so far.
-    """
+    """The variables of a behaviour or rule during its translation, the known values of symbols, and the preconditions."""
 
     kinds: Mapping[str, str]
     names: set[str] = field(default_factory=set)
@@ -174,11 +167,7 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return the formula that a boolean symbol is true.
-
-        The formula is an atom if the symbol isn't derived or its rules are recursive, and the disjunction of the rules' conditions
-        otherwise.
-        """
+        """Return the formula that a boolean symbol is true: the conditions of its rules, or an atom if they are recursive."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -477,10 +466,7 @@ class Lowering:
                     yield no(some(own, both([*its, outside])))
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
-        """Raise `KnowledgeError` if an effect may give a fractional value to an amount of whole numbers.
-
-        PDDL can't restrict a function to whole numbers.
-        """
+        """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers, which PDDL can't restrict."""
         situations = self.words.situations
         quantity = situations[effect.situation].quantity
         if quantity is None or not quantity.whole:

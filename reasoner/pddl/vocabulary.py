@@ -63,10 +63,7 @@ class Vocabulary:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the PDDL type of each class that becomes a type, and the supertype of each type.
-
-        Of overlapping classes, only the largest becomes a type, so that any two types are nested or disjoint.
-        """
+        """Return the PDDL type of each class that becomes a type (the largest of overlapping classes), and each supertype."""
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]

@@ -300,11 +300,7 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
 
 
 def _exceptions(name: str, constraint: Constraint, situation: SituationType) -> Aggregate:
-    """Return the aggregate that counts the violations of a constraint.
-
-    True symbols violate a constraint that a situation type is never true; false symbols violate a constraint that it is always
-    true.
-    """
+    """Return the aggregate that counts the violations of a constraint, which are the symbols with the wrong truth value."""
     variables = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(situation.arguments))
     true = ValueCondition(situation.name, tuple(one.name for one in variables), TRUE, constraint.always)
     return Aggregate(name, "count", Fraction(1), (), variables, (true,))
@@ -362,12 +358,7 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` if a behaviour is inconsistent.
-
-    - Two terms of the behaviour must not have the same name.
-    - Every condition and effect must have as many arguments as its situation type.
-    - Every situation type must exist on the behaviour's level.
-    """
+    """Raise `KnowledgeError` for terms with equal names, wrong numbers of arguments, or situation types unknown on the level."""
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
         raise KnowledgeError(

@@ -43,9 +43,7 @@ BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pat
 
 
 def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
-    """Return a problem with the given goals instead of the task's goals on the same symbols.
-
-    Each goal is a text such as ``cup2 LOCATION location8``.
+    """Return a problem with the given goals, such as ``cup2 LOCATION location8``, instead of the task's goals on these symbols.
 
     Raises
     ------

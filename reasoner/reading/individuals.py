@@ -46,10 +46,7 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Read all facts about some individuals and about the members of some classes, and return the new triples.
-
-        `back` maps a property to individuals; facts with these individuals as the property's value are read, too.
-        """
+        """Return the triples about individuals, about members of classes, and about subjects with given values of properties."""
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, targets in (back or {}).items():
             if not targets:

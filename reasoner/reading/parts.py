@@ -294,10 +294,7 @@ class Parts(NodeReader):
         return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
-        """Return a rule of a situation type whose arguments have the given classes.
-
-        An individual among the rule's arguments becomes a parameter with an equality condition.
-        """
+        """Return a rule; an individual among its arguments becomes a parameter of its class in `kinds` and an equality."""
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")

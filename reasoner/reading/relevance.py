@@ -70,9 +70,7 @@ class Routes:
 
 
 def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
-    """Return the planning problem of the individuals that a scene's task can need.
-
-    The number of queries doesn't depend on the number of individuals.
+    """Return the planning problem of the individuals that a scene's task can need, by a bounded number of queries.
 
     Parameters
     ----------
@@ -374,10 +372,7 @@ class _Search(Individuals):
     """The individuals that task recognition has read, and the search along routes."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes from the first individuals until no new individual is found.
-
-        The first `ROUNDS` queries follow the routes by one step each; then one query follows a property path.
-        """
+        """Follow the routes until no new individual is found: by one step per query, after `ROUNDS` queries by a path."""
         reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):
@@ -416,10 +411,7 @@ class _Search(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read all individuals that the routes reach from a frontier.
-
-        A property path doesn't treat constants separately, so it may reach more individuals than necessary.
-        """
+        """Read all individuals that the routes reach from a frontier, and possibly more, because a path ignores constants."""
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
             node = "|".join(f"<{p}>" for p in PLACES)

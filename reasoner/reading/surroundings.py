@@ -32,9 +32,7 @@ Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
 
 
 class Surroundings:
-    """A growing set of a scene's individuals with all their facts.
-
-    Initially, it contains the individuals of a slice, the members of classes in goals, and the constants.
+    """A growing set of a scene's individuals with their facts: initially a slice, the members of goal classes, and constants.
 
     Attributes
     ----------

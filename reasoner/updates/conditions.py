@@ -41,10 +41,7 @@ class Conditions:
         return [self.witness(group, known, at)]
 
     def witness(self, group: Group, known: Collection[str], at: int) -> str:
-        """Return the outermost of the nested witnesses for the variables that a group introduces.
-
-        Each condition is put into the outermost witness in which all of its variables are bound.
-        """
+        """Return the outermost of the nested witnesses for a group's variables, with each condition as far outside as possible."""
         inside = {*known, *group.names}
         names = list(group.chosen)
         depth = {name: level for level, name in enumerate(names)}

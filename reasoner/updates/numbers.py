@@ -95,11 +95,7 @@ class Numbers:
         return node
 
     def side(self, node: str, name: str, side: Side, at: int) -> None:
-        """Add an operand to a comparison, calculation or effect node.
-
-        An amount as the left operand and a number as the right operand are properties of the node itself. Other operands become
-        separate nodes.
-        """
+        """Add an operand to a node: as properties (an amount on the left, a number on the right) or as a separate node."""
         if name == "left" and isinstance(side, Measured):
             self.nodes.said[node] |= side.properties
             return

@@ -75,11 +75,7 @@ class Operation:
 
 @dataclass(frozen=True)
 class Construction:
-    """``CONSTRUCT { head } WHERE { … }``.
-
-    For a SELECT in WHERE, `function` is the aggregate, `argument` its operand, `name` the variable of its result, and `grouped` the
-    variables of GROUP BY.
-    """
+    """``CONSTRUCT { head } WHERE { … }``; for a SELECT in WHERE, the other fields describe its aggregate and GROUP BY."""
 
     head: Triple
     where: Sequence[Any]

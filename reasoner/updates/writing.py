@@ -309,10 +309,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of a disjunction that only enumerates the variable's possible individuals.
-
-    Return None for any other disjunction.
-    """
+    """Return the variable and the individuals of a disjunction that only enumerates individuals; None for any other."""
     found: list[str] = []
     name = ""
     for group in alternatives:

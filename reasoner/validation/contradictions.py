@@ -32,10 +32,7 @@ Clash = tuple[Condition, Condition]
 
 
 def contradictions(case: Case) -> Iterator[Fault]:
-    """Find behaviours, effects and rules with contradictory conditions.
-
-    A contradiction that several behaviours inherit is reported once.
-    """
+    """Find behaviours, effects and rules with contradictory conditions; an inherited contradiction is reported once."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

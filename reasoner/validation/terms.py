@@ -71,10 +71,7 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return the nodes that mention undeclared terms or relative IRIs, and the nodes that mention these nodes.
-
-    Other faults of these nodes may be consequences of the undeclared term.
-    """
+    """Return the nodes that mention undeclared terms or relative IRIs, directly or through another node."""
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value
