@@ -336,7 +336,7 @@ class _Keeping:
 
 
 def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Condition, bool]]:
-    """Yield a condition and all conditions inside it, each with whether the whole needs it to hold rather than not to hold."""
+    """Yield a condition and all conditions inside it, each with whether it occurs positively (not under a negation)."""
     wanted = wanted is not condition.negated
     yield condition, wanted
     for group in groups(condition):
