@@ -1,8 +1,8 @@
 """Detection of impossible states, with the same messages for all sources of states.
 
-Facts come from files, callers, observations, interventions and the blackboard. A value must belong to its situation type, an
-amount must be within its bounds, and an exclusive value may belong to only one individual. A symbol without a value is unknown,
-which is allowed.
+Facts come from files, callers, observations, interventions and the board in notebooks. A value must belong to its situation type,
+an amount must be within its bounds, and an exclusive value may belong to only one individual. A symbol without a value is
+unknown, which is allowed.
 """
 
 from __future__ import annotations

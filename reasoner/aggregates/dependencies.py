@@ -65,7 +65,7 @@ def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -
 
 
 def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
-    """Return an equivalent aggregate whose conditions contain no derived situation types, but their definitions.
+    """Return an equivalent aggregate whose conditions contain the definitions of derived situation types instead of these types.
 
     Raises
     ------

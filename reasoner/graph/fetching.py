@@ -1,4 +1,4 @@
-"""Download of ontologies from the web on request; each ontology becomes a local file that the catalog maps its IRI to.
+"""Download of ontologies from the web on request; the catalog maps the IRI of an ontology to the downloaded file.
 
 Loading itself never uses the network. A downloaded document is stored only if it is RDF of bounded size, has no external or
 recursive entities, imports no file paths, and is an ontology with the requested IRI.

@@ -169,7 +169,7 @@ class Tally:
 
 @dataclass
 class Lesson:
-    """What was learned in one episode: items and their tallies; `personal` contains preferences between individuals."""
+    """The items that were learned in one episode, with their tallies; `personal` contains preferences between individuals."""
 
     said: list[Said] = field(default_factory=list)
     counted: list[tuple[Said, Fact, Tally]] = field(default_factory=list)

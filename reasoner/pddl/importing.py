@@ -78,7 +78,7 @@ THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
 REACH_GOAL = "reach-goal"
 WORLD, THE_WORLD = "World", "the_world"
-"""The class of the individual that takes the place of the argument of a predicate without arguments, and this individual."""
+"""The class and the individual that are the argument of situation types for predicates without arguments."""
 BASE = "https://w3id.org/confab/pddl/"
 
 

@@ -1,8 +1,8 @@
 """Parser of PDDL texts, which checks all declarations and formulas.
 
 The supported subset contains types, constants, predicates, functions, actions with conditional and quantified effects, durative
-actions, derived predicates, action costs, timed initial literals and ``always`` constraints. Other constructs are rejected by
-name. Every error states file, line and column.
+actions, derived predicates, action costs, timed initial literals, ``always`` constraints and goal preferences. Other constructs
+are rejected by name. Every error states file, line and column.
 
 The parser of unified-planning isn't used, because that parser reports an undefined type as a ``KeyError`` without a message,
 states no position for half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.

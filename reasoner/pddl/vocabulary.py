@@ -28,7 +28,7 @@ sometime sometime-after sometime-before start total-cost total-time types undefi
 class Vocabulary:
     """Mapping from the names of a problem to PDDL names.
 
-    No PDDL name denotes both a type and an object, because some parsers have one table for all names.
+    All PDDL names are different, even those of a type and an object, because some parsers have one table for all names.
     """
 
     def __init__(self, problem: Problem) -> None:

@@ -114,7 +114,7 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether conditions replace a class because its members change or OWL 2 RL doesn't find all of them."""
+        """Return whether conditions are used instead of a class: its members change, or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
 
     @cached_property

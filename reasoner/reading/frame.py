@@ -74,7 +74,7 @@ class Frame:
     """The domain of a problem and the classes of some individuals: everything in a problem except its facts and its goal.
 
     `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values.
-    `lifted` contains the behaviours in which an effect may be on all members of a class.
+    `lifted` contains the behaviours before effects on all members of a class are expanded.
     """
 
     schema: Schema

@@ -46,7 +46,7 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Return the triples about individuals, about members of classes, and about subjects with given values of properties."""
+        """Read and return the triples about individuals, members of classes, and subjects with given values of properties."""
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, targets in (back or {}).items():
             if not targets:

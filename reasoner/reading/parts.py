@@ -282,7 +282,7 @@ class Parts(NodeReader):
         return self.seconds(iri, "duration")
 
     def seconds(self, iri: str, name: str) -> Fraction | None:
-        """Return a property's value, a duration, in seconds; return None if the property has no value."""
+        """Return the value of a property, which is a duration, in seconds; return None if the property has no value."""
         if not self.values(iri, name):
             return None
         found = seconds_of(self.one(iri, name))
@@ -294,7 +294,7 @@ class Parts(NodeReader):
         return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
-        """Return a rule; an individual among its arguments becomes a parameter of its class in `kinds` and an equality."""
+        """Return a rule; an individual among its arguments is replaced by a new parameter with an equality condition."""
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")

@@ -372,7 +372,7 @@ class _Search(Individuals):
     """The individuals that task recognition has read, and the search along routes."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes until no new individual is found: by one step per query, after `ROUNDS` queries by a path."""
+        """Follow the routes until no new individual is found, by `ROUNDS` queries of one step each and then by a property path."""
         reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):

@@ -82,7 +82,7 @@ class Surroundings:
 
     @property
     def lifted(self) -> Mapping[str, Behavior]:
-        """The behaviours in which an effect may be on all members of a class."""
+        """The behaviours before effects on all members of a class are expanded."""
         return self.frame.lifted
 
     def problem(self) -> Problem:

@@ -233,7 +233,7 @@ def _words(condition: Condition, behavior: Behavior) -> str:
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects with values that no behaviour of the next level produces although it changes the situation type."""
+    """Find effects whose values no behaviour of the next level gives, if that level has effects on the situation type."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -54,7 +54,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state of a value in which no individual has it: a symbol of the value is in the class `kind`, or equals `value`."""
+    """A state of a value that excludes a holder: the `situation` of the value is a member of `kind`, or equals `value`."""
 
     situation: str
     kind: str

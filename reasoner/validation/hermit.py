@@ -266,7 +266,7 @@ class _ClassWriter:
         return _all(parts)
 
     def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
-        """Yield the class expression for a condition if it is about the term and has one."""
+        """Yield the class expression that is equivalent to a condition on the term; yield none for other conditions."""
         match condition:
             case ValueCondition(situation, (about,), value, negated) if about == name:
                 iri = self.properties.get(self.reading.names.iri(situation))
