@@ -24,14 +24,17 @@ from worlds.mixed import RandomWorld, drawn
 
 PARTS: dict[str, tuple[tuple[str, ...], str]] = {
     "recognition": (("reasoner/reading/relevance.py",), "guarded"),
+    "proofs": (("planner/hierarchical/unsolvability.py", "planner/certifying.py"), "guarded"),
     "checker of plans": (
         ("planner/validation.py", *sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))),
         "checker",
     ),
     "checker of certificates": (("planner/certificate_checks.py", "planner/possibilities.py"), "certificates"),
-    "proofs": (("planner/hierarchical/unsolvability.py", "planner/certifying.py"), "guarded"),
 }
-"""The modules of each part, and the mode in which worlds are judged."""
+"""The modules of each part, and the mode in which worlds are judged.
+
+Proofs are judged in worlds without a plan. To give up in such a world is a fault of a proof.
+"""
 FIRST, WORLDS, SECONDS = 8_000_000, 150, 60
 Drawn = tuple[RandomWorld, Interpreter]
 
@@ -120,7 +123,7 @@ def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> 
             said = {
                 f"{world.seed} {one.kind} {one.mode}"
                 for one in (*its.complaints, *its.remarks)
-                if one.kind != "gave-up"
+                if one.kind != "gave-up" or hopeless(meant)
             }
             found |= said | {f"{world.seed} judged"}
             if any(map(enough, said)):

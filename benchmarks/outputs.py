@@ -13,12 +13,18 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
+from functools import cache
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from shutil import copy, copytree
+from threading import Thread
 
 from confab.authoring import new_domain
 from confab.cli import main as confab
+from confab.history import RECORD, record
+from confab.page.data import page_data
 from confab.reasoner.kinds import (
     CONSTRUCTED,
     CONVERTED,
@@ -28,16 +34,25 @@ from confab.reasoner.kinds import (
     GENERATED,
     IMPORTED,
     MEMORY,
+    OBSERVED,
     PICTURE,
     PLAN,
+    PROBLEM,
     REPORT,
     ROWS,
+    RUN,
+    TRAJECTORIES,
+    TREE,
+    TRIPLES,
     VERDICTS,
 )
+from confab.reasoner.vocabulary import OWL
+from confab.scene import load
 
-SCENE = "tearoom-scene.ttl"
+SCENE, FOLDER = "tearoom-scene.ttl", "HERE"
+"""The scene of the commands, and the word for the folder in which they work."""
 COLUMNS = "SELECT ?thing WHERE { ?thing a owl:NamedIndividual } ORDER BY ?thing"
-TRIPLES = "CONSTRUCT WHERE { ?thing a owl:NamedIndividual }"
+CONSTRUCTION = "CONSTRUCT WHERE { ?thing a owl:NamedIndividual }"
 
 
 @dataclass(frozen=True)
@@ -54,33 +69,51 @@ class Door:
         The kind of output.
     physics : bool
         Whether it takes a rollout, so that only refusals are tried.
+    new : bool
+        Whether it replaces nothing, not even its own file.
     """
 
     call: str
     file: str
     kind: str
     physics: bool = False
+    new: bool = False
 
     @property
     def name(self) -> str:
         """The command and its option."""
-        words = [word for word in self.call.split() if word in ("merge", "trust", "migrate") or word.startswith("-")]
-        command = self.call.split()[0]
-        options = [word for word in words if word.startswith("-") and self.call.split(word)[1].split()[0] == "OUT"]
-        middle = [word for word in words if not word.startswith("-")]
-        return " ".join([command, *middle, *options])
+        command, *words = self.call.split()
+        middle = [word for word in words if word in ("merge", "trust", "migrate")]
+        into = [f"{option} {'' if place == 'OUT' else Path(self.file).name}".strip() for option, place in pairwise(words)
+                if option.startswith("-") and place in ("OUT", FOLDER, "into")]  # fmt: skip
+        return " ".join([command, *middle, *into])
 
 
 DOORS = (
     Door(f"plan {SCENE} --report OUT", "out.html", REPORT),
     Door(f"plan {SCENE} -o OUT", "out.json", PLAN),
-    Door("run one-arm-serving --no-video -o .", "report.html", REPORT, physics=True),
+    *(
+        Door("run one-arm-serving --memory memory.ttl -o HERE", file, kind, physics=True)
+        for file, kind in {
+            "plan.json": PLAN,
+            "report.html": REPORT,
+            "verify.json": VERDICTS,
+            "observed.ttl": OBSERVED,
+            "run.mp4": FILM,
+            RECORD: RUN,
+        }.items()
+    ),
+    Door("run one-arm-serving --memory OUT -o kept", "out.ttl", MEMORY, physics=True),
+    Door(f"report {SCENE} -o OUT", "out.html", REPORT),
+    Door("runs kept -o OUT", "out.html", REPORT),
     Door("verify one-arm-serving plan.json -o OUT", "out.json", VERDICTS, physics=True),
     Door("verify one-arm-serving plan.json --video OUT", "out.mp4", FILM, physics=True),
     Door(f"execute {SCENE} --save OUT", "out.ttl", EPISODE),
     Door(f"execute {SCENE} --report OUT", "out.html", REPORT),
+    Door(f"execute {SCENE} --learn --memory OUT", "out.ttl", MEMORY),
     Door(f"explain {SCENE} --memory memory.ttl --plot OUT", "out.png", PICTURE),
     Door(f"query {SCENE} QUERY -o OUT", "out.csv", ROWS),
+    Door(f"query {SCENE} CONSTRUCT --format turtle -o OUT", "out.txt", TRIPLES),
     Door(f"query {SCENE} CONSTRUCT -o OUT", "out.ttl", CONSTRUCTED),
     Door(f"learn {SCENE} --memory OUT", "out.ttl", MEMORY),
     Door(f"learn {SCENE} --memory other.ttl --rounds 1 --plot OUT", "out.png", PICTURE),
@@ -91,7 +124,15 @@ DOORS = (
     Door("generate served -o OUT", "out.ttl", GENERATED),
     Door("convert tearoom.ttl --behaviors sparql -o OUT", "out.ttl", CONVERTED),
     Door("import domain.pddl problem.pddl -o OUT", "out.ttl", IMPORTED),
-    Door(f"export {SCENE} -o .", "domain.pddl", DOMAIN),
+    Door(f"export {SCENE} -o HERE", "domain.pddl", DOMAIN),
+    Door(f"export {SCENE} -o HERE", "problem.pddl", PROBLEM),
+    Door(f"export {SCENE} --bt -o HERE", "tree.xml", TREE),
+    Door(f"export {SCENE} --bt -o HERE", "tree.py", TREE),
+    Door("export one-arm-serving --trajectory -o OUT", "out.json", TRAJECTORIES, physics=True),
+    Door("new workshop -o into", "into/workshop.ttl", "a new domain", new=True),
+    Door("new workshop -o into", "into/workshop-scene.ttl", "a new scene", new=True),
+    Door("new workshop -o into", "into/catalog-v001.xml", "a new catalog", new=True),
+    Door("fetch ADDRESS -o HERE", "fetched.ttl", "a fetched ontology", new=True),
 )
 MADE = {  # the commands that create the files of each kind
     MEMORY: f"learn {SCENE} --memory memory.ttl",
@@ -129,13 +170,37 @@ def inside(folder: Path) -> Iterator[None]:
 
 def call(words: str) -> int:
     """Run a command in this process and return its exit code."""
-    queries = {"QUERY": COLUMNS, "CONSTRUCT": TRIPLES}
+    said = {"QUERY": COLUMNS, "CONSTRUCT": CONSTRUCTION, FOLDER: "."}
+    if "ADDRESS" in words:
+        said["ADDRESS"] = f"http://127.0.0.1:{web().server_port}/fetched"
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         try:
-            confab([queries.get(word, word) for word in words.split()])
+            confab([said.get(word, word) for word in words.split()])
         except SystemExit as end:
             return int(end.code or 0)
     return 0
+
+
+class Ontologies(BaseHTTPRequestHandler):
+    """Answers every request with an ontology of that address."""
+
+    def do_GET(self) -> None:
+        """Send an ontology."""
+        self.send_response(200)
+        self.send_header("Content-Type", "text/turtle")
+        self.end_headers()
+        self.wfile.write(f"<http://{self.headers['Host']}{self.path}> a <{OWL}Ontology> .\n".encode())
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Log nothing."""
+
+
+@cache
+def web() -> HTTPServer:
+    """Return a server of ontologies on this machine."""
+    server = HTTPServer(("127.0.0.1", 0), Ontologies)
+    Thread(target=server.serve_forever, daemon=True).start()
+    return server
 
 
 def prepare(folder: Path) -> None:
@@ -148,6 +213,10 @@ def prepare(folder: Path) -> None:
         Path("edited.ttl").write_text(Path("generated.ttl").read_text().replace("@prefix", "# mine\n@prefix", 1))
         os.mkfifo("pipe")
         Path("folder").mkdir()
+        Path("into").mkdir()
+        Path("kept/001").mkdir(parents=True)
+        loaded = load(SCENE)
+        record(Path("kept/001"), page_data(loaded, loaded.plan()), {}, "")
 
 
 def answers(door: Door, whole: Path, there: tuple[str, ...] = THERE) -> Iterator[tuple[str, str]]:
@@ -168,8 +237,8 @@ def _answer(door: Door, what: str) -> str:
     own = what in ("its own", "read-only")
     if own and door.physics:
         out.write_text("another's")
-    elif own and door.call.startswith("memory") and "merge" not in door.call:
-        _put("memory", out)
+    elif own and door.kind == MEMORY and "learn" not in door.call.split()[0] and "merge" not in door.call:
+        _put("memory", out)  # which these commands change
     elif own:
         call(words)
     else:
@@ -193,7 +262,7 @@ def _put(what: str, out: Path) -> None:
     if what in FILES:
         copy(FILES[what], out)
     elif what == "link":
-        out.symlink_to(SCENE)
+        out.symlink_to(Path(SCENE).absolute())
     elif what == "hard link":
         out.hardlink_to(SCENE)
     elif what == "folder":

@@ -1,10 +1,15 @@
 """An output is never an input: what is not of the kind that is about to be written is never replaced."""
 
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from click import Command, Group
 
 from benchmarks.outputs import DOORS, FILES, KIND_OF, LINKS, Door, answers, call, inside, prepare
+from confab.cli import COMMANDS
+from confab.commands.options import Output
 from confab.reasoner.files import check_replaceable, write_whole
 from confab.reasoner.kinds import GENERATED, MEMORY, PLAN, REPORT, kind_of, stamped
 
@@ -20,8 +25,28 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_command_replaces_only_what_is_of_the_kind_that_it_writes(door: Door, whole: Path) -> None:
     there = (*FILES, *LINKS, "folder", "pipe", "read-only", "its own")
     for what, answer in answers(door, whole, there):
-        replaced = what == "its own" or KIND_OF.get(what) == door.kind
+        replaced = (what == "its own" and not door.new) or KIND_OF.get(what) == door.kind
         assert answer in (("replaced", "made") if replaced else ("refused",)), (what, answer)
+
+
+def outputs(name: str, command: Command) -> Iterator[set[str]]:
+    """Yield the names of each output of a command, as the command line states them."""
+    if isinstance(command, Group):
+        for word, one in command.commands.items():
+            yield from outputs(f"{name} {word}", one)
+    for one in command.params:
+        if isinstance(one.type, Output) or "-o" in one.opts:
+            yield {f"{name} {option}" if option.startswith("-") else name for option in one.opts}
+
+
+def test_every_output_of_every_command_is_tried() -> None:
+    tried = {door.name.removesuffix(f" {Path(door.file).name}") for door in DOORS}
+    commands = {
+        name: getattr(import_module(f"confab.commands.{module}"), it) for name, (module, it) in COMMANDS.items()
+    }
+    found = [names for name, command in commands.items() for names in outputs(name, command)]
+    assert len(found) > 20
+    assert [names for names in found if not names & tried] == []
 
 
 def test_the_message_says_what_is_there_what_was_to_be_written_and_what_to_do(
