@@ -35,7 +35,8 @@ PARTS: dict[str, tuple[tuple[str, ...], str]] = {
 
 Proofs are judged in worlds without a plan. To give up in such a world is a fault of a proof.
 """
-FIRST, WORLDS, SECONDS = 8_000_000, 150, 60
+FIRST, WORLDS, SECONDS, WAITING = 8_000_000, 150, 60, 600.0
+"""The worlds; the CPU seconds of all of them, and the seconds of the clock of a call, which matter only on a busy machine."""
 Drawn = tuple[RandomWorld, Interpreter]
 
 
@@ -114,12 +115,13 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
 
 def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
     """Judge worlds in one mode until a fault suffices; return the faults, and the ending of each call."""
-    from worlds.judging import Judge
+    from worlds import judging
 
+    judging.SECONDS = WAITING
     found: set[str] = set()
     with TemporaryDirectory() as folder:
         for world, meant in worlds:
-            its = Judge(world, Path(folder), only=mode, meant=meant).judged()
+            its = judging.Judge(world, Path(folder), only=mode, meant=meant).judged()
             said = {
                 f"{world.seed} {one.kind} {one.mode}"
                 for one in (*its.complaints, *its.remarks)

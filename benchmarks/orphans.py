@@ -1,4 +1,4 @@
-"""Commands that start processes, ended at any moment by kill -9, a crash or Ctrl-C: how many processes they leave behind.
+"""Every command, ended at any moment by kill -9, a crash or Ctrl-C: how many processes it leaves behind.
 
 python -m benchmarks.orphans             50 moments for each command and each end, as docs/figures/promises.md quotes them
 python -m benchmarks.orphans query 5     so many for one command
@@ -6,7 +6,9 @@ python -m benchmarks.orphans query 5     so many for one command
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
+import json
 import os
 import signal
 import sys
@@ -14,12 +16,13 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from uuid import uuid4
 
-from confab.authoring import new_domain
+from benchmarks.outputs import SCENE, prepare
 from confab.cli import main as confab
 from confab.scene import load
 
@@ -27,14 +30,18 @@ ENDS = {"kill -9": signal.SIGKILL, "crash": signal.SIGSEGV, "Ctrl-C": signal.SIG
 MOMENTS = 50
 GRACE = 2.0
 """Seconds after the end of a command in which its processes have to end."""
-LONGEST = 1.5
-"""Seconds of a command over which the moments are spread, from its start on."""
+LONGEST, LATEST = 1.5, 10.0
+"""The moments are spread from the start of a command to its end, but at most to so many seconds after it first has a process, and
+after its start."""
 MARK = "CONFAB_ORPHANS"
 """Environment variable that marks the processes of a command."""
+ADOPT = 36
+"""PR_SET_CHILD_SUBREAPER of Linux: processes whose parent has ended become children of this process."""
 CROSS = "SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }"
 
 
 IMPORTED = (
+    "confab.agents",
     "confab.engines",
     "confab.serving",
     "confab.reasoner.validation.validate",
@@ -43,30 +50,79 @@ IMPORTED = (
     "confab.sim.rollouts",
 )
 """Imports of the commands, done once for all."""
+CALLS = (
+    "verify one-arm-serving arm.json --rollouts 4 --workers 2 --perturb",
+    "verify one-arm-serving arm.json --video NEW.mp4",
+    "plan beverage-serving --engine fast-downward",
+    f"validate {SCENE} --deep",
+    "plan wide.jsonld",
+    f"plan {SCENE}",
+    "run one-arm-serving -o NEW",
+    f"report {SCENE} -o NEW.html",
+    "runs kept",
+    "verify one-arm-serving arm.json",
+    f"execute {SCENE}",
+    f"execute {SCENE} --serve 0",
+    "execute one-arm-serving --world pybullet",
+    f"explain {SCENE}",
+    f"learn {SCENE} --memory NEW.ttl",
+    "memory show memory.ttl",
+    "memory merge memory.ttl -o NEW.ttl",
+    "memory trust memory.ttl all",
+    "memory migrate memory.ttl B1_CARRY=B1_BRING",
+    "new workshop -o NEW",
+    "fetch http://127.0.0.1:9/nothing -o NEW",
+    f"picture {SCENE} --classes -o NEW.png",
+    f"validate {SCENE}",
+    "generate served --objects 100 -o NEW.ttl",
+    "convert tearoom.ttl --behaviors sparql -o NEW.ttl",
+    "import domain.pddl problem.pddl -o NEW.ttl",
+    f"export {SCENE} -o NEW",
+    "export one-arm-serving --trajectory -o NEW.json",
+)
+"""Calls of all commands but query, serve and mcp."""
 
 
 def commands(folder: Path) -> dict[str, Callable[[], object]]:
-    """Return the commands with their arguments; their files are written into a folder."""
+    """Return the commands, by their calls; the files that they read are written into a folder."""
     for module in (*IMPORTED, *(["unified_planning.shortcuts"] if find_spec("unified_planning") else [])):
         import_module(module)
-    new_domain("tearoom", folder)
-    scene = folder / "tearoom-scene.ttl"
-    plan = load("one-arm-serving").plan().save(folder / "plan.json")
+    prepare(folder)
+    load("one-arm-serving").plan().save(folder / "arm.json")
     terms = ",".join(f'"t{i}": "urn:t{i}"' for i in range(3_000))
     level = '{"@context": {"x": "urn:x"}, "@id": "urn:b", "t2":'
-    wide = folder / "wide.jsonld"
-    wide.write_text(f'{{"@context": {{{terms}}}, "@id": "urn:a", "t1":' + level * 400 + "1" + "}" * 401)
-    rollouts = ["verify", "one-arm-serving", str(plan), "--rollouts", "4", "--workers", "2", "--perturb"]
-    film = ["verify", "one-arm-serving", str(plan), "--video", str(folder / "film.mp4")]
+    wide = f'{{"@context": {{{terms}}}, "@id": "urn:a", "t1":' + level * 400 + "1" + "}" * 401
+    (folder / "wide.jsonld").write_text(wide)
+
+    def command(words: Sequence[str]) -> Callable[[], object]:
+        def run() -> None:
+            os.chdir(folder)
+            confab([word.replace("NEW", f"new-{os.getpid()}") for word in words])
+
+        return run
+
     return {
-        "query": lambda: confab(["query", str(scene), CROSS]),
-        "serve": lambda: served(scene),
-        "verify --workers": lambda: confab(rollouts),
-        "verify --video": lambda: confab(film),
-        "plan --engine": lambda: confab(["plan", "beverage-serving", "--engine", "fast-downward"]),
-        "plan of JSON-LD": lambda: confab(["plan", str(wide)]),
-        "validate --deep": lambda: confab(["validate", str(scene), "--deep"]),
+        "query": command(["query", SCENE, CROSS]),
+        "serve": lambda: served(folder / SCENE),
+        "mcp": lambda: by_an_agent(folder),
+        **{call: command(call.split()) for call in CALLS},
     }
+
+
+def by_an_agent(folder: Path) -> None:
+    """Serve an agent that asks a slow query and waits."""
+    hello = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "orphans", "version": "1"}}
+    asked = {"name": "query", "arguments": {"scene": SCENE, "sparql": CROSS, "seconds": 300}}
+    messages: list[dict[str, object]] = [
+        {"id": 1, "method": "initialize", "params": hello},
+        {"method": "notifications/initialized"},
+        {"id": 2, "method": "tools/call", "params": asked},
+    ]
+    reading, writing = os.pipe()
+    os.dup2(reading, 0)
+    for message in messages:
+        os.write(writing, (json.dumps({"jsonrpc": "2.0", **message}) + "\n").encode())
+    confab(["mcp", str(folder)])
 
 
 def served(scene: Path) -> None:
@@ -116,34 +172,55 @@ def marked(mark: str) -> list[int]:
     return found
 
 
+def below(process: int) -> set[int]:
+    """Return the processes that run and descend from a process."""
+    found: set[int] = set()
+    try:
+        children = [task.read_text().split() for task in Path(f"/proc/{process}/task").glob("*/children")]
+    except OSError:  # it has just ended
+        return found
+    for child in (int(number) for numbers in children for number in numbers):
+        with suppress(OSError):
+            if Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                found.add(child)
+        found |= below(child)
+    return found
+
+
 def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple[int, int]:
     """End a command after a time; return the numbers of processes that it had started and that are left."""
     mark = os.environ[MARK] = uuid4().hex
+    before = below(os.getpid())
     child = begun(run)
     time.sleep(after)
-    there = len(marked(mark))
+    there = len({*marked(mark), *below(child)})
     (os.killpg if sign == signal.SIGINT else os.kill)(child, sign)
     os.waitpid(child, 0)
     until = time.monotonic() + GRACE
-    while (rest := marked(mark)) and time.monotonic() < until:
+    while (rest := {*marked(mark), *below(os.getpid())} - before) and time.monotonic() < until:
         time.sleep(0.02)
     for orphan in rest:
         os.kill(orphan, signal.SIGKILL)
+    with suppress(ChildProcessError):  # none was left, or adopted
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
     return there, len(rest)
 
 
 def length(run: Callable[[], object]) -> float:
-    """Return the seconds that a command takes, up to the longest that is looked at."""
-    begin = time.monotonic()
+    """Return the seconds of a command over which the moments are spread."""
+    begin, end = time.monotonic(), LATEST
     os.environ[MARK] = uuid4().hex
     child = begun(run)
-    while time.monotonic() - begin < LONGEST:
+    while (passed := time.monotonic() - begin) < end:
         if os.waitpid(child, os.WNOHANG)[0]:
-            return time.monotonic() - begin
+            return passed
+        if end == LATEST and below(child):
+            end = passed + LONGEST
         time.sleep(0.01)
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return LONGEST
+    return end
 
 
 def trials(run: Callable[[], object], sign: signal.Signals, moments: int) -> tuple[int, int]:
@@ -157,12 +234,14 @@ def trials(run: Callable[[], object], sign: signal.Signals, moments: int) -> tup
 
 def main(arguments: Sequence[str] = ()) -> int:
     """Print the table; return 1 if any process was left."""
+    if ctypes.CDLL(None, use_errno=True).prctl(ADOPT, 1, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "orphans can't be adopted here")
     moments, worst = int(arguments[1]) if len(arguments) > 1 else MOMENTS, 0
     head = [f"{end}: of {moments} moments with processes | left" for end in ENDS]
     print(f"| command | {' | '.join(head)} |\n|---|{'---|' * 2 * len(ENDS)}")
     with tempfile.TemporaryDirectory() as name:
         for command, run in commands(Path(name)).items():
-            if arguments and arguments[0] != command:
+            if arguments and not f"{command} ".startswith(f"{arguments[0]} "):
                 continue
             found = [trials(run, sign, moments) for sign in ENDS.values()]
             worst += sum(orphans for _, orphans in found)

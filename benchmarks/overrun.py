@@ -67,8 +67,20 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("run", "BODIES", "--no-video", "-o", "NEW"),
     ("verify", TABLE, "PLAN.json", "--rollouts", "100"),
     ("verify", TABLE, "PLAN.json", "--rollouts", "100", "--workers", "2"),
+    ("verify", TABLE, "PLAN.json", "--rollouts", "100", "--video", "NEW.mp4"),
+    ("report", "SCENE", "-o", "NEW.html"),
+    ("execute", "BODIES", "--world", "pybullet", "--both-hands"),
+    ("explain", "SCENE", "--plot", "NEW.png"),
+    ("learn", "SCENE", "--memory", "NEW.ttl", "--rounds", "3"),
+    ("validate", "LARGE", "--deep"),
+    ("export", "SCENE", "--bt", "-o", "NEW"),
+    ("export", "BODIES", "--trajectory", "-o", "NEW.json"),
+    ("import", "domain.pddl", "problem.pddl", "-o", "NEW.ttl"),
 )
-"""Commands and where each is tried: in hard scenes, each beginning with another one (SCENE), in those above, or in one."""
+"""All commands with a time limit, and where each is tried.
+
+SCENE: in hard scenes, each beginning with another one; otherwise in those above, or in one.
+"""
 CALLS: tuple[tuple[str, str], ...] = (
     ("SCENE", "scene.plan(time_limit=S)"),
     ("SCENE", "scene.plan(time_limit=S, engine='none')"),
@@ -84,6 +96,8 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("LARGE", "within: confab.load(scene.knowledge.path)"),
     ("LARGE", "within: scene.affordances()"),
     ("SCENE", "within: scene.query(EVERY)"),
+    ("SCENE", "scene.query(EVERY, limits=QueryLimits(seconds=S))"),
+    ("SCENE", "scene.construct(ALL, NEW, limits=QueryLimits(seconds=S))"),
     ("LARGE", "within: confab.validate(scene.knowledge.path)"),
     ("LARGE", "within: scene.problem"),
 )
@@ -102,9 +116,12 @@ Deadline.after = classmethod(after)
 COMMAND = "from confab.start import main; main()"
 CALL = """
 import confab
+from confab.reasoner.graph.query_process import QueryLimits
 scene, EVERY, S = confab.load(sys.argv[1]), sys.argv[2], SECONDS
+ALL, NEW = EVERY.replace("SELECT (COUNT(*) AS ?n)", "CONSTRUCT { ?a ?e ?i } WHERE"), sys.argv[4]
 if 'result.' in sys.argv[3] or 'result)' in sys.argv[3]:
     result = scene.plan()
+os.write(int(os.environ["WATCH"]), b"!")
 try:
     if sys.argv[3].startswith("within: "):
         with confab.within(S):
@@ -197,14 +214,16 @@ def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str])
         confab("generate", "served", "--objects", "8", "-o", taught)
         confab("learn", taught, "--memory", memory)
         confab("plan", "beverage-serving", "-o", plan)
+        confab("export", scenes["1,000 objects"], "-o", folder)
         hard, turn, new = [name for name in scenes if name != EASY], count(), count()
         known = {**scenes, **SHIPPED, "MEMORY": memory, "PLAN.json": plan}
+        known |= {name: str(Path(folder, name)) for name in ("domain.pddl", "problem.pddl")}
 
         def tried(said: str, words: Sequence[str], name: str, seconds: float) -> Ended:
             if not words:
-                return overrun(CALL, [known[name], EVERY, said], seconds)
-            made = {word: str(Path(folder, f"{next(new)}{word}")) for word in ("NEW", "NEW.ttl")}
-            put = {**known, words[1]: known[name], **made}
+                return overrun(CALL, [known[name], EVERY, said, str(Path(folder, f"{next(new)}.ttl"))], seconds)
+            put = {**known, words[1]: known[name]}
+            put |= {word: str(Path(folder, f"{next(new)}{word}")) for word in words if word.startswith("NEW")}
             return overrun(COMMAND, [*(put.get(word, word) for word in words), "--time-limit", f"{seconds:g}"], seconds)
 
         print(f"| | call | scene | {' | '.join(f'{seconds:g} s' for seconds in limits)} |")

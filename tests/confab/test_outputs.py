@@ -34,9 +34,9 @@ def outputs(name: str, command: Command) -> Iterator[set[str]]:
     if isinstance(command, Group):
         for word, one in command.commands.items():
             yield from outputs(f"{name} {word}", one)
-    for one in command.params:
-        if isinstance(one.type, Output) or "-o" in one.opts:
-            yield {f"{name} {option}" if option.startswith("-") else name for option in one.opts}
+    for parameter in command.params:
+        if isinstance(parameter.type, Output) or "-o" in parameter.opts:
+            yield {f"{name} {option}" if option.startswith("-") else name for option in parameter.opts}
 
 
 def test_every_output_of_every_command_is_tried() -> None:

@@ -1,0 +1,35 @@
+"""Every command and every call with a time limit is among those of which `benchmarks.overrun` measures how they keep it."""
+
+import inspect
+from importlib import import_module
+
+import confab
+from benchmarks.overrun import CALLS, COMMANDS
+from confab import cli
+
+SERVERS = {"serve"}
+"""Commands whose limit is that of a query (`benchmarks.load`)."""
+
+
+def test_every_command_with_a_time_limit_is_measured() -> None:
+    limited = {
+        name
+        for name, (module, function) in cli.COMMANDS.items()
+        if any(
+            "--time-limit" in one.opts for one in getattr(import_module(f"confab.commands.{module}"), function).params
+        )
+    }
+    assert len(limited) > 10
+    assert limited - SERVERS == {words[0] for words in COMMANDS}
+
+
+def test_every_call_with_a_time_limit_is_measured() -> None:
+    limited = {
+        name
+        for public in (getattr(confab, name) for name in confab.__all__)
+        if inspect.isclass(public)
+        for name, method in inspect.getmembers(public, inspect.isfunction)
+        if not name.startswith("_") and {"time_limit", "seconds", "limits"} & set(inspect.signature(method).parameters)
+    }
+    assert {"plan", "execute", "query"} <= limited
+    assert {name for name in limited - SERVERS if not any(f".{name}(" in call for _, call in CALLS)} == set()
