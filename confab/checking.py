@@ -43,8 +43,7 @@ def refused(
                 return [Fault((), "another individual has a name that the plan uses")]
             lookups: Lookups = {}
             problem = around.problem()
-            wanted = {**problem.goal, **given}
-            problem = replace(problem, goal={s: value for s, value in wanted.items() if s not in unmet}, weights={})
+            problem = replace(problem, goal={**problem.goal, **given}).only(unmet)
             faults = carried_out(problem, plan, lookups, around.lifted)
             if not around.widen(lookups):
                 return faults

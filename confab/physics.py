@@ -291,7 +291,7 @@ def verify(
             finished += roll_out(trial, seeds, workers, done) if seeds else []
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
-    wanted = scene.problem.goal if goal is None else goal
+    wanted = scene.problem.only(scene.problem.weights).goal if goal is None else goal
     return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene)
 
 

@@ -443,7 +443,8 @@ class Result:
         """Return the same result with the problem of the whole scene instead of the part that was read for the task."""
         if self.part is None:
             return self
-        return replace(self, problem=with_goals(self.scene.problem, self.goals), part=None)
+        whole = with_goals(self.scene.problem, self.goals)
+        return replace(self, problem=whole.only(self.outcome.unmet), part=None)
 
     def explain(self) -> Account:
         """Return why each step of the plan is there; without a plan, why there is none."""

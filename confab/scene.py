@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, overload
 
 from confab import ontology, planning
-from confab.accepting import AnyPlan, Facts, number, plan_of
+from confab.accepting import AnyPlan, Facts, number, plan_of, several
 from confab.known import Known
 from confab.planner.plan import Plan
 from confab.planner.solve import DEFAULT_MODE, Mode
@@ -140,6 +140,9 @@ class Scene(Known):
         """
         from confab.execution import carry_out
 
+        if plan is None and self.problem.weights:  # the plan decides which soft goals are left unmet
+            chosen = self.plan(several(goals), memory, mode, time_limit)
+            plan = chosen if chosen.solved else None
         return carry_out(
             self, plan, interventions, world, goals, memory, mode, seed, observer, watch, time_limit, **options
         )

@@ -71,8 +71,7 @@ class _Choices:
 
     def task(self, kept: Goals) -> Problem:
         """Return the task with these soft goals as hard goals, and without the others."""
-        goal = {s: value for s, value in self.problem.goal.items() if s not in self.weights or s in kept}
-        return replace(self.problem, goal=goal, weights={})
+        return self.problem.only(self.weights.keys() - kept)
 
     def outcome(self, kept: Goals) -> Outcome:
         """Plan for a choice; a search that the time limit ends has given up, except the first search."""

@@ -18,7 +18,7 @@ quantified behaviour          ground action                              `Ground
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
@@ -530,6 +530,11 @@ class Problem:
     value_levels: Mapping[str, int] = field(default_factory=dict)
     times: Times | None = None
     weights: Mapping[Symbol, Fraction] = field(default_factory=dict)
+
+    def only(self, unmet: Collection[Symbol]) -> Problem:
+        """Return the problem without some soft goals, in which the other goals must be met."""
+        goal = {symbol: value for symbol, value in self.goal.items() if symbol not in unmet}
+        return replace(self, goal=goal, weights={})
 
     def values(self, symbol: Symbol, level: int) -> tuple[str, ...]:
         """Return the values that a symbol can have on a level, in declared order."""

@@ -78,6 +78,12 @@ def test_command_line_and_json_say_what_is_left() -> None:
     assert [one["goal"] for one in data["forgone"]] == ["glass IN shop"]
 
 
+def test_execution_leaves_the_same_goals_unmet() -> None:
+    done = confab.load("wishes-small").execute()
+    assert done.reached
+    assert len(done.episode.events) == len(confab.load("wishes-small").plan().plan.primitives)
+
+
 @pytest.mark.parametrize("weight", ["0.0", "-1.0"])
 def test_a_weight_that_is_no_cost_is_refused_with_the_remedy(tmp_path: Path, weight: str) -> None:
     with pytest.raises(KnowledgeError, match="wanted the cost of leaving the goal unmet, above 0"):
