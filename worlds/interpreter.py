@@ -358,11 +358,12 @@ class Interpreter:
                     yield self.limit(symbol, f"t[{self.slots[symbol]}]")
 
     def prevented(self) -> Iterator[str]:
-        """Yield that each symbol of a constrained situation type is false, or true."""
+        """Yield that each symbol of a constrained situation type is false, or true, unless it wasn't before, either."""
         for one in self.problem.domain.constraints.values():
+            wanted = TRUE if one.always else FALSE
             for symbol, slot in self.slots.items():
                 if symbol.situation == one.situation:
-                    yield f"t[{slot}] == {(TRUE if one.always else FALSE)!r}"
+                    yield f"t[{slot}] == {wanted!r} or s[{slot}] != {wanted!r}"
 
     def limit(self, symbol: Symbol, amount: str) -> str:
         """Return that an amount is within its bounds."""
