@@ -109,12 +109,15 @@ class Afterwards:
     classes : mapping of class to individuals
     kinds : dict of term to class
         The classes of all terms in the behaviour and the conditions; classes of new variables are added.
+    holding : sequence of Condition, optional
+        The preconditions that hold when the effects take place; if left out, all of them.
     """
 
     behavior: Behavior
     situations: Mapping[str, SituationType]
     classes: Mapping[str, Sequence[str]]
     kinds: dict[str, str]
+    holding: Sequence[Condition] | None = None
     _number: Iterator[int] = field(default_factory=lambda: count(1))
 
     def __post_init__(self) -> None:
@@ -122,6 +125,7 @@ class Afterwards:
         preconditions = self.behavior.preconditions
         bound = {p.name for p in self.behavior.parameters}.union(*map(mentions, preconditions))
         self._fixed = frozenset(bound)
+        preconditions = preconditions if self.holding is None else tuple(self.holding)
         self._known = {
             (c.situation, c.arguments): FALSE if c.negated else c.value
             for c in preconditions

@@ -44,7 +44,7 @@ from confab.reasoner.symbols import (
     Effect,
     Parameter,
     SituationType,
-    Timing,
+    Span,
     ValueCondition,
     ValueEffect,
     made_of,
@@ -80,13 +80,41 @@ def kept(
     for aggregate in aggregates:
         if aggregate.kept and read_by(aggregate) & behavior.changes:
             try:
-                behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
+                found = _Keeping(behavior, aggregate, situations, classes).behavior()
+                behavior = found if found.timing is None else _timed(found, aggregate, situations, classes)
             except TooManyCasesError:
                 raise DomainError(
                     f"{behavior.name} changes the facts that determine {aggregate.situation} by too many effects at once; "
                     "use fewer effects, or another behaviour for some of them"
                 ) from None
     return behavior
+
+
+def _timed(
+    behavior: Behavior,
+    aggregate: Aggregate,
+    situations: Mapping[str, SituationType],
+    classes: Mapping[str, Sequence[str]],
+) -> Behavior:
+    """Return a behaviour in whose timing a total changes together with each of the facts that it depends on.
+
+    The effects of each span are a separate change, in the state in which the conditions of this span hold.
+    """
+    timing = behavior.timing
+    assert timing is not None
+    read, effects = read_by(aggregate), list(timing.effects)
+    for span in dict.fromkeys(span for span, effect in effects if effect.situation in read):
+        made = timing.made(span)
+        part = replace(
+            behavior,
+            effects=tuple(effect for effect in made if isinstance(effect, ValueEffect)),
+            amounts=tuple(effect for effect in made if isinstance(effect, AmountEffect)),
+        )
+        holding = [condition for at, condition in timing.conditions if at in (span, Span.THROUGHOUT)]
+        found = _Keeping(part, aggregate, situations, classes, holding).behavior()
+        behavior = replace(behavior, variables=found.variables)
+        effects += [(span, effect) for effect in found.amounts[len(part.amounts) :]]
+    return replace(behavior, timing=replace(timing, effects=tuple(effects)))
 
 
 @dataclass(frozen=True)
@@ -114,10 +142,11 @@ class _Keeping:
         aggregate: Aggregate,
         situations: Mapping[str, SituationType],
         classes: Mapping[str, Sequence[str]],
+        holding: Sequence[Condition] | None = None,
     ) -> None:
         kinds = {**behavior.kinds, **{e.each.name: e.each.kind for e in behavior.every_effect if e.each is not None}}
         self.own, self.situations = behavior, situations
-        self.after = Afterwards(behavior, situations, classes, kinds)
+        self.after = Afterwards(behavior, situations, classes, kinds, holding)
         self.terms = {one.name: self.after.fresh(one.kind) for one in (*aggregate.parameters, *aggregate.variables)}
         asked = (substituted(condition, self.terms) for condition in aggregate.conditions)
         self.conditions = [self.after.renamed(condition) for condition in asked]
@@ -148,21 +177,7 @@ class _Keeping:
         more = sorted(t for t in used - each if is_variable(t) and t not in known)
         variables = (*self.own.variables, *(Parameter(name, self.after.kinds[name]) for name in more))
         amounts = (*self.own.amounts, *effects)
-        return replace(self.own, variables=variables, amounts=amounts, timing=self._timed(effects))
-
-    def _timed(self, effects: Sequence[AmountEffect]) -> Timing | None:
-        """Return the timing of the behaviour, in which the total changes together with the facts that it depends on."""
-        timing = self.own.timing
-        if timing is None or not effects:
-            return timing
-        read = read_by(self.aggregate)
-        spans = dict.fromkeys(span for span, effect in timing.effects if effect.situation in read)
-        if len(spans) > 1:
-            raise DomainError(
-                f"{self.own.name} changes the facts that determine {self.aggregate.situation} at several times "
-                f"({', '.join(span.value for span in spans)}); let these effects take place at one time, or use two behaviours"
-            )
-        return replace(timing, effects=(*timing.effects, *((span, effect) for span in spans for effect in effects)))
+        return replace(self.own, variables=variables, amounts=amounts)
 
     def _candidates(self) -> Iterator[_Candidate]:
         """Yield a candidate for each pair of an effect and a symbol in the aggregate that the effect may change."""

@@ -32,6 +32,9 @@ REACTING: list[tuple[str, tuple[str, ...]]] = [
 REACTING += [("peroxide", ("fuel", "solvent")), ("bleach", ("fuel",))]
 
 
+OVENS = (Path(__file__).parent / "cases" / "ovens.ttl").read_text("utf-8")
+
+
 def changed(tmp_path: Path, old: str, new: str) -> str:
     """Write the small scene with a text replaced in the domain and in the scene; return its path."""
     assert old in DOMAIN + SCENE
@@ -150,3 +153,15 @@ def test_random_worlds_with_constraints_are_answered_as_exhaustive_search_answer
 @pytest.mark.parametrize("seed", [410_000_044, 410_000_270, 410_000_048])
 def test_constraints_on_empty_classes_and_unions_of_classes_keep_their_meaning(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed, constrained=0.3), tmp_path, every=True).judged().complaints
+
+
+def test_a_schedule_keeps_a_constraint_at_every_time_and_without_it_overlaps(tmp_path: Path) -> None:
+    """An oven is on from the start to the end of a step, and never are two ovens on."""
+    times = []
+    for name, text in (("ovens", OVENS), ("free", OVENS.replace("c:never true ; ", ""))):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "ovens.ttl").write_text(text, "utf-8")
+        timed = confab.load(str(tmp_path / name / "ovens.ttl")).plan(minimise="makespan").timed
+        assert timed is not None
+        times.append(timed.makespan)
+    assert times == [120, 60]
