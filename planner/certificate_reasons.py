@@ -188,7 +188,7 @@ class _Causes:
             return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
         if amount and not found:
             stays = self.certificate.always.get(symbol)
-            return [Cause(f"{symbol.arguments[0]} {situation} is always {stays}" if stays else self.bounds_of(symbol))]
+            return [Cause(f"{_named(symbol)} is always {stays}" if stays else self.bounds_of(symbol))]
         if not found:
             what = "gives it another value" if kept else "has this effect"
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
@@ -198,7 +198,7 @@ class _Causes:
         """Return in words the bound of an amount that a goal value exceeds; empty if there is none."""
         quantity, words = (
             self.lowest.quantity(fact.symbol.situation),
-            f"{fact.symbol.arguments[0]} {fact.symbol.situation}",
+            _named(fact.symbol),
         )
         if quantity is None:
             return ""
@@ -234,7 +234,7 @@ class _Causes:
 
     def bounds_of(self, symbol: Symbol) -> str:
         """Return the bounds of an amount in words."""
-        allowed, words = self.claims.allowed(symbol), f"{symbol.arguments[0]} {symbol.situation}"
+        allowed, words = self.claims.allowed(symbol), _named(symbol)
         least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
         most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
         return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words
@@ -339,11 +339,14 @@ class _Causes:
         by = reading.expression(effect.amount, env)  # type: ignore[union-attr]
         if quantity is None or old is None:
             return
-        words = f"{symbol.arguments[0]} {symbol.situation}"
+        words = _named(symbol)
         terms = (*symbol.arguments, symbol.situation)
         operation = effect.operation  # type: ignore[union-attr]
         new = by if by is None or operation == "assign" else calculated(OPERATORS[operation], old, by)
-        if new is None:
+        constraint = self.problem.domain.constraints.get(symbol.situation)
+        if constraint is not None:
+            yield f"violate the constraint that {constraint}", (constraint.situation,)
+        elif new is None:
             yield f"make {words} an amount that can't be calculated", terms
         elif quantity.most is not None and new.low > quantity.most and isinstance(new.low, Fraction):
             yield f"take {words} to {written(new.low)}, more than its maximum, {written(quantity.most)}", terms
@@ -427,3 +430,8 @@ class _Noting(CaseView):
         if always is not None:
             self.claimed[Fact(symbol, always)] = None
         return super().between(symbol)
+
+
+def _named(symbol: Symbol) -> str:
+    """Return the first argument of a symbol, if it has one, and its situation type."""
+    return " ".join((*symbol.arguments[:1], symbol.situation))

@@ -8,17 +8,23 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import permutations
 from random import Random
 
 from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.aggregates.compiling import compiled
+from confab.reasoner.aggregates.totals import with_totals
+from confab.reasoner.amounts import Quantity
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     Behavior,
+    Constraint,
     Domain,
+    Parameter,
     Problem,
     SituationType,
     Span,
@@ -52,12 +58,13 @@ class Action:
 
 @dataclass(frozen=True)
 class TimedWorld:
-    """Actions, initial facts, and goals."""
+    """Actions, initial facts, goals, and facts that never hold together."""
 
     facts: int
     actions: tuple[Action, ...]
     initial: frozenset[int]
     goal: tuple[Literal, ...]
+    never: tuple[Literal, ...] = ()
 
 
 Running = tuple[int, int]
@@ -65,13 +72,21 @@ Running = tuple[int, int]
 State = tuple[frozenset[int], frozenset[Running]]
 
 
-def timed_world(seed: int) -> TimedWorld:
-    """Return a random world; the same for the same seed."""
+def timed_world(seed: int, constrained: bool = False) -> TimedWorld:
+    """Return a random world, the same for the same seed; with `constrained`, two facts never hold together in it."""
     rng = Random(seed)
     while True:
         world = _drawn(rng)
-        if not all((fact in world.initial) is value for fact, value in world.goal):
+        if constrained:
+            never = tuple((fact, rng.random() < 0.6) for fact in sorted(rng.sample(range(world.facts), 2)))
+            world = replace(world, never=never)
+        if not _hold(world.initial, list(world.goal)) and not _violated(world, world.initial):
             return world
+
+
+def _violated(world: TimedWorld, facts: frozenset[int]) -> bool:
+    """Return whether the facts that never hold together do."""
+    return bool(world.never) and _hold(facts, list(world.never))
 
 
 def _drawn(rng: Random) -> TimedWorld:
@@ -160,7 +175,7 @@ def _begun(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]
     if not _hold(facts, asked):
         return None
     after = _made(facts, begun)
-    if not _hold(after, held) or not _kept(world, after, running):
+    if not _hold(after, held) or not _kept(world, after, running) or _violated(world, after):
         return None
     return after, running | {(number, action.seconds)}
 
@@ -178,7 +193,7 @@ def _passed(
         if _taken(world, left, [*asked, *made]) or not _hold(facts, asked):
             return None
         facts = _made(facts, made)
-        if not _kept(world, facts, left):
+        if not _kept(world, facts, left) or _violated(world, facts):
             return None
     return facts, left
 
@@ -231,7 +246,14 @@ def problem_of(world: TimedWorld) -> Problem:
     classes = {"Thing": ("it",), "Actor0": ("actor0",), "Actor1": ("actor1",)}
     initial = {Symbol(f"F{fact}", ("it",)): TRUE for fact in sorted(world.initial)}
     goal = {Symbol(f"F{fact}", ("it",)): TRUE if value else FALSE for fact, value in sorted(world.goal)}
-    return Problem("urn:timed", Domain(situations, behaviors), classes, {}, initial, goal)
+    domain = Domain(situations, behaviors)
+    if world.never:
+        together = tuple(ValueCondition(f"F{fact}", ("it",), TRUE if value else FALSE) for fact, value in world.never)
+        count = Aggregate("E", "count", Fraction(1), (), (Parameter("?it", "Thing"),), together)
+        situations["E"] = SituationType("E", (), "E", quantity=Quantity(whole=True, most=Fraction(0)))
+        domain = compiled(replace(domain, aggregates={"E": count}, constraints={"E": Constraint("F0")}), classes)
+        initial = with_totals(domain, classes, {}, initial)
+    return Problem("urn:timed", domain, classes, {}, initial, goal)
 
 
 def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:

@@ -158,7 +158,7 @@ class _Sums:
     def said(self, places: Sequence[int], there: Fraction, taken: Fraction, wanted: Fraction) -> Reason:
         symbols = [self.amounts.symbols[place] for place in places]
         unit = self.amounts.quantities[places[0]].unit
-        about = ", ".join(str(symbol.arguments[0]) for symbol in symbols[:5]) + ", …" * (len(symbols) > 5)
+        about = ", ".join("".join(symbol.arguments[:1]) for symbol in symbols[:5]) + ", …" * (len(symbols) > 5)
         what = f"{written(there)}{' ' * bool(unit)}{unit} are there"
         of_it = f" ({written(taken)} of them in use)" if taken else ""
         text = f"{symbols[0].situation} of {about}: {what}{of_it}, {written(wanted)} are wanted, and nothing gives more"

@@ -110,6 +110,11 @@ def test_plans_of_random_timed_worlds_are_plans_and_not_shorter_than_the_shortes
     assert {seed: said for seed in range(7_000, 7_120) if (said := wrong(timed_world(seed)))} == {}
 
 
+def test_schedules_of_random_timed_worlds_keep_constraints_at_every_time() -> None:
+    found = {seed: said for seed in range(8_000, 8_080) if (said := wrong(timed_world(seed, constrained=True)))}
+    assert found == {}
+
+
 def test_a_plan_that_leaves_a_level_keeps_its_stretches_in_time(tmp_path: Path) -> None:
     write_scene(tmp_path / "table.ttl", "swap", 10, 2)
     problem = read(load(str(tmp_path / "table.ttl"))).problem
