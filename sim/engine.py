@@ -21,10 +21,11 @@ from confab.reasoner.embodiment.values import Embodiment, Shape
 from confab.reasoner.limits import check
 from confab.sim.base import Base
 from confab.sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
-from confab.sim.collision import Solid, Surroundings, box, column, rim
+from confab.sim.collision import Solid, Surroundings, box, clearances, column, rim
 from confab.sim.mechanisms import Mechanic
 from confab.sim.robot import Manipulator
 from confab.sim.sight import Sight, Sought, look, over_the_shoulders
+from confab.sim.stages import MARGIN
 from confab.sim.urdf import Array, Spheres
 from confab.sim.verdict import SkillError
 
@@ -49,6 +50,16 @@ STEADY = 5.0
 
 NEAR_PLACE = 0.05
 """Maximum distance in metres between a place and a body that is at it."""
+
+
+STEP_UP = 0.01
+"""Metres between the heights above a place that are tried for a load."""
+
+
+def whole_spheres(shape: Shape) -> Spheres:
+    """Return spheres for an upright body down to its lower edge, in the frame of its base."""
+    inner, edge = column(*outline(shape), bottom=outer_radius(shape) / 3), rim(*outline(shape))
+    return Spheres(np.concatenate([inner.centers, edge.centers]), np.concatenate([inner.radii, edge.radii]))
 
 
 @dataclass(frozen=True)
@@ -352,16 +363,19 @@ class Engine:
         """Return the error (3,) of a mechanism's perceived position."""
         return self.shifts.get(mechanic.body, np.zeros(3))
 
-    def carrier(self, name: str) -> tuple[Array, Array]:
-        """Return the frame of a link or body that carries places; the world's frame for an empty name."""
+    def carrier(self, name: str, sensed: bool = False) -> tuple[Array, Array]:
+        """Return the frame of a link or body that carries places, true or `sensed`; the world's frame for an empty name."""
         if not name:
             return np.eye(3), np.zeros(3)
-        return self.links[name].frame(name) if name in self.links else self.truth(name)
+        if name not in self.links:
+            return self.sense(name) if sensed else self.truth(name)
+        turned, origin = self.links[name].frame(name)
+        return turned, origin + self.shift(self.links[name]) if sensed else origin
 
-    def place(self, name: str) -> Array:
-        """Return a place's present position (3,)."""
+    def place(self, name: str, sensed: bool = False) -> Array:
+        """Return a place's present position (3,), with `sensed` as far as its carrier is perceived."""
         place = self.embodiment.places[name]
-        turned, origin = self.carrier(place.carrier)
+        turned, origin = self.carrier(place.carrier, sensed)
         point: Array = origin + turned @ np.array(place.position)
         return point
 
@@ -499,11 +513,21 @@ class Engine:
 
         The lowest centimetres, which may touch a table, are included if `whole`.
         """
-        shape = self.bodies[body].shape
         rotation, base = self.in_hand(hand, body)
-        spheres = column(*outline(shape), bottom=outer_radius(shape) / 3 if whole else min(0.03, height_of(shape) / 3))
-        centers, radii = spheres.centers, spheres.radii
-        if whole:
-            edge = rim(*outline(shape))
-            centers, radii = np.concatenate([centers, edge.centers]), np.concatenate([radii, edge.radii])
-        return Spheres(centers @ rotation.T + base, radii)
+        shape = self.bodies[body].shape
+        spheres = whole_spheres(shape) if whole else column(*outline(shape), bottom=min(0.03, height_of(shape) / 3))
+        return Spheres(spheres.centers @ rotation.T + base, spheres.radii)
+
+    def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
+        """Return the height from `least` on above a point at which an upright load has the margin to everything around it.
+
+        From a hole or a mouth the load has to rise above the rim. The result is `least` if the load gets nearer to a solid
+        on the way up, such as the top of a cupboard.
+        """
+        spheres = whole_spheres(self.bodies[body].shape)
+        rises = np.arange(least, max(most, least) + STEP_UP / 2, STEP_UP)
+        centers = spheres.centers + point + np.stack([0 * rises, 0 * rises, rises], -1)[:, None]
+        gaps = clearances(centers, spheres.radii, self.surroundings(hand.hand.name, body)).values()
+        nearest = np.min([np.full(len(rises), np.inf), *gaps], axis=0)
+        clear = np.flatnonzero(nearest > MARGIN)
+        return float(rises[clear[0]]) if len(clear) and nearest[: clear[0] + 1].argmin() == 0 else least

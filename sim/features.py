@@ -78,7 +78,7 @@ def ways(frame: FeatureFrame, moving: bool) -> Ways:
 
 
 def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
-    """Return the frame of a feature: perceived for an object, true for a place or link, with joints at `values` if given.
+    """Return the frame of a feature: perceived for an object and a place, true for a link, with joints at `values` if given.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] 
         The object is not visible, or has no such feature.
     """
     if name in engine.embodiment.places:
-        return FeatureFrame(np.eye(3), engine.place(name))
+        return FeatureFrame(np.eye(3), engine.place(name, sensed=True))
     if name in engine.links:
         mechanic = engine.links[name]
         found = mechanic.link(name).features.get(feature)

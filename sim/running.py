@@ -73,11 +73,21 @@ class Run:
     def number(self, expression: str, link: str = "") -> float:
         """Return the value of a sum of settings, numbers and, with `link`, the named values of its joint (opened, shut, …)."""
         known = dict(self.numbers)
+        if "clear" in expression:
+            known["clear"] = self.clear()
         if link:
             one = self.world.links[link].link(link)
             known |= {name: getattr(one, name) for name in ("opened", "shut", "lower", "upper")}
             known["wide"] = wide(one)
         return evaluate(expression, known)
+
+    def clear(self) -> float:
+        """Return the height above the target at which the load is clear of everything around it; `hover` for an empty hand."""
+        hover, attempt = self.numbers["hover"], self.attempt
+        if attempt.held is None:
+            return hover
+        point = self.at("target").point
+        return self.world.clear_height(attempt.hand, attempt.held, point, hover, self.numbers["raised"])
 
     def things(self) -> tuple[str, ...]:
         """Return the participants and the held body, without the hand."""

@@ -14,6 +14,9 @@ from confab.reasoner.embodiment.values import Embodiment, Flaw, Phase, SkillUse
 JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
 """Numbers of a joint that an expression may contain."""
 
+MEASURED_NUMBERS = {"clear"}
+"""Numbers that an expression may name and that are computed when the skill runs."""
+
 WITHOUT_ROLE = {"hand", "supports"}
 """Words that may replace a role and need no term of the behaviour."""
 
@@ -38,7 +41,8 @@ def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
         bounds = [guard.bound for guard in (*phase.until, *phase.checks)]
         for expression in (*phase.offset, phase.above, phase.value, phase.speed, phase.wait, *bounds):
             for _, term in TERM.findall(expression):
-                if not (term[0].isdigit() or term[0] == "." or term in use.numbers or term in JOINT_NUMBERS):
+                known = term in use.numbers or term in JOINT_NUMBERS | MEASURED_NUMBERS
+                if not (term[0].isdigit() or term[0] == "." or known):
                     yield phase, term
 
 
