@@ -37,7 +37,7 @@ from confab.sim.measuring import check, finger_force, until
 from confab.sim.motion import pose_of, rotations, turned_near
 from confab.sim.pouring import FOLD, reach_over
 from confab.sim.running import Run
-from confab.sim.stages import Stage
+from confab.sim.stages import Stage, rises
 from confab.sim.swings import SAMPLES, check_swing
 from confab.sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
 from confab.sim.urdf import Array
@@ -97,15 +97,35 @@ def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
 
 def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     if phase.motion == "free":
-        _with_looks(run, phase, lambda: _free(run, phase, later))
+        _with_looks(run, phase, lambda: _lower(run, (phase, *later), lambda: _free(run, phase, later)))
     else:
         FINGERS[phase.fingers](run, phase)
-        _with_looks(run, phase, lambda: MOTIONS[phase.motion](run, phase))
+        _with_looks(run, phase, lambda: _lower(run, (phase,), lambda: MOTIONS[phase.motion](run, phase)))
     if phase.motion:
         arrived(run.world, run.attempt.hand.hand.name, phase.motion, run.roles.get(phase.to.partition(".")[0], ""))
     run.world.run(round(run.number(phase.wait) * run.world.rate))
     for guard in phase.checks:
         check(run, phase, guard)
+
+
+def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> None:
+    """Do a motion; if it lifts and is blocked, try it with the next lower height to lift to."""
+    if "least_raised" not in run.numbers or not any("raised" in phase.above for phase in phases):
+        motion()
+        return
+    given, first = run.numbers, None
+    for raised in rises(given):
+        run.numbers = {**given, "raised": raised}
+        try:
+            motion()
+        except SkillError as failure:
+            if failure.verdict.code not in REFUTED:
+                raise
+            first = first or failure
+        else:
+            return
+    assert first is not None
+    raise first
 
 
 def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:

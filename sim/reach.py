@@ -1,14 +1,15 @@
 """The places within reach of each hand, computed from geometry alone: URDF, furniture and shapes, without a physics engine.
 
 A hand reaches a place if, for every height at which bodies of the scene are grasped, there is a grasp pose whose approach, grasp
-and lift are all within the joints' limits and free of contact with furniture and the robot's trunk.
+and lift are all within the joints' limits and free of contact with furniture and the robot's trunk. Below a solid, a hand lifts
+less.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ import numpy as np
 from confab.reasoner.embodiment.values import Embodiment, Hand, Place, Robot
 from confab.sim.arms import read_arm
 from confab.sim.assembly import read_robot
-from confab.sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
+from confab.sim.bodies import height_of, outline
+from confab.sim.collision import Solid, Surroundings, box, column, fixed_spheres, read_mover
 from confab.sim.linkage import with_open_mechanisms
 from confab.sim.motion import Reacher, beyond
-from confab.sim.stages import MARGIN, Numbers, grip_stages
-from confab.sim.urdf import UrdfModel
+from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
+from confab.sim.urdf import Spheres, UrdfModel
 
-VERSION = "1"
+VERSION = "2"
 """Version of the method. It is part of the fingerprint, so that stored results of an older version count as outdated."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
@@ -57,7 +59,10 @@ def reach(embodiment: Embodiment) -> Reach:
                 found = [
                     place
                     for place in near
-                    if all(_reaches(reacher, place, h, numbers) for h in _heights(embodiment, place.name, heights))
+                    if all(
+                        _reaches(reacher, _loaded(reacher, embodiment, h), place, h, numbers)
+                        for h in _heights(embodiment, place.name, heights)
+                    )
                 ]
                 pairs |= {(hand.name, place.name) for place in found}
     return Reach(frozenset(pairs), fingerprint(embodiment))
@@ -81,18 +86,20 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
             for hand in robot.hands:
                 reacher = _reacher(embodiment, robot, hand, model, solids)
                 for height in _heights(embodiment, place, heights):
-                    if not _reaches(reacher, places[place], height, numbers):
+                    loaded = _loaded(reacher, embodiment, height)
+                    if not _reaches(reacher, loaded, places[place], height, numbers):
                         at = f" at {stand}" if stand else ""
-                        found.append(f"{hand.name}{at}: {_why(reacher, places[place], height, numbers)}")
+                        found.append(f"{hand.name}{at}: {_why(reacher, loaded, places[place], height, numbers)}")
                         break
     return tuple(dict.fromkeys(found))
 
 
-def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str:
+def _why(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers: Numbers) -> str:
     """Return the reason for which no posture passes a stage of a grasp at a height above a place."""
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     left = np.ones(1, dtype=bool)
-    for name, stage in zip(STAGES, grip_stages(grip, numbers), strict=True):
+    stages = grip_stages(grip, _lowest(numbers))
+    for name, stage, mover in zip(STAGES, stages, (reacher, reacher, loaded), strict=True):
         q, valid = reacher.solve(stage.poses)
         valid = valid & left
         if not valid.any():
@@ -102,10 +109,10 @@ def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str
                 if missing > 0
                 else f"no posture is within all joints' limits {name}"
             )
-        free = reacher.free(q)
+        free = mover.free(q)
         if not (valid & free).any():
-            gaps = reacher.mover.clearances(q[valid], reacher.around)
-            blocked = {one: int(np.sum(gap <= reacher.margin)) for one, gap in gaps.items()}
+            gaps = mover.mover.clearances(q[valid], mover.around)
+            blocked = {one: int(np.sum(gap <= mover.margin)) for one, gap in gaps.items()}
             worst = max(blocked, key=lambda one: (blocked[one], -float(gaps[one].max())))
             return f"{worst} is in the way {name}"
         left = valid & free
@@ -117,7 +124,7 @@ def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
     settings = [use.numbers for use in embodiment.skills.values() if use.skill == "reach"]
     if not settings:
         raise ValueError("no behaviour uses the skill 'reach', so reach is undefined; give one behaviour that skill")
-    numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
+    numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised", "least_raised")}
     grasped = sorted({body.shape.grasp_height for body in embodiment.bodies.values()})
     return numbers, grasped or [settings[0]["empty_height"]]
 
@@ -150,7 +157,9 @@ def fingerprint(embodiment: Embodiment) -> str:
     parts += [repr(place.height) for _, place in sorted(embodiment.places.items()) if place.height is not None]
     parts += [repr(place.carrier) for _, place in sorted(embodiment.places.items()) if place.carrier]
     parts += [repr(mechanism) for mechanism in embodiment.mechanisms]
-    parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
+    parts += sorted(
+        {repr((body.shape.grasp_height, *map(list, outline(body.shape)))) for body in embodiment.bodies.values()}
+    )
     reaching = [use.numbers for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
     parts += [repr(sorted((name, value) for name, value in uses.items() if name != "time_limit")) for uses in reaching]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
@@ -181,11 +190,33 @@ def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel,
     return Reacher(read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening)), around, MARGIN)
 
 
-def _reaches(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> bool:
-    """Return whether some posture passes all stages of a grasp at a height above the place."""
+def _reaches(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers: Numbers) -> bool:
+    """Return whether some posture passes all stages of a grasp at a height above the place.
+
+    The hand has to be able to lift to the least raised height; the raised height has to be within the joints' limits.
+    """
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
-    solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, numbers)]
-    valid = np.all([ok for _, ok in solved], axis=0)
+    solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, _lowest(numbers))]
+    above = reacher.solve(grip_stages(grip, numbers)[-1].poses)[1]
+    valid = np.all([above, *(ok for _, ok in solved)], axis=0)
     if not valid.any():
         return False
-    return bool(np.any(np.all([reacher.free(q[valid]) for q, _ in solved], axis=0)))
+    movers = (reacher, reacher, loaded)
+    return bool(np.any(np.all([one.free(q[valid]) for one, (q, _) in zip(movers, solved, strict=True)], axis=0)))
+
+
+def _lowest(numbers: Numbers) -> Numbers:
+    """Return settings in which a hand lifts to the least raised height."""
+    return {**numbers, "raised": rises(numbers)[-1]}
+
+
+def _loaded(reacher: Reacher, embodiment: Embodiment, height: float) -> Reacher:
+    """Return a hand that holds the tallest body of the scene at a height above its base, without the body's lowest third."""
+    shapes = [body.shape for body in embodiment.bodies.values()]
+    own = [shape for shape in shapes if shape.grasp_height == height] or shapes
+    if not own:
+        return reacher
+    tallest = max(own, key=height_of)
+    spheres = column(*outline(tallest), bottom=height_of(tallest) / 3)
+    held = Spheres(spheres.centers - np.array([0.0, 0.0, height]), spheres.radii)
+    return replace(reacher, mover=reacher.mover.holding(held))

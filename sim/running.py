@@ -19,6 +19,9 @@ from confab.sim.verdict import SkillError, named
 TOLD = ("object", "source", "target", "place")
 """The order in which a failure names the participants' roles."""
 
+LEDGE = 0.01
+"""Metres by which a fixture may stand out above a place and still count as its support."""
+
 
 @dataclass
 class Run:
@@ -101,13 +104,15 @@ class Run:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 
     def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the things that a phase may touch: objects, parts of a link at a feature, fixtures and carriers of a place."""
+        """Return the things that a phase may touch: objects, parts of a link at a feature, fixtures below a place, its carrier."""
         found: list[str] = []
         for word in phase.touches:
             if word == "supports":
-                found += [fixture.name for fixture in self.world.embodiment.fixtures]
-                below = self.world.nearest_place(self.attempt.hand.frame()[1])[0]
-                found.append(self.world.embodiment.places[self.roles.get("place", below)].carrier)
+                place = self.roles.get("place") or self.world.nearest_place(self.attempt.hand.frame()[1])[0]
+                height = self.world.place(place)[2] + LEDGE
+                fixtures = self.world.embodiment.fixtures
+                found += [one.name for one in fixtures if one.position[2] + one.size[2] / 2 < height]
+                found += [name for name in [self.world.embodiment.places[place].carrier] if name]
             elif "." in word:
                 found += touched(self.world, *self.feature_of(word))
             elif word in self.roles:

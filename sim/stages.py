@@ -13,6 +13,9 @@ from confab.sim.urdf import Array
 
 Numbers = Mapping[str, float]
 
+RISES = 4
+"""Number of heights to which a hand may lift, from the raised to the least raised height."""
+
 MARGIN = 0.008
 """Margin in metres to all obstacles."""
 
@@ -36,6 +39,11 @@ class Stage:
     fold: float = 0.0
     released: bool = False
     joint: float | None = None
+
+
+def rises(numbers: Numbers) -> tuple[float, ...]:
+    """Return the heights to which a hand may lift, the highest first."""
+    return tuple(np.linspace(numbers["raised"], min(numbers["raised"], numbers["least_raised"]), RISES).tolist())
 
 
 def fan() -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from confab.reasoner.embodiment.values import Fixture
+from confab.reasoner.embodiment.values import Embodiment, Fixture
 from confab.sim.reach import fingerprint, hindrance, reach
 
 from .conftest import Case
@@ -31,8 +31,18 @@ def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_els
 
 def test_what_keeps_a_hand_from_a_place_is_named_with_the_stage_of_the_grasp(serving: Case) -> None:
     name = "location5"
-    place = serving.embodiment.places[name]
     assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm out of reach when grasping",)
-    above = Fixture("lamp", (0.5, 0.5, 0.02), (*place.position[:2], place.position[2] + 0.25))
-    hung = replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, above))
-    assert hindrance(hung, name)[0] == "left_hand: lamp is in the way when lifting"
+    for height in (0.15, 0.2):
+        assert hindrance(below_a_lamp(serving, height), name)[0] == "left_hand: lamp is in the way when lifting"
+
+
+def test_a_hand_lifts_less_where_a_solid_above_leaves_room_for_the_load_alone(serving: Case) -> None:
+    assert ("left_hand", "location5") in reach(below_a_lamp(serving, 0.25)).pairs
+    assert ("left_hand", "location5") not in reach(below_a_lamp(serving, 0.2)).pairs
+
+
+def below_a_lamp(serving: Case, height: float) -> Embodiment:
+    """Return the embodiment with a board of 2 cm whose middle is at a height above location5; a bottle is 16 cm high."""
+    x, y, z = serving.embodiment.places["location5"].position
+    lamp = Fixture("lamp", (0.5, 0.5, 0.02), (x, y, z + height))
+    return replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, lamp))

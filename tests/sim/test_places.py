@@ -1,0 +1,60 @@
+"""Places in holes, below shelves and in drawers behind doors: a load comes and goes without touching what is around it."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import confab
+from confab.reaching import with_reach
+from confab.scene import Scene
+from confab.sim.rollouts import Trial
+from confab.sim.staging import Perturbation
+from confab.sim.verify import expectations
+from confab.sim.world import PhysicsWorld
+
+RIGHT = Path(__file__).parent / "right"
+
+
+def scene(name: str, folder: Path) -> Scene:
+    return with_reach(confab.load(shutil.copy(RIGHT / f"{name}.ttl", folder)))
+
+
+@pytest.mark.parametrize("name", ["peg", "shelf", "cupboard"])
+@pytest.mark.parametrize("noise", [0.0, 0.004])
+def test_perturbed_rollouts_verify(name: str, noise: float, tmp_path: Path) -> None:
+    one = scene(name, tmp_path)
+    steps = one.plan().plan.primitives
+    expected = expectations(one.problem, steps)
+    trial = Trial(one.embodiment, one.problem.initial, steps, expected, Perturbation(), False, noise)
+    for seed in (4105, 4106):
+        rollout = trial.run(seed)
+        assert rollout.ok, rollout.failure
+
+
+def test_the_outer_fitting_is_opened_first_and_shut_last(tmp_path: Path) -> None:
+    steps = scene("cupboard", tmp_path).plan().plan.primitives
+    fittings = [(step.behavior, step.arguments[1]) for step in steps if step.behavior.startswith("F3")]
+    assert fittings == [("F3_OPEN", "door"), ("F3_OPEN", "drawer"), ("F3_SHUT", "drawer"), ("F3_SHUT", "door")]
+
+
+def test_a_load_is_clear_of_the_rim_before_it_enters_a_hole(tmp_path: Path) -> None:
+    one = scene("peg", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        hand, rim = world.hands["left_hand"], 0.04
+        for name, least in (("hole", rim), ("spot", 0.0)):
+            height = world.clear_height(hand, "peg1", world.place(name), 0.02, 0.19)
+            assert least + 0.008 < height < max(least, 0.02) + 0.025, name
+
+
+def test_a_hand_lifts_to_the_height_that_the_board_above_leaves(tmp_path: Path) -> None:
+    one = scene("shelf", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        for step in one.plan().plan.primitives[:3]:
+            verdict = world.execute(step)
+            assert verdict.ok, verdict
+        assert step.behavior == "B3_LIFT"
+        lifted = world.truth("jar1")[1] - world.place("under")
+        assert 0.03 < lifted[2] < 0.24 - 0.09
+        assert np.hypot(*lifted[:2]) < 0.02
