@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer, current_thread, main_thread
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Ending = Callable[[int], NoReturn]
 """Ends the process at once with an exit code."""
-YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
+YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 4, 130, 141
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 """Exit codes by status of an outcome."""
 LONGEST = 2_000
@@ -46,6 +46,9 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     try:
         code = _interruptible(call) or YES  # None if a command returns no code
         sys.stdout.flush()
+    except SystemExit as error:
+        closed = isinstance(sys.stdout, cast("type", click.utils.PacifyFlushWrapper))  # the reader of a pipe has ended
+        sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
     except (KnowledgeError, DomainError) as error:

@@ -256,7 +256,9 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
         asked = " ".join(map(str, asked))  # a behaviour and its arguments
     if isinstance(asked, int):
         if not 0 <= asked < len(plan.steps):
-            raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0")
+            named = [number_of(plan, step) for step in steps if step.id == asked]
+            hint = f"; {asked} is the ID of {', '.join(named[:6])}" if named else ""
+            raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0{hint}")
         return plan.steps[asked]
     if not isinstance(asked, str):
         found = [step for step in steps if step.path == tuple(asked)]
@@ -287,7 +289,11 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
             raise KnowledgeError(
                 f"'{asked}' is said of {len(tops)} steps: {shown}; ask for one, e.g. {number_of(plan, tops[0])}"
             )
-    known = [labels.step(step) for step in steps]
+    alike = [step for step in steps if words == labels.name(step.behavior).lower()]
+    if alike:
+        shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in alike[:6])
+        raise KnowledgeError(f"'{asked}' is said of {len(alike)} steps: {shown}; ask for one")
+    known = [text for step in steps for text in (labels.step(step), str(step))]
     raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, 'confab explain SCENE lists its steps')}")
 
 

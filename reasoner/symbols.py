@@ -652,7 +652,11 @@ def made_of(effect: Effect, one: str) -> Effect:
 
 def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior:
     """Return a behaviour in which each effect on all members of a class is replaced by one effect per member."""
-    if all(effect.each is None for effect in behavior.every_effect):
+    timing = behavior.timing
+    if all(
+        effect.each is None
+        for effect in (*behavior.every_effect, *(one for _, one in (timing.effects if timing else ())))
+    ):
         return behavior
 
     def single(effect: Effect) -> list[Effect]:
@@ -665,7 +669,9 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
     all_of = frozenset(one for kind in kinds for one in classes.get(kind, ()))
     by_name = {one for effect in behavior.effects for one in (*effect.arguments, effect.value)}
     by_name |= {one for one in all_of if any(substituted(c, {one: "?"}) != c for c in behavior.conditions)}
-    return replace(behavior, effects=effects, amounts=amounts, spread=all_of - by_name)
+    if timing is not None:
+        timing = replace(timing, effects=tuple((at, one) for at, effect in timing.effects for one in single(effect)))
+    return replace(behavior, effects=effects, amounts=amounts, timing=timing, spread=all_of - by_name)
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:

@@ -104,7 +104,7 @@ def learn(
     if plot is not None:
         curve.save(plot)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
-    show_result(data if as_json else f"{memory}: {remembered!r}")
+    show_result(data if as_json else f"{memory}: {remembered.said()}")
     raise Exit(status)
 
 
@@ -174,7 +174,7 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
         for source in memories[1:]:
             merged.merge(Memory.load(source), trust)
         merged.save(out)
-    show_result(f"{out}: {merged!r}")
+    show_result(f"{out}: {merged.said()}")
 
 
 @memory_app.command("trust", epilog=examples("memory trust"))

@@ -70,7 +70,10 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
     ending = file.suffix.lower()
     form: ox.RdfFormat | str | None = FORMATS.get(ending) or SYNTAXES.get(ending)
     if form is None:
-        raise DocumentError(f"unknown kind of file; wanted one of {', '.join(FORMATS)}")
+        saved = "; a plan, an episode or verdicts aren't a scene: give the scene that they belong to" * (
+            ending == ".json"
+        )
+        raise DocumentError(f"unknown kind of file; wanted one of {', '.join(FORMATS)}{saved}")
     content = file.read_bytes()
     if form == ox.RdfFormat.RDF_XML:
         begin = re.sub(rb"^(\xef\xbb\xbf)?(\s*#[^\n]*\n|\s+)*", b"", content[:10_000])

@@ -369,8 +369,11 @@ def scene_file(source: str | Path) -> Path:
     if files or path.is_dir():
         which = f"; did you mean '{files[0]}'?" if files else ", without a file of an ontology in it"
         raise KnowledgeError(f"'{source}' is {'a folder' if path.is_dir() else 'no file'}{which}")
-    near = nearest(str(source), shipped)
-    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)}){near}")
+    if len(path.parts) > 1:
+        raise KnowledgeError(f"no scene '{source}': there is no such file")
+    if near := nearest(str(source), shipped).removeprefix("; "):
+        raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene; {near}")
+    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)})")
 
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:

@@ -77,6 +77,11 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if len(words) < 2:
         raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
     about, name, *rest = words
+    if name not in problem.domain.situations and (len(words) == 2 or about not in individuals):
+        raise KnowledgeError(
+            f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'"
+            f"{nearest(name, problem.domain.situations) if len(words) > 2 else ''}"
+        )
     if about not in individuals:
         raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
     if name not in problem.domain.situations:

@@ -135,3 +135,13 @@ def test_a_plan_whose_steps_undo_each_other_says_so_and_how_to_ask_for_less() ->
     assert said.startswith("12 of the 30 primitives only undo each other")
     assert "--optimal" in said
     assert confab.load("beverage-serving").plan().dearer() == ""
+
+
+def test_a_reader_that_ends_early_is_no_negative_answer() -> None:
+    """Exit code 141, as of a process that a closed pipe ends."""
+    done = subprocess.Popen(
+        [sys.executable, "-m", "confab", "query", "drums-large", "--affords", "all"], stdout=subprocess.PIPE
+    )
+    assert done.stdout is not None
+    done.stdout.close()
+    assert done.wait(60) == 141
