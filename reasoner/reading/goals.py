@@ -233,7 +233,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
     """Return the goals that a goal node denotes: one for each member of a class if the node names a class as an argument."""
-    if is_a(parts.nodes.get(iri, {}), "AllOf") and not parts.flag(iri, "negated"):
+    if iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
     if not (isinstance(found, Witness) and parts.classes_in(iri)):

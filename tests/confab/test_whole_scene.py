@@ -155,3 +155,11 @@ def test_what_may_take_part_is_looked_for_in_the_whole_scene(tmp_path: Path) -> 
     told = result.why_not("cup1 LOCATION location7 by hand2")
     assert told.plan is not None
     assert not validate(result.in_whole_scene().problem, told.plan)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_goal_of_which_nothing_is_stated_is_refused_by_name(mode: Mode, tmp_path: Path) -> None:
+    text = (CASES / "lamps.ttl").read_text(encoding="utf-8")
+    (tmp_path / "lamps.ttl").write_text(text.replace("c:goal :task.g .", "c:goal :task.g, :task.h ."), encoding="utf-8")
+    with pytest.raises(KnowledgeError, match=r"task\.h"):
+        confab.load(tmp_path / "lamps.ttl").plan(mode=mode)
