@@ -72,9 +72,12 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command of a name; for a wrong name, suggest the most similar one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from confab.guessing import chosen
             from confab.reasoner.names import nearest
 
-            hint = nearest(args[0], COMMANDS)
+            helps = {name: getattr(self.get_command(ctx, name), "help", "") or "" for name in COMMANDS}
+            meant = chosen(args[0], helps)
+            hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], COMMANDS)
             raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
         return super().resolve_command(ctx, args)
 

@@ -55,7 +55,14 @@ arguments args params parameters operands objects
 steps actions children kids subplan subplans sub substeps refinement decomposition sequence list trajectory
 primitives primitive leaves low atomic flatten flat
 cost metric price total objective reward
-seconds time timeout runtime duration elapsed wall cpu clock
+rollouts runs trials episodes repeats repetitions attempts iterations
+world simulator simulation backend env environment
+interventions disturbances perturbations noise
+engine solver planner backend
+source path file filename uri url
+output out file save destination
+ground grounded grounding instantiate quantifying applicable
+seconds time timeout deadline limit runtime duration elapsed wall cpu clock
 search expanded expansions statistics stats nodes generated
 reason why because unsolvable failure failed error explain justify
 report html page visualise visualize visualization render plot browser gantt chart
@@ -128,27 +135,48 @@ MOST, NEAR = 3, 0.3
 
 
 @cache
+def stem(word: str) -> str:
+    """Return a word without its endings: ``simulat`` of ``simulators``."""
+    return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", word))
+
+
+@cache
 def meanings() -> Mapping[str, frozenset[int]]:
-    """Return the lines of `MEANINGS` that contain a word, by word."""
-    lines = [line.split() for line in MEANINGS.strip().splitlines()]
+    """Return the lines of `MEANINGS` that contain a word, by its stem."""
+    lines = [[*map(stem, line.split())] for line in MEANINGS.strip().splitlines()]
     words = {word for line in lines for word in line}
     return {word: frozenset(i for i, line in enumerate(lines) if word in line) for word in words}
 
 
 def alike(one: str, other: str) -> float:
     """Return the similarity of the meanings of two words, from 0 to 1."""
-    if one.rstrip("s") == other.rstrip("s"):
+    if stem(one) == stem(other):
         return 1.0
-    if meanings().get(one, frozenset()) & meanings().get(other, frozenset()):
+    if meanings().get(stem(one), frozenset()) & meanings().get(stem(other), frozenset()):
         return 0.9
     near = SequenceMatcher(None, one, other).ratio()
     return near if near > 0.8 and min(len(one), len(other)) > 3 else 0.0
 
 
+def segments(run: str) -> tuple[str, ...]:
+    """Return the known words that are written together in a text, the longest first; nothing if it has other parts.
+
+    >>> segments("simulateplan"), segments("xyzzy")
+    (('simulate', 'plan'), ())
+    """
+    if stem(run) in meanings() or run in FILLERS:
+        return (run,)
+    for end in range(len(run) - 2, 2, -1):
+        if (stem(run[:end]) in meanings() or run[:end] in FILLERS) and (rest := segments(run[end:])):
+            return (run[:end], *rest)
+    return ()
+
+
 @cache
 def words_of(name: str) -> tuple[str, ...]:
     """Return the significant words of a name: ``plan`` and ``length`` of ``getPlanLength``."""
-    words = tuple(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().strip("_").split("_"))
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+    words = tuple(word for run in re.findall(r"[^\W_]+", apart) for word in segments(run) or (run,))
     return tuple(word for word in words if word not in FILLERS) or words
 
 
@@ -213,11 +241,11 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return the known name that a wrong name means; an empty text if there is none.
+    """Return the known name that a wrong name means; an empty text if there is none. A mapping gives descriptions, too.
 
     >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
     ('time_limit', '')
     """
-    worth = {each: score(words_of(name), each, "") for each in known}
+    worth = {each: score(words_of(name), each, known[each] if isinstance(known, Mapping) else "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
     return best if worth.get(best, 0.0) >= ENOUGH else ""

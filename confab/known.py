@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast, overload
 
 import pyoxigraph as ox
 
@@ -67,6 +67,10 @@ class Known:
         """Return the state for pickling and copying: the knowledge graph. Values are read from it again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
+
+    def __getitem__(self, name: object) -> NoReturn:
+        """Raise `TypeError` with the names of the scene's mappings; iteration and ``in`` call this, too."""
+        raise TypeError("a scene has no items; use objects, facts, goals or behaviors")
 
     @cached_property
     def reading(self) -> Reading:

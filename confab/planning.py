@@ -134,6 +134,10 @@ def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
             from confab.memory import Memory
 
             memory = Memory.load(memory, scene)
+        if memory is not None and not isinstance(memory, Links) and not hasattr(memory, "advisor"):
+            raise KnowledgeError(
+                f"memory={memory!r} is no memory; wanted a file's name, Memory.load(FILE) or Memory.of(SCENE)"
+            )
         return _plan(scene, goals, memory, options, deadline)
 
 

@@ -20,7 +20,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.graph.knowledge import load as load_graph
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import right_names
+from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
 
 if TYPE_CHECKING:
@@ -103,11 +103,17 @@ class Scene(Known):
         shown: anywidget.AnyWidget = board(self)
         return shown
 
-    def verify(self, plan: AnyPlan, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
-        """Execute the primitives of a plan, or of an object with a plan, in PyBullet: see `confab.physics.verify`."""
+    def verify(
+        self, plan: AnyPlan | None = None, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]
+    ) -> Report:
+        """Execute the primitives of a plan, or of an object with a plan, in PyBullet: see `confab.physics.verify`.
+
+        Without a plan, the scene is planned in first.
+        """
         from confab.physics import verify
 
         self.settle()
+        plan = self.plan() if plan is None else plan
         if isinstance(plan, Result):
             options.setdefault("goal", plan.problem.goal)
         return verify(self, plan_of(plan, self.problem), rollouts, seed, **options)
@@ -268,6 +274,7 @@ class Scene(Known):
         return styled(tag("p", repr(self)), table(["wanted", "now"], rows) if rows else None)
 
 
+@right_arguments
 def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene: str | None = None) -> Scene:
     """Load a scene: a shipped name, a file of RDF or several, a graph of rdflib, or the URL of a SPARQL 1.1 endpoint.
 

@@ -195,6 +195,14 @@ def _usage(error: Any) -> str:
         error.show()
         sys.exit(MISUSE)
     command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
+    if isinstance(error, click.NoSuchOption) and error.ctx:
+        from confab.guessing import chosen
+
+        options = [each for each in error.ctx.command.params if isinstance(each, click.Option)]
+        helps = {one: each.help or "" for each in options for one in each.opts if one.startswith("--")}
+        meant = chosen(error.option_name, helps)
+        if meant:  # click itself drops an option that isn't spelt similarly
+            return f"no such option '{error.option_name}'. Did you mean '{meant}'?; see {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 

@@ -9,9 +9,10 @@ from functools import wraps
 from importlib import import_module
 from inspect import getattr_static, signature
 from types import FunctionType
-from typing import NoReturn, TypeVar
+from typing import NoReturn, ParamSpec, TypeVar
 
 C = TypeVar("C", bound=type)
+P = ParamSpec("P")
 R = TypeVar("R")
 V = TypeVar("V")
 
@@ -69,6 +70,11 @@ class Named(dict[str, V]):
     def __missing__(self, name: object) -> NoReturn:
         """Raise `KeyError` with the most similar name."""
         raise KeyError(f"no {self.kind} '{name}'{nearest(str(name), self)}" + (f"; {self.hint}" if self.hint else ""))
+
+    def __getattr__(self, name: str) -> NoReturn:
+        """Raise `AttributeError`; for a key, the message shows how its value is accessed."""
+        hint = f"; use [{name!r}]" if name in self else ""
+        raise AttributeError(f"a mapping of names has no attribute {name!r}{hint}")
 
     def __reduce__(self) -> tuple[type[dict[str, V]], tuple[dict[str, V]]]:
         """Return the reduced form for copying and pickling: a plain dictionary."""
@@ -139,21 +145,31 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
             function = getattr_static(cls, name)
             own = isinstance(function, FunctionType) and function.__module__.startswith("confab.")
             if own and not name.startswith("_"):
-                setattr(cls, name, _checked(function))
+                setattr(cls, name, right_arguments(function, bound=1))
         return cls
 
     return decorated
 
 
-def _checked(function: Callable[..., R]) -> Callable[..., R]:
-    """Return a method whose error for an unknown argument lists the arguments."""
-    parameters = [*signature(function).parameters.values()][1:]
-    takes = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
-    if not takes or any(each.kind is each.VAR_KEYWORD for each in parameters):
+def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
+    """Return a function whose error for an unknown argument suggests an argument, or lists the arguments.
+
+    Parameters
+    ----------
+    function : callable
+        Further arguments, ``**options: Unpack[module.Options]``, are known by the keys of the typed dictionary.
+    bound : int
+        Number of leading parameters that aren't named in a call: 1 for a method.
+    """
+    parameters = [*signature(function).parameters.values()][bound:]
+    own = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
+    further = next((str(each.annotation) for each in parameters if each.kind is each.VAR_KEYWORD), "")
+    if not own or (further and not further.startswith("Unpack[")):
         return function
 
     @wraps(function)
-    def checked(*given: object, **named: object) -> R:
+    def checked(*given: P.args, **named: P.kwargs) -> R:
+        takes = own if named.keys() <= {*own} else [*own, *_keys(further, function.__module__)]
         for name in named:
             if name not in takes:
                 meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
@@ -162,6 +178,15 @@ def _checked(function: Callable[..., R]) -> Callable[..., R]:
         return function(*given, **named)
 
     return checked
+
+
+def _keys(unpacked: str, module: str) -> Iterable[str]:
+    """Return the keys of the typed dictionary in an annotation ``Unpack[module.Options]``; none of an empty annotation."""
+    if not unpacked:
+        return ()
+    home, _, name = unpacked.removeprefix("Unpack[").removesuffix("]").rpartition(".")
+    keys: Mapping[str, object] = getattr(import_module(f"confab.{home}" if home else module), name).__annotations__
+    return keys
 
 
 class WrongNameError(AttributeError):

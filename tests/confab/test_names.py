@@ -6,6 +6,7 @@ import copy
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 
 import pytest
 
@@ -128,3 +129,37 @@ def test_the_command_line_runs_as_a_module_groups_its_commands_and_guesses_a_mis
     wrong = said("plna")
     assert wrong.returncode == 2
     assert wrong.stderr.strip() == "confab: no such command 'plna'; did you mean 'plan'?; see confab --help"
+
+
+def test_a_wrong_argument_is_understood_by_its_words_also_among_further_options(
+    scene: confab.Scene, result: confab.Result
+) -> None:
+    calls: dict[str, tuple[Callable[..., object], str]] = {
+        "trials": (scene.verify, "rollouts"),
+        "simulator": (scene.execute, "world"),
+        "path": (confab.load, "source"),
+    }
+    for wrong_name, (call, right) in calls.items():
+        with pytest.raises(TypeError, match=f"did you mean '{right}'"):
+            call(**{wrong_name: 1})
+    with pytest.raises(TypeError, match=r"it takes .*noise"):
+        result.verify(xyzzy=1)  # type: ignore[call-arg]
+
+
+def test_a_wrong_access_to_a_scene_or_its_objects_says_the_right_one(scene: confab.Scene) -> None:
+    with pytest.raises(TypeError, match="use objects"):
+        scene["cup1"]
+    with pytest.raises(AttributeError, match=r"use \['cup1'\]"):
+        getattr(scene.objects, "cup1")  # noqa: B009
+    with pytest.raises(confab.KnowledgeError, match="is no memory"):
+        scene.plan(memory=True)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [(["solve"], "plan"), (["simulate"], "verify"), (["verify", "x", "--n-episodes", "3"], "--rollouts")],
+)
+def test_the_command_line_understands_commands_and_options_by_their_words(line: list[str], right: str) -> None:
+    done = subprocess.run([sys.executable, "-m", "confab", *line], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"did you mean '{right}'" in done.stderr.lower()
