@@ -40,16 +40,16 @@ WAYS: Mapping[str, Mapping[str, str]] = {
 MEANINGS = """
 load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
 scenes examples datasets catalog list available builtin samples
-families generate random synthetic
+families family generate random synthetic table benchmark
 plan solve policy planner planning replan find compute start predict motion
 query ask sparql select
 verify simulate simulation simulator physics physically rollout roll dry monte carlo test
-execute run act perform dispatch apply step through carry drive real move
+execute run act perform dispatch apply step through carry drive real move play tick loop
 validate lint check shacl consistent consistency errors error warnings warning problems
 facts fact state initial init values now current belief situation world
 goals goal task tasks objective desired target wanted
 objects object individuals individual instances things entities
-behaviors behavior behaviours behaviour action actions operator operators skills schema schemas preconditions effects
+behaviors behavior behaviours behaviour action actions operator operators skills schema schemas preconditions effects name
 situations predicates fluents situation variables
 arguments args params parameters operands objects
 steps actions children kids subplan subplans sub substeps refinement decomposition sequence list trajectory
@@ -57,7 +57,12 @@ primitives primitive leaves low atomic flatten flat
 cost metric price total objective reward
 rollouts runs trials episodes repeats repetitions attempts iterations
 world simulator simulation backend env environment
-interventions disturbances perturbations noise
+interventions disturbances perturbations noise interrupts surprises
+forgone soft preferences preference unmet unachieved violated open
+within timeout deadline limit time budget
+relations static constants
+classes types sorts kinds hierarchy taxonomy
+index find search locate position
 engine solver planner backend
 source path file filename uri url
 output out file save destination
@@ -66,12 +71,12 @@ seconds time timeout deadline limit runtime duration elapsed wall cpu clock
 search expanded expansions statistics stats nodes generated
 reason why because unsolvable failure failed error explain justify
 report html page visualise visualize visualization render plot browser gantt chart
-picture draw show plot render image png map visualise visualize screenshot svg
+picture draw show plot render image png map visualise visualize screenshot svg diagram thumbnail figure
 video film movie gif mp4 animation
 graph triples rdf rdflib turtle ttl n3 jsonld serialize serialise save add
 networkx graph nx digraph tree
 save store write dump persist
-export pddl
+export pddl bt behaviortree tree
 json dict
 dataframe df pandas csv excel frame
 records dict dicts
@@ -80,7 +85,7 @@ length levels num number count size depth shape
 level depth layer height
 solved success succeeded ok solvable done found feasible
 outcome status termination
-bound optimal lower
+bound optimal lower gap
 timed schedule makespan duration timeline gantt
 certificate proof
 events timeline observations history log trace
@@ -92,7 +97,7 @@ advice rules rule weights
 embodiment robot robots arms body urdf hardware gripper kinematics joints links
 iri uri namespace namespaces prefixes base
 names prefixes prefix namespaces namespace manager
-with_fact fact set assert tell put remove without change update insert assume modify transform clone
+with_fact fact set assert tell put remove without change update insert assume modify transform clone copy
 with_goal goal set replace
 rate accuracy probability score
 label words text sentence name title
@@ -100,7 +105,7 @@ id index identifier uuid
 affordances possible applicable available afford legal can do
 serve server endpoint api rest http web host
 board widget edit editor interactive gui ui
-show print pretty display
+show print pretty display summary table stats statistics
 __version__ version
 """
 """Groups of words with the same meaning, one group per line."""
@@ -128,6 +133,8 @@ FILLERS = frozenset(
 )
 OF_ANY = frozenset({"plan", "planning", "search"})
 """Words that are ignored beside other words: a plan's length is its length."""
+OF_MODULE = frozenset({"scene", "ontology", "file"})
+"""The same for names of the module, all of whose functions are about scenes."""
 ENOUGH, FAR = 0.5, 0.1
 """Minimum score of a suggested name; reduction of the score for each step that leads to the name."""
 MOST, NEAR = 3, 0.3
@@ -229,7 +236,8 @@ def guessed(kind: str, name: str) -> str:
     ('seconds, timed, or outcome.seconds', '')
     """
     wanted = words_of(name)
-    wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in OF_ANY) or wanted
+    aside = OF_MODULE if kind == "confab" else OF_ANY
+    wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in aside) or wanted
     worth = {
         before + known: score(wanted, known, doc) - FAR * far
         for there, before, far in reversed([*places(kind)])

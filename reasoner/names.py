@@ -103,7 +103,7 @@ def _ontology_name(iri: str) -> str:
 
 TYPED = 0.85
 """Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
-FEW_NAMES = 30
+FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong one."""
 GUESSING: list[str] = []
 """Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one."""
@@ -217,7 +217,9 @@ class WrongNameError(AttributeError):
             return text
         every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
         known = sorted(each for each in every if not each.startswith("_"))
-        meant = next((right for right, wrong in self._hints().items() if name in wrong.split()), "")
+        hints = {word: right for right, wrong in reversed([*self._hints().items()]) for word in wrong.split()}
+        singular = {word.rstrip("s"): right for word, right in hints.items()}
+        meant = hints.get(name) or singular.get(name.rstrip("s"), "")
         if not meant and not get_close_matches(name, known, n=1, cutoff=TYPED):
             meant = next((import_module(each).guessed(kind.split()[-1], name) for each in GUESSING), "")
         if meant:
