@@ -13,7 +13,7 @@ from pathlib import Path
 from subprocess import Popen, TimeoutExpired
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from confab import __version__, answers
 from confab.planner.solve import Mode
@@ -69,6 +69,15 @@ class Kept:
         return self._texts[number]
 
 
+def _wrong_arguments(name: str, error: ValidationError) -> str:
+    """Return in a sentence which arguments of a tool are missing or wrong."""
+    faults = [
+        f"{'.'.join(map(str, one['loc']))}: {'missing' if one['type'] == 'missing' else one['msg']}"
+        for one in error.errors()
+    ]
+    return f"{name}: wrong arguments: {'; '.join(faults)}"[:SHOWN]
+
+
 def server(folder: Path) -> MCPServer[Any]:
     """Return the server for the scenes in a folder.
 
@@ -88,7 +97,20 @@ def server(folder: Path) -> MCPServer[Any]:
     folder = folder.resolve()
     if not folder.is_dir():
         raise KnowledgeError(f"{folder}: there is no such folder")
-    made: MCPServer[Any] = MCPServer(
+
+    class Server(MCPServer[Any]):
+        """The SDK's server, whose errors about arguments are one sentence."""
+
+        async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
+            """Call a tool by its name with its arguments."""
+            try:
+                return await super().call_tool(name, arguments, context)
+            except ToolError as error:
+                if isinstance(error.__cause__, ValidationError):
+                    raise ToolError(_wrong_arguments(name, error.__cause__)) from None
+                raise
+
+    made = Server(
         "confab",
         version=__version__,
         instructions="Plans of a robot from an ontology, with reasons, proofs that there is none, and checks in physics.",

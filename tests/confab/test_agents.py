@@ -64,6 +64,8 @@ async def a_goal_is_planned_for_and_a_step_explained(client: Any) -> None:
 @session
 async def something_else_is_compared(client: Any) -> None:
     assert await said(client, "why_not", scene=SCENE, instead=GOAL)
+    text = await said(client, "why_not", refused=True, scene=SCENE)
+    assert text == "why_not: wrong arguments: instead: missing"
 
 
 @session
