@@ -19,7 +19,6 @@ from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
-from confab.planner.preferences import preferred
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -172,6 +171,13 @@ def _plan(
         problem = whole()
         faulty = [*never_done(problem)]
 
+    def chosen(problem: Problem) -> tuple[Problem, Outcome]:
+        if not problem.weights:
+            return problem, search(problem)
+        from confab.planner.preferences import preferred
+
+        return preferred(problem, search, exact)
+
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
         if options.by_engine:
@@ -218,14 +224,14 @@ def _plan(
         leaves = options.leave_levels and mode != "paper"
         if not leaves and _none_at_all(possible, deadline):
             raise KnowledgeError(why, seen.names.iri(behavior.name))
-        doable, outcome = preferred(possible, search, exact)
+        doable, outcome = chosen(possible)
         problem = replace(problem, goal=doable.goal, weights={})
         if leaves and outcome.status is Status.UNSOLVABLE:
             raise KnowledgeError(why, seen.names.iri(behavior.name))
         if outcome.status is Status.GAVE_UP and outcome.reason:
             outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
     else:
-        problem, outcome = preferred(problem, search, exact)
+        problem, outcome = chosen(problem)
     if in_part and (
         outcome.status is Status.UNSOLVABLE
         or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
@@ -233,7 +239,7 @@ def _plan(
         anew = whole()
         if anew != seen.problem:
             in_part = False
-            problem, outcome = preferred(anew, search, exact)
+            problem, outcome = chosen(anew)
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, deadline)
     elif asks_for_times(problem, options.minimise):

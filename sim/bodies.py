@@ -13,6 +13,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -22,11 +23,13 @@ from typing import Any
 from uuid import uuid4
 
 import numpy as np
-import pybullet
 from numpy.typing import ArrayLike
 
 from confab.reasoner.embodiment.values import Shape
 from confab.sim.urdf import Array
+
+with suppress(ImportError):  # shapes are measured without PyBullet, too
+    import pybullet
 
 PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
