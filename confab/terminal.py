@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer, current_thread, main_thread
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -47,7 +47,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         code = _interruptible(call) or YES  # None if a command returns no code
         sys.stdout.flush()
     except SystemExit as error:
-        closed = isinstance(sys.stdout, cast("type", click.utils.PacifyFlushWrapper))  # the reader of a pipe has ended
+        closed = isinstance(error.__context__, BrokenPipeError)  # the reader of a pipe has ended
         sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
