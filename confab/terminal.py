@@ -47,7 +47,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         code = _interruptible(call) or YES  # None if a command returns no code
         sys.stdout.flush()
     except SystemExit as error:
-        closed = isinstance(error.__context__, BrokenPipeError)  # the reader of a pipe has ended
+        closed = "PacifyFlush" in type(sys.stdout).__name__  # click's wrapper after the reader of a pipe has ended
         sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
