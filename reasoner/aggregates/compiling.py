@@ -1,4 +1,4 @@
-"""Compilation of a domain with aggregates: behaviours update sums and counts, and conditions no longer read maxima or minima."""
+"""Compilation of a domain with aggregates: behaviours update sums and counts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
-from confab.reasoner.aggregates.extrema import extrema_replaced
 from confab.reasoner.aggregates.keeping import MOST_CONDITIONS, kept
 from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, walk
@@ -15,16 +14,15 @@ from confab.reasoner.symbols import AnyOf, Behavior, Condition, Domain, Effect, 
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
-    """Return an equivalent domain in which no condition reads a maximum or minimum and behaviours update sums and counts.
+    """Return an equivalent domain in which behaviours update sums and counts.
 
     Effects on all members of a class become one effect per member.
 
     Raises
     ------
     DomainError
-        An effect or a price reads a maximum or minimum, or too many effects change the same total.
+        Too many effects change the same total.
     """
-    domain = extrema_replaced(domain)
     aggregates = domain.aggregates.values()
     behaviors = {}
     for name, behavior in domain.behaviors.items():

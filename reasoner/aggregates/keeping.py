@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 
 from confab.reasoner.afterwards import (
     OPPOSITE,
@@ -53,6 +53,8 @@ from confab.reasoner.symbols import (
 
 MOST_CONDITIONS = 5_000
 """Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts (one second to compile)."""
+MOST_CANDIDATES = 300
+"""Maximum number of candidates of a total; each is compared with each earlier one (one second)."""
 
 
 def kept(
@@ -159,7 +161,9 @@ class _Keeping:
         self.linear = self.after.linear(self.amount)
         quantity = situations[aggregate.situation].quantity
         self.forbidden = aggregate.function == "count" and quantity is not None and quantity.most == 0
-        self.candidates = list(self._candidates())
+        self.candidates = list(islice(self._candidates(), MOST_CANDIDATES + 1))
+        if len(self.candidates) > MOST_CANDIDATES:
+            raise TooManyCasesError
 
     def behavior(self) -> Behavior:
         """Return the behaviour with the effects on the total."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
 
-from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
+from confab.reasoner.aggregates.extrema import extrema_replaced
 from confab.reasoner.amounts import Amount, Quantity, inside, written
 from confab.reasoner.derivation import circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -74,7 +74,8 @@ class Frame:
     """The domain of a problem and the classes of some individuals: everything in a problem except its facts and its goal.
 
     `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values.
-    `lifted` contains the behaviours before effects on all members of a class are expanded.
+    In `domain`, conditions don't read maxima or minima, and behaviours don't update sums and counts yet. `lifted` contains the
+    behaviours before effects on all members of a class are expanded.
     """
 
     schema: Schema
@@ -136,7 +137,7 @@ def frame(
         _check_behavior(replace(one.behavior, level=domain.situations[one.situation].level), domain)
     individuals_named(domain, names)
     try:
-        domain = compiled(domain, classes)
+        domain = extrema_replaced(domain)
     except DomainError as error:
         raise KnowledgeError(str(error)) from None
     return Frame(schema, parts, domain, classes, parents, properties, lifted)

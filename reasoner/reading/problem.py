@@ -19,9 +19,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import exceptions, with_totals
 from confab.reasoner.condition_nodes import Node
-from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.language import DomainError
 from confab.reasoner.limits import check
 from confab.reasoner.names import Names
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
@@ -114,13 +116,15 @@ def reading_of(
         Whether the frame contains all individuals of the scene.
     """
     schema, names = known.schema, known.names
-    relations, stated = facts_of(
-        facts, {**tuples, **schema.facts}, known.properties, known.domain, names, schema.numbers
-    )
-    initial = initial_state(known.domain, known.classes, stated, names)
-    initial = with_totals(known.domain, known.classes, relations, initial)
-    check_values(initial | exceptions(known.domain, known.classes, relations, initial), known.domain, names)
+    try:
+        domain = compiled(known.domain, known.classes)
+    except DomainError as error:
+        raise KnowledgeError(str(error)) from None
+    relations, stated = facts_of(facts, {**tuples, **schema.facts}, known.properties, domain, names, schema.numbers)
+    initial = initial_state(domain, known.classes, stated, names)
+    initial = with_totals(domain, known.classes, relations, initial)
+    check_values(initial | exceptions(domain, known.classes, relations, initial), domain, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
-    problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
+    problem = Problem(scene, domain, known.classes, relations, initial, {}, known.parents, levels)
     wanted = with_task(problem, known.parts, schema.of_kind("Task"))
     return Reading(with_times(wanted, known.parts, schema), names, schema, whole)
