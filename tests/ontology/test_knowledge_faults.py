@@ -218,7 +218,7 @@ MINI = """
         ({"shut": "false . ?box :SHUTT true", "unit": "kg"}, "CLOSE", ":SHUTT is neither a property"),
         ({"shut": "false . ?box :SHUT true", "unit": "kg"}, "CLOSE", "CLOSE requires that box SHUT false and that box SHUT true"),
     ],
-    ids=["a text", "no update", "units", "a misspelt name", "a contradiction"],
+    ids=["a text for a value", "no update", "units", "a misspelt name", "conditions that contradict each other"],
 )  # fmt: skip
 def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
     tmp_path: Path, said: dict[str, str], node: str, what: str

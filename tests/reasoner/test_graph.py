@@ -54,6 +54,16 @@ def test_a_catalog_with_entities_is_refused(tmp_path: Path) -> None:
         load(tmp_path / "mine.ttl")
 
 
+def test_a_catalog_that_leads_to_a_circle_of_links_is_a_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "catalog-v001.xml").write_text(
+        '<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog"><uri name="urn:l" uri="loop.ttl"/></catalog>'
+    )
+    (tmp_path / "loop.ttl").symlink_to("loop.ttl")
+    (tmp_path / "mine.ttl").write_text(HEADER.format("urn:l"))
+    with pytest.raises(KnowledgeError, match="a link that leads to no file; correct the entry"):
+        load(tmp_path / "mine.ttl")
+
+
 def test_a_query_that_is_no_sparql_is_a_clear_error() -> None:
     graph = load("beverage-serving")
     with pytest.raises(KnowledgeError, match="not SPARQL"):
