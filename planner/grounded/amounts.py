@@ -20,6 +20,7 @@ from typing import TypeAlias
 from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import (
     COMPARING,
+    LARGEST,
     Amount,
     Calculation,
     Expression,
@@ -250,6 +251,18 @@ class Amounts:
                 found[place].append((bit, difference, sign))
         return found
 
+    @cached_property
+    def bounds(self) -> Sequence[tuple[Exact | float, Exact | float, int]]:
+        """The least and the greatest allowed amount at each place, and the greatest denominator."""
+        return [
+            (
+                -inf if its.least is None else _exact(its.least),
+                inf if its.most is None else _exact(its.most),
+                1 if its.whole else LARGEST,
+            )
+            for its in self.quantities
+        ]
+
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
         """Return the number of a tuple; for a new tuple, store `mask` (another tuple's bits), updated at the `changed` places."""
         number = self._number.get(vector)
@@ -304,12 +317,12 @@ class Amounts:
                     new[move.place] = old + by
                 case _:
                     new[move.place] = old - by
-        for place, amount in new.items():
-            if not self.quantities[place].allows(Fraction(amount)):
-                return None
         changed = list(vector)
         for place, amount in new.items():
-            changed[place] = _exact(amount)
+            changed[place] = exact = _exact(amount)
+            least, most, denominator = self.bounds[place]
+            if not (least <= exact <= most and exact.denominator <= denominator and abs(exact.numerator) <= LARGEST):
+                return None
         number = self.numbered(tuple(changed), self._masks[number], new)
         return after & self.keep | self._masks[number] | number << self.size
 

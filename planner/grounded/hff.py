@@ -17,8 +17,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from fractions import Fraction
-from math import ceil
 from typing import NamedTuple, TypeAlias
 
 from confab.planner.grounded.amounts import Exact, Linear, pushes
@@ -173,7 +171,7 @@ def _times(amount: Exact, sign: str, push: Exact | None) -> int:
         amount, push = (amount, push) if amount < 0 else (-amount, -push)
     if push <= 0:
         return 0
-    times = max(ceil(Fraction(-amount) / Fraction(push)), 1)
+    times = max(-(amount // push), 1)
     if sign == ">" and amount + times * push == 0:
         times += 1
     return min(times, MOST_TIMES)

@@ -119,13 +119,12 @@ class _Sums:
 
     def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
         """Return for each bit the least amount consumed by any operator that sets it, divided among bits set together."""
-        found = {
-            bit: min(
-                (Fraction(used.get(o, 0)) / len(self.sets[o] & bits) for o in self.makers[bit]), default=Fraction(0)
-            )
-            for bit in bits
-        }
-        return {bit: value for bit, value in found.items() if value > 0}
+        found = dict[int, Fraction]()
+        for bit in bits:
+            makers = self.makers.get(bit, ())
+            if makers and all(o in used for o in makers):
+                found[bit] = min(Fraction(used[o]) / len(self.sets[o] & bits) for o in makers)
+        return found
 
     def undone(self, operator: int, worth: Mapping[int, Fraction]) -> Fraction:
         """Return the worth of the bits that an operator certainly clears."""
