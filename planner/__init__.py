@@ -1,1 +1,4 @@
-"""Symbols in, plan out: search, cogency, refinement, acting and learning. Knows no RDF and no physics."""
+"""The planner: it takes a problem as symbols, searches for plans, executes them in a world, and learns from them.
+
+This package uses no RDF and no physics.
+"""

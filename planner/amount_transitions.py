@@ -1,6 +1,6 @@
-"""Amounts in generated Python: comparisons, changes by behaviours, and tests of whether a change approaches a goal.
+"""Amounts in generated Python: comparisons, changes by behaviours, and tests of progress towards a goal.
 
-A table stores an amount as text; generated code calls functions of this module with the numbers of the texts.
+A table stores amounts as text; generated code converts the text to numbers and calls the functions of this module.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from confab.reasoner.symbols import AmountEffect, Comparison
 
 Rows: TypeAlias = "frozenset[tuple[str, ...]]"
 Constant: TypeAlias = "Callable[[tuple[str, str], object], str]"
-"""Makes a value available to generated code, and returns its name in this code."""
+"""Function that makes a value available to generated code and returns the value's name there."""
 
 
 def amount(expression: Expression, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return an amount as a Python expression; a missing amount is `NOTHING`."""
+    """Return an arithmetic expression as a Python expression; an amount without a value is `NOTHING`."""
     match expression:
         case Amount(situation, arguments):
             return _now(situation, key_written(arguments), constant)
@@ -56,7 +56,7 @@ def comparison(condition: Comparison, relations: Mapping[str, Rows], constant: C
 
 
 def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return the call that changes an existing symbol's amount in `amounts`."""
+    """Return the call that changes the amount of an existing symbol in `amounts`."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     old = f"{identifier('now', effect.situation)}[{key}]"
     function = constant(("amounts", "changed"), changed)
@@ -64,7 +64,7 @@ def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Consta
 
 
 def approaches_goal(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return a test of whether an effect brings its amount nearer to a goal; the goal is in a variable."""
+    """Return a Python test of whether an effect brings its amount nearer to the goal in the variable `wanted`."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     after = (
         f"{constant(('amounts', 'done'), done)}({effect.operation!r}, {_now(effect.situation, key, constant)}, {by})"
@@ -79,7 +79,7 @@ def _now(situation: str, key: str, constant: Constant) -> str:
 
 @lru_cache(maxsize=64)
 def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
-    """Return the numbers of a relation."""
+    """Return the tuples of a relation with a numeric value, as numbers."""
     return {row[:-1]: number(row[-1]) for row in rows}
 
 
@@ -89,7 +89,7 @@ def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
 def changed(
     amounts: dict[tuple[str, object], Number], situation: str, key: object, old: str, operation: str, by: Number
 ) -> None:
-    """Change an amount after earlier effects of the same behaviour."""
+    """Change an amount that earlier effects of the same behaviour may have changed already."""
     cell = situation, key
     amounts[cell] = done(operation, amounts[cell] if cell in amounts else number(old), by)
 
@@ -99,7 +99,7 @@ def settled(
     quantities: Mapping[str, Quantity],
     changes: list[tuple[str, object, str]],
 ) -> bool:
-    """Add amounts to the changes; return whether all are valid."""
+    """Add new amounts to the changes; return whether all amounts are valid."""
     for (situation, key), found in amounts.items():
         if not quantities[situation].allows(found):
             return False

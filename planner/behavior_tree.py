@@ -1,12 +1,12 @@
-"""A plan as a reactive behaviour tree, which recovers by itself after a disturbance that undoes a step.
+"""A plan as a reactive behaviour tree; if a disturbance undoes a step, the tree repeats the step.
 
-Each step becomes a fallback: either *its effects hold already*, or *its conditions hold and it is executed*. The required facts
-are the causal links of the primitives (`confab.planner.causal_links`), to the goal or to a later primitive that requires them.
-A link is satisfied if the fact holds, or if the later primitive has been executed. So a primitive is repeated exactly if a
-later primitive still requires its effects. At the beginning of each tick the completed primitives are marked, the last one
-first. After each primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps whose primitives
-neither require nor disturb one another, and that have different workers, are parallel. The steps below an abstract step are a
-subtree.
+Each step becomes a fallback with two children: *its effects hold already*, or *its conditions hold and it is executed*.
+The required facts of the tree are the causal links between primitives, or from a primitive to the goal
+(`confab.planner.causal_links`). A link is satisfied if the fact holds, or if the later primitive has been executed. So
+a primitive is repeated if and only if a later primitive still requires its effects. At the beginning of each tick, the
+completed primitives are marked, from the last to the first. After each primitive the tree is ticked again. Steps are
+ticked in the order of the plan; sibling steps are parallel if they have different workers and their primitives neither
+require nor disturb one another. The steps below an abstract step are a subtree.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 @dataclass(frozen=True)
 class Holds:
-    """A condition leaf: some facts, or some ground conditions, hold."""
+    """A condition leaf that succeeds if some facts, or some ground conditions, hold."""
 
     facts: tuple[Fact, ...] = ()
     conditions: tuple[Condition, ...] = ()
@@ -38,21 +38,24 @@ class Holds:
 
 @dataclass(frozen=True)
 class Do:
-    """Conditions and an action: if its preconditions hold, a primitive is executed to its end; then the tree is ticked again."""
+    """An action leaf: if its preconditions hold, a primitive is executed, and then the tree is ticked again."""
 
     step: Step
 
 
 @dataclass(frozen=True)
 class Marked:
-    """A condition leaf: the step of a path was marked as done in this tick."""
+    """A condition leaf that succeeds if the step of a path was marked as done in this tick."""
 
     path: Path
 
 
 @dataclass(frozen=True)
 class Mark:
-    """Marks the step of a path as done if the child succeeds, and as not done otherwise; it always succeeds."""
+    """A node that marks the step of a path as done if its child succeeds, and as not done otherwise.
+
+    The node itself always succeeds.
+    """
 
     path: Path
     child: Node
@@ -60,28 +63,28 @@ class Mark:
 
 @dataclass(frozen=True)
 class All:
-    """Children that are ticked one after another, as long as they succeed."""
+    """A sequence node: the children are ticked one after another, as long as they succeed."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class First:
-    """Children that are ticked one after another, until one succeeds."""
+    """A fallback node: the children are ticked one after another, until one succeeds."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Together:
-    """Children that are ticked at the same time and must all succeed."""
+    """A parallel node: the children are ticked at the same time and must all succeed."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Subtree:
-    """A tree with a name: the whole tree, the marks, or the steps below a step."""
+    """A named subtree: the whole tree, the marks, or the sub-steps of a step."""
 
     name: str
     child: Node
@@ -92,7 +95,7 @@ Node: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Subtree
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
-    """Return the tree of a plan.
+    """Return the behaviour tree of a plan.
 
     Parameters
     ----------
@@ -115,7 +118,7 @@ def children(node: Node) -> tuple[Node, ...]:
 
 
 class _Tree:
-    """The nodes of a plan's steps."""
+    """Creates the nodes for a plan's steps."""
 
     def __init__(self, problem: Problem, plan: Plan) -> None:
         self.problem = problem
@@ -137,13 +140,13 @@ class _Tree:
     # --------------------------------------------------------------------------------------------------- steps
 
     def at_rest(self) -> list[Fact]:
-        """Return the rest values of all symbols that the plan changes."""
+        """Return the rest values of all symbols that the plan changes and that have rest values."""
         changed = {change.fact.symbol for purpose in self.purposes.values() for change in purpose.gives}
         rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
 
     def marks(self) -> tuple[Node, ...]:
-        """Return the marks of all required primitives, the last first."""
+        """Return the marks of all required primitives, the last primitive first."""
         needed = [path for path in self.position if self.needs[path]]
         return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
 
@@ -163,7 +166,7 @@ class _Tree:
         )
 
     def needed(self, step: Step) -> list[Step]:
-        """Return the required primitives of a step."""
+        """Return the primitives of a step that are required."""
         return [below for below in Plan((step,)).primitives if self.needs[below.path]]
 
     def node(self, step: Step) -> Node:
@@ -185,12 +188,12 @@ class _Tree:
     # ------------------------------------------------------------------------------------------------ purposes of the steps
 
     def kept(self, path: Path) -> Node:
-        """Return the condition that all links from a primitive are kept."""
+        """Return the condition that all causal links from a primitive are satisfied."""
         links = tuple(dict.fromkeys(map(self.link, self.needs[path])))
         return links[0] if len(links) == 1 else All(links)
 
     def link(self, need: Need) -> Node:
-        """Return the condition that a link is satisfied: the later step is done, or the link's facts or conditions hold."""
+        """Return the condition that a causal link is satisfied: the later step is done, or the link's facts or conditions hold."""
         kept: list[Node] = [Marked(need.by)] if need.by else []
         kept.append(Holds(tuple(self.wanted(change, need.kind) for change in need.gives)))
         if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
@@ -202,7 +205,10 @@ class _Tree:
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
     def wanted(self, change: FactChange, kind: Kind) -> Fact:
-        """Return the fact that a change makes true. For an amount, the fact is a bound: at least, or at most, the planned value."""
+        """Return the fact that a change makes true.
+
+        For an amount, the fact is a bound: the amount is at least, or at most, the planned value.
+        """
         symbol, value = change.fact.symbol, change.fact.value
         if kind is Kind.GOAL and symbol in self.problem.goal:
             return Fact(symbol, self.problem.goal[symbol])
@@ -214,10 +220,10 @@ class _Tree:
 def _abstract_links(
     below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
 ) -> dict[Path, list[tuple[FactChange, list[Path]]]]:
-    """Return the links between abstract steps by primitives: the fact, and the primitives with which the link may end.
+    """Return the causal links between abstract steps: each has a fact, and the primitives at which the link may end.
 
-    Such a link begins with the primitive that gives the fact. It ends with the first primitive of the later step that changes
-    the fact, otherwise with the last required primitive of that step.
+    A link between abstract steps begins with the primitive that makes its fact true. The link ends with the first
+    primitive of the later step that changes the fact, otherwise with the last primitive of that step that is required.
     """
     under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
     found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}
@@ -251,13 +257,13 @@ class Situation:
         self.facts = Facts(problem, state, self.rules)
 
     def holds(self, leaf: Holds) -> bool:
-        """Return whether the facts or conditions of a leaf hold."""
+        """Return whether all facts or conditions of a leaf hold."""
         if leaf.conditions:
             return self.rules.satisfied(leaf.conditions, {}, {}, self.facts) is not None
         return all(self.is_so(fact) for fact in leaf.facts)
 
     def is_so(self, fact: Fact) -> bool:
-        """Return whether a fact holds; the value of an amount may be a comparison."""
+        """Return whether a fact holds; the wanted value of an amount may be a comparison."""
         value = self.facts.value(fact.symbol.situation, fact.symbol.arguments)
         return value is not None and meets(value, fact.value)
 

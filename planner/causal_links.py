@@ -1,11 +1,12 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step needs an earlier step of the same level if it depends on a fact of the earlier step: with the previous value of
-that fact, the later step isn't applicable, or lacks a needed effect. This test finds links for any kind of condition ("no
-object stands there", "the hand holds it"). Without the earlier step, `confab.planner.validation` rejects the rest of the plan.
-Each level has its own sequence of steps; lower steps stand in for it where a plan leaves the level. The facts that a step reads
-are recorded, and only these are restored. So the effort grows with the number of facts that the steps read, and not with the
-square of the plan's length.
+A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the
+previous value, the later step would be inapplicable or lose a required effect. This test finds causal links for any
+kind of condition ("no object stands there", "the hand holds it"). The checker (`confab.planner.validation`) rejects a
+plan without one of these earlier steps. Each level has its own sequence of steps; where the plan leaves a level,
+lower-level steps take their place. The facts that a step reads are recorded, and only these facts are reset to their
+previous values. So the effort grows with the number of facts that the steps read, and not with the square of the plan's
+length.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Path = tuple[int, ...]
 
 
 class Kind(Enum):
-    """The kind of a need for a fact."""
+    """The kind of need for a fact."""
 
     GOAL = "goal"  # a goal
     ABOVE = "above"  # an effect, or an unchanged fact, of the step above
@@ -44,11 +45,12 @@ class FactChange:
 
 @dataclass(frozen=True)
 class Need:
-    """A need for some of the facts that a step gives.
+    """A need for some of the facts that a step makes true.
 
-    `gives` are these facts. `by` is the path of the step that needs them; it is empty for the goal and for rest values at the end
-    of the plan. `conditions` are the preconditions of a later step that fail without them, with individuals; empty if the step
-    would be applicable and have other effects. For a goal, they are the defined goals that follow from the facts.
+    `gives` lists the facts that are needed. `by` is the path of the step that needs the facts; it is empty for the goal
+    and for rest values at the end of the plan. `conditions` lists the ground preconditions of the later step that fail
+    without the facts; it is empty if only the later step's effects would differ. For a goal, `conditions` lists the
+    defined goals that follow from the facts.
     """
 
     kind: Kind
@@ -59,9 +61,9 @@ class Need:
 
 @dataclass(frozen=True)
 class Purpose:
-    """The facts that a step gives, as its level sees them, and their needs, nearest first.
+    """The facts that a step makes true on its level, and the needs for them, nearest first.
 
-    A step without needs is superfluous.
+    A step that isn't needed is superfluous.
     """
 
     gives: tuple[FactChange, ...]
@@ -89,7 +91,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
 
 
 def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
-    """Return the order of a step's needs: the goal, steps of the same refinement, the step above, other steps, rest values."""
+    """Return the sort key of a step's needs: the goal, steps of the same refinement, the step above, other steps, rest values."""
     order = {Kind.GOAL: 0, Kind.ABOVE: 2, Kind.REST: 4}
 
     def key(need: Need) -> tuple[int, Path]:
@@ -100,7 +102,10 @@ def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
 
 
 def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
-    """Yield the steps of a level in order; where the plan leaves the level, the steps in their place."""
+    """Yield the steps of a level in order.
+
+    Where the plan leaves the level, yield the lower-level steps in their place.
+    """
     for step in steps:
         if step.level >= level or not step.steps:
             yield step
@@ -110,14 +115,14 @@ def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
 
 @dataclass
 class _Written:
-    """The step that gave a cell its value, and the value before."""
+    """The step that gave a cell its value, and the cell's previous value."""
 
     by: int
     before: str
 
 
 class _Noting(Facts):
-    """Facts that record the cells, and the holders of values, that are read."""
+    """Facts that record which cells, and which holders of values, are read."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -179,7 +184,7 @@ class _Course:
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the changes of a step in the present state; None if it isn't applicable."""
+        """Return the changes of a step in the present state; None if the step isn't applicable."""
         behavior = self.problem.domain.behaviors[step.behavior]
         found = self.rules.changes(behavior, step.arguments, self.facts)
         return None if found is None else {(situation, key): value for situation, key, value in found}
@@ -187,7 +192,7 @@ class _Course:
     def needs_of(
         self, step: Step
     ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
-        """Yield the steps that a step needs, each with the conditions that fail, or the cells that differ, without it."""
+        """Yield the steps that a step needs, with the conditions or cells that would differ without each of them."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
@@ -216,7 +221,10 @@ class _Course:
     def failures_without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
-        """Return the conditions of a step that fail if cells have their previous values; None if the step is unaffected."""
+        """Return the conditions of a step that fail if the given cells have their previous values.
+
+        Return None if the step isn't affected.
+        """
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
         now = {cell: str(facts.value(*cell)) for cell in cells}
@@ -244,7 +252,7 @@ class _Course:
         return (changes, (), differs) if differs else None
 
     def givers_of_amount(self, cell: Cell, before: str) -> _Written | None:
-        """Return the steps that provided a consumed amount: without any of them it would have been less."""
+        """Return the steps that provided a consumed amount: without any of them, the amount would have been smaller."""
         if cell not in self.written or not self.counted(cell):
             return None
         less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
@@ -252,11 +260,11 @@ class _Course:
         return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
 
     def counted(self, cell: Cell) -> bool:
-        """Return whether a cell has an amount: a step that changes an amount depends on the amount before."""
+        """Return whether a cell contains an amount; a step that changes an amount depends on the previous amount."""
         return self.problem.domain.situations[cell[0]].quantity is not None
 
     def done(self, number: int, step: Step) -> None:
-        """Execute a step with all steps below it, and record what it gave."""
+        """Execute a step with all its sub-steps, and record the cells that it changed."""
         mark = len(self.facts.log)
         for primitive in Plan((step,)).primitives:
             for cell, value in (self.changes(primitive) or {}).items():
@@ -272,7 +280,7 @@ class _Course:
     def left(
         self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
     ) -> Iterator[tuple[Path, Need]]:
-        """Yield the facts that steps have to achieve for the step above (for the plan if level is 0), each with its giver."""
+        """Yield each fact that sub-steps have to achieve for their parent (level 0: the plan), with its achiever."""
         touched = dict[Cell, str]()
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)
@@ -293,9 +301,9 @@ class _Course:
             yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
 
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
-        """Yield the steps that give the facts from which a defined goal follows.
+        """Yield the steps that make the facts true from which a defined goal follows.
 
-        Facts that its derivation read, and without which the goal wouldn't hold.
+        These are the facts that the derivation of the goal read and without which the goal wouldn't hold.
         """
         if cell[0] not in self.problem.domain.rules:
             return
@@ -317,7 +325,10 @@ class _Course:
                 yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
 
     def changes_that_matter(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
-        """Return the changes of some cells if a defined situation would differ without them; otherwise nothing."""
+        """Return the changes of `cells` if a defined situation would differ without them.
+
+        Otherwise return no changes.
+        """
         facts, mark = self.facts, len(self.facts.log)
         now = {other: str(facts.value(*other)) for other in cells}
         for other in cells:
@@ -329,7 +340,7 @@ class _Course:
         return tuple(FactChange(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
 
     def fact_of(self, number: int, cell: Cell) -> Fact | None:
-        """Return the fact that a step gives to a cell."""
+        """Return the fact that a step makes true for a cell."""
         given = self.gives.get(self.steps[number].path, ())
         return next((c.fact for c in given if (c.fact.symbol.situation, c.fact.symbol.arguments) == cell), None)
 

@@ -1,11 +1,11 @@
-"""Checks whether a certificate proves that a task has no plan. The checker shares no code with any search.
+"""Checker of certificates of unsolvability; the checker shares no code with any search.
 
 It checks the whole task on its lowest level, since a failure of an upper level proves nothing. It reads behaviours and conditions
 as they are written (`confab.planner.possibilities`) and verifies that the certificate's set of states
 
-1. contains the initial state;
-2. is closed: no behaviour of the lowest level leads out of it. Each case is expanded with all applicable behaviours;
-3. contains no state in which the goal holds and each symbol with a rest value has that value, or its initial one.
+1. contains the initial state; 2. is closed: no lowest-level behaviour leads out of it; Each case of the certificate is
+   expanded with all applicable behaviours;
+3. contains no goal state in which each symbol with a rest value has its rest value or its initial value.
 
 A plan of several levels is a sequence of behaviours of the lowest level that ends in such a state (docs/levels.md).
 """
@@ -24,20 +24,26 @@ from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 OTHER, ANY, KEPT = "", "?", "="
-"""Entries of a case: none of the distinguished values; any value; in a successor, the value before the behaviour."""
+"""Entries of a case: `OTHER` is any value that isn't distinguished; `ANY` is any value.
+
+`KEPT`, in a successor, is the value before the behaviour.
+"""
 WORK = 3_000_000
-"""Maximum work of a check: tests of conditions, and behaviours tried in a case."""
+"""Maximum work of a check, as the number of tested conditions and of behaviours tried in a case."""
 MOST_CASES = 200_000
 
 T = TypeVar("T")
 Case: TypeAlias = "tuple[str, ...]"
 Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
-"""The result of a behaviour in a case: the entries that change, each with its possible values, or None if the behaviour isn't
-applicable; and the claim "never" or "always" that it violates."""
+"""The result of a behaviour in a case: the entries that change, each with its possible values (None if the behaviour
+isn't applicable), and the violated claim "never" or "always"."""
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
-    """Return the reason for which a certificate doesn't prove that a problem has no plan; None if it proves this."""
+    """Return the reason why a certificate doesn't prove that a problem has no plan.
+
+    Return None if the certificate is a proof.
+    """
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
@@ -65,7 +71,7 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
 
 
 class Decisions(Generic[T]):
-    """A trie of results, indexed by the entries of the case on which they depend."""
+    """A trie of results; each result is indexed by the entries of the case on which it depends."""
 
     def __init__(self) -> None:
         self.at: int | None = None
@@ -73,14 +79,14 @@ class Decisions(Generic[T]):
         self.below: dict[str, Decisions[T]] = {}
 
     def find(self, case: Case) -> T | None:
-        """Return the known result for a case."""
+        """Return the stored result for a case."""
         node: Decisions[T] | None = self
         while node is not None and node.at is not None:
             node = node.below.get(case[node.at])
         return None if node is None else node.found
 
     def learn(self, case: Case, reads: Iterable[int], found: T) -> None:
-        """Store a result under the entries that were read."""
+        """Store a result under the entries on which it depends."""
         node = self
         for at in dict.fromkeys(reads):
             node.at = at
@@ -90,7 +96,10 @@ class Decisions(Generic[T]):
 
 @dataclass
 class CaseView:
-    """Knowledge about one case; `reads` lists the entries that were read, `unknown` the symbols without an entry."""
+    """The values that symbols can have in one case of a certificate.
+
+    `reads` lists the entries that were read, `unknown` the symbols without an entry.
+    """
 
     claims: Claims
     case: Case
@@ -98,7 +107,7 @@ class CaseView:
     unknown: list[tuple[Symbol, str, bool]] | None = None
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has a value in some state of the case."""
+        """Return whether a symbol has a value in at least one state of the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -121,7 +130,7 @@ class CaseView:
         return True
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has another value in some state of the case."""
+        """Return whether a symbol has another value in at least one state of the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -158,7 +167,7 @@ class CaseView:
 
 
 class Claims:
-    """A certificate prepared for queries: positions of distinguished symbols, bounds of amounts."""
+    """A certificate prepared for queries: positions of distinguished symbols, and bounds of amounts."""
 
     def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
         self.lowest, self.certificate = lowest, certificate
@@ -168,7 +177,7 @@ class Claims:
         self._ranges: dict[Symbol, Range] = {}
 
     def entry(self, at: int, value: str) -> str:
-        """Return the entry of a case for a value."""
+        """Return the entry that represents a value at a position of a case."""
         return value if not self.apart[at] or value in self.apart[at] else OTHER
 
     def range(self, symbol: Symbol) -> Range:
@@ -186,7 +195,7 @@ class Claims:
         return self._ranges[symbol]
 
     def allowed(self, symbol: Symbol) -> Range:
-        """Return the range that the situation type of a symbol allows, with the initial amount."""
+        """Return the range that the situation type of a symbol allows, extended by the initial amount."""
         quantity, first = self.lowest.quantity(symbol.situation), number(self.lowest.initial(symbol))
         low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
         high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
@@ -200,7 +209,7 @@ class Claims:
 
 @dataclass
 class Try:
-    """A behaviour with its individuals, and its known results."""
+    """A behaviour with its individuals, and its results known so far."""
 
     behavior: Behavior
     env: Mapping[str, str]
@@ -208,11 +217,11 @@ class Try:
 
 
 class Cases:
-    """All cases of a certificate, from the initial one on.
+    """All reachable cases of a certificate, starting with the initial case.
 
-    `came_from` maps each case to its predecessor and the behaviour between them.
+    `came_from` maps each case to its predecessor and the behaviour that leads from there.
 
-    `fault` says what invalidates the certificate; `reached` is a case in which the goal may hold.
+    `fault` is the reason why the certificate is invalid; `reached` is a case in which the goal may hold.
     """
 
     def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
@@ -226,7 +235,7 @@ class Cases:
     # ---------------------------------------------------------------------------------------------------- beginning
 
     def first(self) -> Case | None:
-        """Return the initial case; None, with `fault` set, if some claim doesn't hold there."""
+        """Return the initial case; None, and set `fault`, if some claim doesn't hold in the initial state."""
         lowest, certificate = self.lowest, self.certificate
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
             if not lowest.exists(symbol.situation, symbol.arguments):
@@ -260,7 +269,7 @@ class Cases:
     # ------------------------------------------------------------------------------------------------------- search
 
     def explore(self) -> None:
-        """Expand all cases, breadth first. Stop at a fault, or at a case in which the goal may hold."""
+        """Expand all cases in breadth-first order. Stop at a fault, or at a case in which the goal may hold."""
         first = self.first()
         if first is None:
             return
@@ -325,7 +334,7 @@ class Cases:
     # -------------------------------------------------------------------------------------------- one try in one case
 
     def after(self, one: Try, case: Case) -> Leaf:
-        """Return the result of a behaviour in a case; stored by the entries on which it depends."""
+        """Return the result of a behaviour in a case, from the stored results if possible."""
         known = one.known.find(case)
         if known is None:
             view = CaseView(self.claims, case)
@@ -334,7 +343,7 @@ class Cases:
         return known
 
     def effects(self, reading: Reading, one: Try) -> Leaf:
-        """Return the possible changes by a behaviour of the symbols that the certificate mentions."""
+        """Return the possible changes by a behaviour to the symbols that the certificate mentions."""
         behavior, env, claims = one.behavior, one.env, self.claims
         if not all(reading.holds(condition, env, behavior.kinds) for condition in behavior.preconditions):
             return None, ""
@@ -375,7 +384,7 @@ class Cases:
         return tuple((at, tuple(dict.fromkeys(entries))) for at, entries in sorted(changes.items())), ""
 
     def _overruled(self, behavior: Behavior, env: Mapping[str, str], symbol: Symbol) -> bool:
-        """Return whether an unconditional effect certainly gives a symbol the value that it always has."""
+        """Return whether an unconditional effect certainly gives a symbol the value that the certificate claims."""
         last = [
             env.get(effect.value, effect.value)
             for effect in behavior.effects
@@ -397,7 +406,10 @@ class Cases:
         return known
 
     def met(self, reading: Reading, fact: Fact) -> bool:
-        """Return whether a fact of the final state may hold; a symbol not at rest initially may keep its value."""
+        """Return whether a goal or rest value may hold in the final state.
+
+        A symbol that isn't at rest initially may keep its value.
+        """
         symbol, wanted = fact.symbol, fact.value
         if reading.goal(symbol, wanted):
             return True
@@ -405,7 +417,7 @@ class Cases:
 
 
 def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
-    """Return whether a fact is a goal, or a rest value that a plan has to restore if it changes the symbol."""
+    """Return whether a fact is a goal, or a rest value that a plan must restore after changing the symbol."""
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
@@ -426,9 +438,9 @@ def unified(
     terms: tuple[str | None, ...],
     words: tuple[str | None, ...],
 ) -> dict[str, str] | None:
-    """Return the bindings of a behaviour's own variables with which the terms of an effect equal some words.
+    """Return the bindings of a behaviour's own variables that make the terms of an effect equal to the given words.
 
-    None if there are no such bindings. A word that is None matches any term.
+    Return None if there are no such bindings. A word that is None matches any term.
     """
     found: dict[str, str] = {}
     for term, word in zip(terms, words, strict=True):
@@ -444,5 +456,5 @@ def unified(
 
 
 def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield the bindings of a behaviour's own variables with which it may be applicable, given some of them."""
+    """Yield the bindings of a behaviour's own variables that extend `given` and with which the behaviour may be applicable."""
     yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

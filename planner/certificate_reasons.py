@@ -1,4 +1,4 @@
-"""The reason of a certificate of unsolvability as a sentence: the first cause, and its consequences up to the goal."""
+"""The reason for unsolvability as a sentence, read from a certificate: the first cause, and its consequences up to the goal."""
 
 from __future__ import annotations
 
@@ -32,22 +32,25 @@ from confab.reasoner.symbols import (
 )
 
 WORK = 300_000
-"""Maximum number of tests to find the cause."""
+"""Maximum number of tests to find the first cause."""
 WORDS, ONE = ("none", "one", "two", "three", "four", "five"), "?one"
-"""Small numbers in words; the variable that stands for each of several counted individuals."""
+"""Small numbers as words, and the variable that stands for each of several counted individuals."""
 SHOWN = 4
-"""Maximum number of facts of a chain or of a goal that a sentence names."""
+"""Maximum number of facts that a sentence names."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A fact that never holds or always holds; with variables, such facts of all individuals of the variables' classes."""
+    """A fact that never holds or always holds.
+
+    A fact with variables stands for all individuals of the variables' classes.
+    """
 
     fact: Fact
     kinds: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
-        """Return the claim in words; a variable is named by its class."""
+        """Return the claim as text; a variable is written as its class."""
         names = {variable: f"some {kind}" for variable, kind in self.kinds}
         symbol = self.fact.symbol
         named = Symbol(symbol.situation, tuple(names.get(a, a) for a in symbol.arguments))
@@ -56,7 +59,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a fact can't hold: a sentence, its terms, and the claims on which it depends; none if the cause can't be changed."""
+    """The reason why a fact can't hold: a sentence, its terms, and the claims on which the reason depends."""
 
     text: str
     terms: tuple[str, ...] = ()
@@ -65,7 +68,7 @@ class Cause:
 
 
 def told(problem: Problem, certificate: Certificate) -> Reason:
-    """Return why there is no plan, as a certificate shows it."""
+    """Return the reason, read from a certificate, why a problem has no plan."""
     goals = [*certificate.unmet[:SHOWN]]
     terms = [word for fact in goals for word in _words(fact)]
     if certificate.told_apart:
@@ -104,7 +107,7 @@ def _words(fact: Fact) -> tuple[str, ...]:
 
 
 class _Causes:
-    """The causes of the claims of a certificate of facts."""
+    """The causes of the claims in a certificate."""
 
     def __init__(self, problem: Problem, certificate: Certificate) -> None:
         self.problem, self.certificate = problem, certificate
@@ -112,7 +115,7 @@ class _Causes:
         self.claims = Claims(self.lowest, certificate)
 
     def reading(self) -> tuple[Reading, _Noting]:
-        """Return the reader of conditions, and the view that records the claims used."""
+        """Return the reader of conditions, and the view that records the claims that it uses."""
         view = _Noting(self.claims, ())
         return Reading(self.lowest, view), view
 
@@ -135,7 +138,7 @@ class _Causes:
         return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
 
     def causes(self, claim: Claim) -> list[Cause]:
-        """Return why each behaviour that could make a claim false can't, the simplest cause first."""
+        """Return for each behaviour that could make a claim false the cause that prevents it, the simplest cause first."""
         fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):
@@ -195,7 +198,7 @@ class _Causes:
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
     def exceeded(self, fact: Fact) -> str:
-        """Return in words the bound of an amount that a goal value exceeds; empty if there is none."""
+        """Return as text the bound of an amount that a goal value exceeds; an empty text if there is none."""
         quantity, words = (
             self.lowest.quantity(fact.symbol.situation),
             _named(fact.symbol),
@@ -218,11 +221,11 @@ class _Causes:
         return ""
 
     def direction(self, fact: Fact) -> str:
-        """Return `MORE` or `LESS`: the direction in which an amount would have to change to meet its goal."""
+        """Return `MORE` or `LESS`: the direction in which an amount must change to satisfy its goal."""
         return towards(self.problem.initial.get(fact.symbol), fact.value)
 
     def towards(self, effect: Effect, given: dict[str, str], fact: Fact) -> bool:
-        """Return whether an effect may move an amount towards its goal, or out of its claimed bounds."""
+        """Return whether an effect may move an amount towards its goal, or beyond its claimed bounds."""
         if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
             return True
         reading, _ = self.reading()
@@ -233,14 +236,14 @@ class _Causes:
         return by.high > 0 if more else by.low < 0
 
     def bounds_of(self, symbol: Symbol) -> str:
-        """Return the bounds of an amount in words."""
+        """Return the bounds of an amount as text."""
         allowed, words = self.claims.allowed(symbol), _named(symbol)
         least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
         most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
         return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words
 
     def too_few(self, rule: Rule, given: dict[str, str]) -> Cause | None:
-        """Return a cause if a rule requires more individuals than there can be."""
+        """Return a cause if a behaviour or rule requires more individuals than can exist."""
         for condition in rule.conditions:
             many, kind, own = counted(substituted(condition, given))
             if many < 2:
@@ -258,9 +261,9 @@ class _Causes:
     def lacking(
         self, claim: Claim, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]
     ) -> Cause:
-        """Return a smallest set of conditions that can't hold together and without which a behaviour would make a claim false.
+        """Return a smallest set of jointly unsatisfiable conditions that prevents a behaviour from making a claim false.
 
-        Conditions that no behaviour changes are preferred.
+        Static conditions, which no behaviour changes, are preferred.
         """
         from confab.reasoner.validation.contradictions import clashing
 
@@ -303,7 +306,7 @@ class _Causes:
         behavior: Behavior,
         kinds: dict[str, str] | None = None,
     ) -> list[Condition] | None:
-        """Return a minimal set of conditions that can't hold together; None if all can."""
+        """Return a minimal set of jointly unsatisfiable conditions; None if all conditions are satisfiable."""
         kinds = kinds or dict(behavior.kinds)
 
         def can(some: Sequence[Condition]) -> bool:
@@ -321,7 +324,7 @@ class _Causes:
         return core
 
     def out_of_bounds(self, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]) -> Cause:
-        """Return the amount that a behaviour would take out of its bounds."""
+        """Return the amount that a behaviour would move beyond its bounds."""
         reading, _ = self.reading()
         for env in reading.solutions(tuple(conditions), given, behavior.kinds):
             for effect in behavior.amounts:
@@ -330,7 +333,7 @@ class _Causes:
         return Cause("")
 
     def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Yield in words how an effect would violate the bounds of an amount."""
+        """Yield as text how an effect would violate the bounds of an amount."""
         from confab.planner.possibilities import OPERATORS, calculated
 
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
@@ -356,7 +359,7 @@ class _Causes:
             yield f"take {words} to {written(new.low)}, which is no whole number", terms
 
     def words(self, core: Sequence[Condition], given: dict[str, str], kinds: dict[str, str]) -> str:
-        """Return failing conditions in words, as a requirement: ``a Hand that canReach location9, and there is none``."""
+        """Return failing conditions as text, phrased as a requirement: ``a Hand that canReach location9, and there is none``."""
 
         def term(name: str) -> str:
             return given.get(name, f"some {kinds[name]}" if name in kinds else name)
@@ -377,7 +380,7 @@ class _Causes:
         return f"{all_}, which {'does not hold' if self.lowest.constant(core[0]) else 'never holds'}"
 
     def _all(self, conditions: Sequence[Condition], given: dict[str, str], kinds: Mapping[str, str]) -> str:
-        """Return a conjunction in words, variables without a value by their classes."""
+        """Return a conjunction as text; variables without a value are written as their classes."""
         named = {**given, **{name: f"some {kind}" for name, kind in kinds.items() if name not in given}}
         return " and ".join(said(substituted(condition, named)) for condition in conditions)
 
@@ -406,26 +409,26 @@ def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...
 
 @dataclass
 class _Noting(CaseView):
-    """A view of a case that records the claims by which facts turned out impossible."""
+    """A view of a case that records which claims made facts impossible."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has a value in some state of the case."""
+        """Return whether a symbol has a value in at least one state of the case."""
         found = super().may(symbol, value)
         if not found and value in self.claims.lowest.given[symbol.situation]:
             self.claimed[Fact(symbol, value)] = None
         return found
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has another value in some state of the case."""
+        """Return whether a symbol has another value in at least one state of the case."""
         found = super().may_not(symbol, value)
         if not found and symbol in self.claims.certificate.always:
             self.claimed[Fact(symbol, value)] = None
         return found
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol has in the case."""
+        """Return the range of amounts of a symbol in the case."""
         always = self.claims.certificate.always.get(symbol)
         if always is not None:
             self.claimed[Fact(symbol, always)] = None
@@ -433,5 +436,5 @@ class _Noting(CaseView):
 
 
 def _named(symbol: Symbol) -> str:
-    """Return the first argument of a symbol, if it has one, and its situation type."""
+    """Return the first argument (if any) and the situation type of a symbol."""
     return " ".join((*symbol.arguments[:1], symbol.situation))

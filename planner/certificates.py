@@ -1,9 +1,10 @@
 """A certificate proves that a task has no plan: a set of states that contains the initial state, is closed, and violates the goal.
 
-Three kinds of claims describe the set. Some facts *never* hold. Some symbols *always* keep their value, or an amount stays
-within bounds. The values of some symbols are *told apart* (distinguished): only some combinations of these values, the cases,
-are reachable, and their number is stated. If no value is distinguished, there is one case. If all values are distinguished,
-each case is a state.
+Three kinds of claims describe the set of states of a certificate. First, some facts *never* hold. Second, some symbols
+*always* keep their value, or an amount stays within bounds. Third, the values of some symbols are *told apart*
+(distinguished): only some combinations of these values, called cases, are reachable, and the certificate states their
+number. A certificate without distinguished values has a single case. If a certificate distinguishes all values, each
+case is a single state.
 
 `confab.planner.certificate_checks` verifies a certificate, `confab.planner.certifying` finds one.
 """
@@ -21,7 +22,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Certificate:
-    """A set of states that contains the initial state, that no behaviour of the lowest level leaves, and that excludes the goal.
+    """A set of states that contains the initial state, that no lowest-level behaviour leaves, and that contains no goal state.
 
     Attributes
     ----------
@@ -45,21 +46,21 @@ class Certificate:
 
     @property
     def kind(self) -> str:
-        """The kind of the description, in a word or two."""
+        """The kind of claims in the certificate, as a short text."""
         if not self.told_apart:
             return "facts"
         return "pair" if len(self.told_apart) == 2 and all(map(len, self.told_apart.values())) else "cases"
 
 
 class ToldApartJson(TypedDict):
-    """A symbol as a list of situation type and arguments, with the values that are distinguished."""
+    """A symbol, as a list of situation type and arguments, with its distinguished values."""
 
     symbol: list[str]
     values: list[str]
 
 
 class CertificateJson(TypedDict):
-    """A certificate; a fact is a list of situation type, arguments and value."""
+    """A certificate as JSON data; a fact is a list of situation type, arguments and value."""
 
     format: int
     never: list[list[str]]
@@ -85,7 +86,7 @@ def certificate_json(certificate: Certificate) -> CertificateJson:
 
 
 def certificate_from(data: Any) -> Certificate:
-    """Return the certificate that JSON data contain.
+    """Return the certificate that JSON data describe.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Every "unsolvable" needs a certificate that an independent checker accepts; without one the outcome becomes "gave up"."""
+"""The outcome "unsolvable" needs a certificate that an independent checker accepts.
+
+Without one, the outcome becomes "gave up".
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,13 @@ if TYPE_CHECKING:
     from confab.planner.certificates import Certificate
 
 ADDED_UP = 200_000
-"""Maximum number of rows of a join that determines by how much an amount falls short."""
+"""Maximum number of rows of a join that calculates the missing part of an amount."""
 
 
 def certified(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return an outcome: "unsolvable" only with a certificate that the checker accepts, otherwise "gave up".
+    """Return an outcome "unsolvable" unchanged if the checker accepts its certificate.
+
+    Otherwise return the outcome "gave up".
 
     Parameters
     ----------
@@ -55,7 +60,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
 
 def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
-    """Return the missing amount, which is a more specific reason than the combinations of values in which it is missing."""
+    """Return the missing amount as the reason; it is more specific than combinations of values."""
     if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
         return None
     from confab.planner.grounded.grounding import ground

@@ -1,15 +1,17 @@
 """Find a certificate that a task has no plan.
 
-First step: relaxed reachability. It determines which facts can become true if no fact ever ceases to hold. It works backwards
-from the goal, so that only relevant facts are considered. A required fact that can't become true never holds.
+First step of the search for a certificate: relaxed reachability. Relaxed reachability determines which facts can become
+true if no fact ever becomes false. The computation works backwards from the goal, so that only relevant facts are
+considered. A required fact that isn't reachable in this way never holds.
 
-Second step, if the goal is reachable in this way: distinguish few values, at first those of the goal, and search the cases,
-which are the combinations of these values. A path through the cases to the goal is executed on the task itself. If it fails,
-the values that it assumed wrongly are distinguished, too. This is repeated until no path is left (the task is unsolvable) or a
-path succeeds (there is a plan).
+Second step, if the relaxed goal is reachable: distinguish a few values, at first those of the goal, and search the
+cases, which are the combinations of these values. A path through the cases to the goal is executed on the original
+task. If the execution fails, the values that the path assumed wrongly are distinguished, too. The second step is
+repeated until no path is left (the task is unsolvable) or a path succeeds (there is a plan).
 
-Last step: distinguish all values, so that each case is a state. One partition may have infinitely many cases and another few,
-so each partition is tried with a small limit of work first, and then with a larger one.
+Last step of the search for a certificate: distinguish all values, so that each case is a state. One choice of
+distinguished values may have infinitely many cases and another choice few, so each is tried with a small work limit
+first, and then with larger limits.
 """
 
 from __future__ import annotations
@@ -39,24 +41,29 @@ from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
-"""Maximum work to find a certificate: tests of conditions, and behaviours tried in a case."""
+"""Maximum work to find a certificate, as the number of tested conditions and of behaviours tried in a case."""
 LITTLE = 2_000, 20_000
-"""Maximum number of tests per goal in the first and in the second round, before all goals are examined to the end."""
+"""Maximum number of tests per goal in the first and in the second round.
+
+Afterwards all goals are examined with the full limit.
+"""
 PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
-"""Maximum number of tests for each pair of goals, and for leaving symbols out of a certificate; and the share of the remaining
-tests that each kind of partition may use."""
+"""Maximum number of tests for each pair of goals, and for removing symbols from a certificate.
+
+And the share of the remaining tests for each kind of certificate.
+"""
 FEW = 3
-"""Maximum number of distinguished values of a symbol; beyond it, all its values are distinguished."""
+"""Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
-"""Kinds of questions about reachability: whether a symbol can get a value (`GETS`), can lose its value (`LEAVES`; for an amount,
-by how much), or whether a condition on the final state can hold (`ENDS`)."""
+"""Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
+change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
-    """Return a certificate that a task has no plan; None if there is a plan, or if the allowed work doesn't suffice.
+    """Return a certificate that a task has no plan; None if there is a plan, or if the work limit is too small.
 
-    With `few_states`, a search has examined all states, so a proof by states is tried first.
+    With `few_states`, a search has already examined all states, so a certificate of all states is tried first.
     """
     if not problem.domain.levels:
         return None
@@ -79,7 +86,7 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
 
 
 def _at_once(lowest: Lowest, little: int) -> Certificate | None:
-    """Return a certificate for a single goal, each goal tried by itself with a small limit of work."""
+    """Return a certificate for a single goal; each goal is tried with a small work limit."""
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         alone = {symbol: wanted}
         if (found := _with_little(lowest, little, partial(Relaxed(lowest).certificate, alone))) is not None:
@@ -90,9 +97,11 @@ def _at_once(lowest: Lowest, little: int) -> Certificate | None:
 
 
 def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
-    """Return the certificate that `find` returns within the allowed work; None if it needs more work or finds none.
+    """Return the certificate that `find` returns within a small work limit.
 
-    `NoTimeLeftError` ends the whole search for a certificate.
+    Return None if `find` exceeds the limit or finds no certificate.
+
+    A `NoTimeLeftError` isn't caught; it ends the whole search for a certificate.
     """
     most = lowest.most
     try:
@@ -107,7 +116,7 @@ def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate |
 
 
 def _contested(lowest: Lowest) -> Certificate | None:
-    """Return a certificate for two goals that require the same exclusive value."""
+    """Return a certificate for two goals that require the same value, if only one symbol can have it."""
     wanting: dict[tuple[str, str], list[Symbol]] = {}
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         kind = lowest.problem.domain.situations[symbol.situation]
@@ -125,8 +134,8 @@ def _contested(lowest: Lowest) -> Certificate | None:
 class Relaxed:
     """Relaxed reachability, computed backwards from the questions.
 
-    A question that is asked for the first time counts as impossible until an achiever is found; then all answers that depend on it
-    are computed again.
+    A new question counts as impossible until an achiever is found; then all answers that depend on it are computed
+    again.
     """
 
     def __init__(self, lowest: Lowest) -> None:
@@ -147,7 +156,7 @@ class Relaxed:
         return value in self.lowest.given[symbol.situation] and self._ask((GETS, symbol, value))
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol can get another value."""
+        """Return whether a symbol can get a value other than the given one."""
         if self.lowest.initial(symbol) != value:
             return True
         if self.problem.domain.situations[symbol.situation].boolean:
@@ -172,7 +181,7 @@ class Relaxed:
     # ------------------------------------------------------------------------------------------------------ finding out
 
     def reachable(self, key: Key) -> bool:
-        """Determine whether the answer to a question is yes."""
+        """Answer a question about reachability: return whether the answer is yes."""
         self._asking = None
         self._ask(key)
         while self._waiting and key not in self.possible:
@@ -183,12 +192,18 @@ class Relaxed:
         return key in self.possible
 
     def look(self, key: Key) -> Reading:
-        """Return the reader of conditions for one question; `reads` records the questions that it asks."""
+        """Return the reader of conditions for one question.
+
+        `reads` records the other questions on which the answer depends.
+        """
         self._asking, self.reads = key, {}
         return Reading(self.lowest, self)
 
     def _news(self, key: Key) -> bool:
-        """Examine a question again; return whether its answer has changed: now possible, or a wider range of an amount."""
+        """Examine a question again.
+
+        Return whether its answer has changed to possible, or to a wider range of an amount.
+        """
         kind, symbol, _ = key
         reading = self.look(key)
         if kind == LEAVES and self.lowest.quantity(symbol.situation) is not None:
@@ -199,7 +214,7 @@ class Relaxed:
         return True
 
     def brought_about(self, reading: Reading, key: Key) -> bool:
-        """Return whether the answer to a question is yes, as far as is known."""
+        """Return whether the answer to a question is yes according to the present knowledge."""
         kind, symbol, value = key
         if kind == ENDS:
             return reading.goal(symbol, value)
@@ -222,7 +237,7 @@ class Relaxed:
         terms: tuple[str, ...],
         words: tuple[str | None, ...],
     ) -> Iterator[dict[str, str]]:
-        """Yield the individuals for a behaviour's variables with which the terms of an effect become the given words."""
+        """Yield the bindings of a behaviour's variables that make the terms of an effect equal to the given words."""
         own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
         given = unified(self.problem, behavior, own, terms, words)
         if given is None:
@@ -264,7 +279,7 @@ class Relaxed:
         return None
 
     def claims(self, keys: Iterable[Key]) -> tuple[set[Fact], dict[Symbol, str]]:
-        """Return all claims "never" and "always" on which some impossible facts depend."""
+        """Return all claims "never" and "always" on which the impossibility of some facts depends."""
         never, always = set[Fact](), dict[Symbol, str]()
         seen, waiting = set[Key](), list(keys)
         while waiting:
@@ -315,7 +330,7 @@ def _number(effect: AmountEffect) -> bool:
 
 
 def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate by cases: of two goals, of all goals, or of all states; the cheapest kind is tried first."""
+    """Return a certificate for two goals, for all goals, or of all states; the cheapest kind is tried first."""
     for little in (LITTLE[1], lowest.most):
         for find in (
             partial(_by_pairs, lowest, relaxed),
@@ -328,7 +343,7 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate for two goals about the same individual that can't hold together, rest values included."""
+    """Return a certificate that two goals about the same individual, including rest values, can't hold together."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
         if a in other.arguments or b in one.arguments:  # one is about the value of the other: these pairs come first
@@ -344,7 +359,7 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
-    """Distinguish one value after the other until the goal, or part of it, holds in no case."""
+    """Distinguish more and more values until the goal, or part of it, holds in no case."""
     certificate = Certificate(cases=0)
     while True:
         cases = Cases(lowest, certificate)
@@ -385,7 +400,7 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without superfluous symbols; each symbol is tested with little work."""
+    """Return a certificate without superfluous symbols; each symbol is tested with a small work limit."""
     most = min(lowest.work + FEWER, lowest.most)
     for symbol in sorted(found.told_apart):
         fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
@@ -395,20 +410,20 @@ def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
 
 
 def _closed(lowest: Lowest, certificate: Certificate) -> Cases | None:
-    """Return the cases of a certificate if the goal holds in none of the reachable ones."""
+    """Return the cases of a certificate if the goal holds in no reachable case; otherwise None."""
     cases = Cases(lowest, certificate)
     cases.explore()
     return None if cases.fault or cases.reached is not None else cases
 
 
 def _counted(lowest: Lowest, certificate: Certificate) -> Certificate | None:
-    """Return a certificate with the number of its cases, if it is valid."""
+    """Return a certificate with the number of its cases, if the certificate is valid."""
     cases = _closed(lowest, certificate)
     return None if cases is None else replace(certificate, cases=len(cases.came_from))
 
 
 def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
-    """Return a few facts of which at least one is unmet in each case."""
+    """Return a few facts such that each case violates at least one of them."""
     failing = {
         fact: {
             case for case in cases.came_from if not cases.met(Reading(cases.lowest, CaseView(cases.claims, case)), fact)
@@ -426,7 +441,7 @@ def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
 def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certificate | None:
     """Return a certificate that also distinguishes the values on which a path through the cases fails.
 
-    None if the path succeeds.
+    Return None if the path succeeds.
     """
     lowest, problem = cases.lowest, cases.problem
     path: list[tuple[Case, Try, Case]] = []
@@ -463,7 +478,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
 
 
 def _wrong(view: CaseView, facts: Facts) -> list[tuple[Symbol, str, bool]]:
-    """Return the facts that a case assumes and the actual state doesn't have."""
+    """Return the facts that a case assumes and that don't hold in the actual state."""
     found = []
     for symbol, value, has in view.unknown or ():
         now = facts.value(symbol.situation, symbol.arguments)
@@ -486,7 +501,7 @@ def _met(problem: Problem, facts: Facts, fact: Fact) -> bool:
 
 
 def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
-    """Return the facts about rest values, or initial values, that a state would need and doesn't have."""
+    """Return the rest values, or initial values, that a final state must have and that this state doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):
         rest = problem.domain.situations[symbol.situation].rest

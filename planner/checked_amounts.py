@@ -1,4 +1,4 @@
-"""Amounts as the checker calculates them; no code is shared with any search."""
+"""Calculation of amounts by the checker; this module shares no code with any search."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from confab.reasoner.symbols import Comparison
 Arguments: TypeAlias = "tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Arguments]"
 Said: TypeAlias = "Callable[[str, Arguments], str | None]"
-"""Returns the value of a symbol; None if it doesn't exist."""
+"""Function that returns the value of a symbol; None if the symbol doesn't exist."""
 Values: TypeAlias = "list[str]"
 Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
-"""Returns a function that selects the values of some terms from the values of all terms."""
+"""Function that returns a selector: the selector picks the values of some terms from the values of all terms."""
 Worth: TypeAlias = "Callable[[Said, Values], Fraction | None]"
-"""The value of an amount; None if it has none."""
+"""Function that returns the value of an amount; None if the amount has no value."""
 Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
 
 
 def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
-    """Return a function that calculates an expression."""
+    """Return a function that calculates an arithmetic expression."""
     match expression:
         case Amount(situation, arguments):
             of = key(arguments)
@@ -53,7 +53,7 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
 
 
 def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[[Said, Values], bool]:
-    """Return a comparison as a test; with a missing value it is false."""
+    """Return a comparison as a test; the test is false if a value is missing."""
     of_left, of_right = worth(condition.left, key, relations), worth(condition.right, key, relations)
     holds = COMPARING[condition.operator]
 
@@ -67,7 +67,7 @@ def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[
 def changed(
     effects: Iterable[tuple[Cell, str, Fraction | None]], said: Said, quantities: Mapping[str, Quantity | None]
 ) -> list[tuple[str, Arguments, str]] | None:
-    """Return the amounts after effects, each calculated in the state before; None if one is invalid.
+    """Return the amounts after effects, each calculated from the state before; None if an amount is invalid.
 
     An effect is a symbol, an operation and a number; an effect on a symbol that doesn't exist is ignored.
     """

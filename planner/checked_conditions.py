@@ -1,6 +1,6 @@
-"""Conditions as the checker reads them: a conjunction is a list of tests and choices, most determined first.
+"""Evaluation of conditions by the checker: a conjunction becomes a list of tests and choices, the most determined condition first.
 
-It shares no code with any search.
+This module shares no code with any search.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ from confab.reasoner.symbols import (
 Arguments: TypeAlias = "tuple[str, ...]"
 Bindings: TypeAlias = "dict[str, str]"
 Values: TypeAlias = "list[str]"
-"""The individuals of terms, by position."""
+"""The individuals of terms, indexed by position."""
 Test: TypeAlias = "Callable[[Stated, Values], bool]"
 Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
 Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
-"""A dependency of a check: the individuals that initially satisfy the conditions of a witness, for each row of open terms."""
+"""Lookups on which the result of a check depends: the individuals that initially satisfy the conditions of a witness,
+for each row of open terms."""
 
 
 class Stated(Protocol):
-    """The part of a state that conditions read."""
+    """The part of a state that conditions can read."""
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
-        """Return the value of a symbol, or None if there is no such symbol."""
+        """Return the value of a symbol, or None if the symbol doesn't exist."""
 
     def holders(self, situation: str, value: str) -> Iterable[Arguments]:
-        """Return the arguments of the symbols that are stated to have a value."""
+        """Return the arguments of the symbols that have a stated value."""
 
 
 class Source(Protocol):
@@ -51,7 +52,7 @@ class Source(Protocol):
     lookups: Lookups | None
 
     def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, by the individual at a position."""
+        """Return the tuples of a relation, indexed by the individual at a position."""
 
 
 class ConditionReader:
@@ -66,7 +67,7 @@ class ConditionReader:
         return self.places.setdefault(term, len(self.places))
 
     def key(self, terms: Sequence[str]) -> Callable[[Values], Arguments]:
-        """Return a function that yields the individuals of some terms."""
+        """Return a function that returns the individuals of some terms."""
         places = [self.place(term) for term in terms]
         if len(places) > 1:
             return itemgetter(*places)
@@ -78,10 +79,10 @@ class ConditionReader:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], last: Sequence[Test] = ()
     ) -> list[Test]:
-        """Return conditions as tests, the last of which may choose individuals and test the rest.
+        """Return conditions as tests; the last test may choose individuals and run the remaining tests on them.
 
-        `bound` grows by these variables. Variables that only nested conditions (`AnyOf`, `Witness`) mention are local to these.
-        `last` are tests after all others.
+        The variables of the conditions are added to `bound`. Variables that occur only in nested conditions (`AnyOf`,
+        `Witness`) are local to these conditions. The tests in `last` run after all others.
         """
         waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
         nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
@@ -105,7 +106,7 @@ class ConditionReader:
         return [*tests, *(self.test(condition, bound, kinds) for condition in nested), *last]
 
     def given(self, condition: ValueCondition, kind: str) -> Test:
-        """Return the choice of a value that the state doesn't determine."""
+        """Return the choice of a value that the state doesn't determine: every individual of the class is tried."""
         key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
 
         def given(facts: Stated, values: Values) -> bool:
@@ -118,7 +119,7 @@ class ConditionReader:
         return given
 
     def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
-        """Return a test of whether the rest holds with one of some candidates for a variable."""
+        """Return a test that holds if the rest holds with one of the candidates for a variable."""
         place, members = self.place(variable), self.problem.members(kind)
 
         def some(facts: Stated, values: Values) -> bool:
@@ -134,9 +135,9 @@ class ConditionReader:
     def noted(
         self, candidates: Candidates, variable: str, kind: str, conditions: Sequence[Condition], bound: set[str]
     ) -> Candidates:
-        """Return candidates and record the lookup, as the individuals that initially satisfy the known conditions.
+        """Return the candidates for a variable, and record the lookup: the individuals that initially satisfy the known conditions.
 
-        An individual that the problem doesn't have keeps its values, as no step names it.
+        An individual that the problem doesn't contain keeps its values, since no step names it.
         """
         asked = tuple(c for c in conditions if variable in variables_of(c) <= bound)
         known = tuple(sorted(set().union(*map(variables_of, asked)) - {variable}))
@@ -177,7 +178,7 @@ class ConditionReader:
         return lambda facts, values: self.problem.classes.get(kind, ())
 
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
-        """Return a condition as a test; choices inside it are discarded."""
+        """Return a condition as a test; choices inside the condition are local to it."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 key, at = self.key(arguments), self.place(value)
@@ -204,7 +205,7 @@ class ConditionReader:
 
 
 def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
-    """Return whether tests hold; the first satisfying choices are stored in `values`."""
+    """Return whether all tests hold; store the first satisfying choices in `values`."""
     for test in tests:  # noqa: SIM110 - a generator takes twice as long
         if not test(facts, values):
             return False
@@ -212,9 +213,9 @@ def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
 
 
 def _breadth(condition: Condition, bound: set[str]) -> int:
-    """Rank conditions with unknown variables.
+    """Return the rank of a condition with unknown variables.
 
-    0 if the state determines the individual, 1 if there are few candidates, otherwise 2.
+    The rank is 0 if the state determines the individual, 1 if there are few candidates, otherwise 2.
     """
     if isinstance(condition, ValueCondition) and not condition.negated:
         return not (variables_of(condition) - bound == {condition.value} and condition.value not in condition.arguments)

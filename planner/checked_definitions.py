@@ -1,4 +1,7 @@
-"""Derived situations of rules and aggregates, as the checker computes them; no code is shared with any search."""
+"""Derived situations (by rules and aggregates) as the checker computes them.
+
+This module shares no code with any search.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,12 @@ Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
 def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]]:
-    """Return for each defined situation type those that are mutually dependent with it."""
+    """Return for each defined situation type all types that depend on it and on which it depends."""
     return {name: group for group in strata(rules) for name in group}
 
 
 class Definitions:
-    """Defined situations, evaluated one symbol at a time and cached until `forget`.
+    """Values of defined situations, computed on demand and cached until `forget` is called.
 
     Parameters
     ----------
@@ -37,14 +40,14 @@ class Definitions:
         self._known: dict[Cell, bool] = {}
 
     def forget(self) -> None:
-        """Discard the cache after a change that rules may depend on."""
+        """Clear the cache; called after a change on which rules may depend."""
         self._known.clear()
 
     def follows(self, cell: Cell) -> bool:
-        """Return whether a defined situation holds by its rules, which may depend on other defined situations.
+        """Return whether a defined situation follows from its rules, which may depend on other defined situations.
 
-        A symbol that is read while another one is evaluated is recorded and counts as false; all recorded symbols are evaluated
-        again until no more become true. Symbols that have become true stay true; all other recorded symbols are false.
+        A defined symbol that is read during this evaluation counts as false at first; all such symbols are evaluated
+        again until no more become true. Symbols that became true stay true; the remaining symbols are false.
         """
         if cell in self._known:
             return self._known[cell]
@@ -89,7 +92,7 @@ class Total:
         self._terms = tuple(reading.places)
 
     def _added(self, facts: Stated, values: Values) -> bool:
-        """Record one solution, and request the next."""
+        """Add one solution to the sum, and request the next solution."""
         number = self._number(facts.value, values)
         if number is not None:
             self._found[self._names(values)] = number

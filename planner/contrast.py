@@ -1,9 +1,9 @@
-"""Contrastive explanations: an alternative is enforced and the rest is planned, or its missing conditions are named.
+"""Contrastive explanations: plan with an enforced alternative, or name the alternative's failing conditions.
 
-There are two kinds of alternative. A *step* in place of another step: the earlier steps are kept, the alternative step is
-refined and applied, and the rest is planned again. A *choice* of the individual that takes part in changes of a symbol: every
-behaviour that changes the symbol, and has a role for the individual, must take this individual; the whole task is planned
-again.
+There are two kinds of alternatives: steps and choices. An alternative *step* replaces a step of the plan: the earlier
+steps are kept, the alternative step is refined and applied, and the rest is planned again. An alternative *choice*
+enforces an individual for changes of a symbol: every behaviour that changes the symbol and has a suitable role must
+take this individual; the whole task is planned again.
 """
 
 from __future__ import annotations
@@ -20,21 +20,22 @@ from confab.planner.validation import BehaviorReader, Facts, successor, validate
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]
-"""A planning function: `confab.planner.solve.solve` with some mode and limits."""
+"""A planning function: Function that calls `confab.planner.solve.solve` with a fixed mode and fixed limits."""
 
 
 class NoChoiceError(ValueError):
-    """The requested choice doesn't exist; the message says why."""
+    """The requested choice doesn't exist; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """The result of asking for an alternative.
+    """The result of a request for an alternative.
 
-    `behavior` and `arguments` are the requested step, if one was; `instead` is the step that it replaces. `lacks`: the failing
-    conditions, if the step isn't applicable. `plan`: the complete plan with the alternative; `cost` is its cost, and `before`
-    the cost of the original plan. `reason`: why no plan with the alternative was found. If all of these are missing, the plan
-    already contains the step, as `instead`.
+    `behavior` and `arguments` are the requested step, if a step was requested; `instead` is the step of the plan that
+    the requested step replaces. `lacks` lists the failing conditions, if the requested step isn't applicable. `plan` is
+    the complete plan with the alternative; `cost` is the cost of that plan, and `before` is the cost of the original
+    plan. `reason` states why no plan with the alternative was found. If `lacks`, `plan` and `reason` are all empty, the
+    original plan already contains the step, as `instead`.
     """
 
     before: float
@@ -99,7 +100,7 @@ def instead_of(
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
-    """Return the result if an individual takes part wherever it can in changes of a symbol.
+    """Return the result of a choice: the individual takes part in every change of the symbol in which it can.
 
     Raises
     ------
@@ -117,7 +118,7 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, a
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
-    """Return a behaviour that changes a symbol only with an individual in one of its roles, if it has such a role."""
+    """Return a behaviour that changes a symbol only with an individual in one of its suitable roles, if any."""
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip
@@ -157,7 +158,7 @@ def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
 
 
 def _similarity(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
-    """Return the similarity of two steps: first by common individuals, then by the behaviour."""
+    """Return the similarity of two steps: the number of common individuals, then whether the behaviours are equal."""
     return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
 
 
@@ -178,7 +179,7 @@ def _fewest_failures(
 def _refined(
     problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
 ) -> tuple[Step | None, Reason | None]:
-    """Return a step with its refinement from a state, or the reason why it has none."""
+    """Return a step with its refinement from a state, or the reason why it has no refinement."""
     step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
     after = successor(problem, behavior, arguments, state)
     if behavior.level == problem.domain.levels[-1] or after is None or after == state:
@@ -195,7 +196,7 @@ def _refined(
 
 
 def _from(problem: Problem, level: int, state: State) -> Problem:
-    """Return the problem from a state between two steps of a level, with behaviours of that level and those below."""
+    """Return the problem from a state between two steps of a level, with the behaviours up to that level."""
     behaviors = {b.name: b for b in problem.domain.behaviors.values() if b.level >= level}
     goal = problem.goal_on(level)
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors), initial=state, goal=goal)

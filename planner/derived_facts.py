@@ -1,4 +1,4 @@
-"""Defined situations, which generated Python derives when it reads them from a table."""
+"""Defined situations in generated Python: a defined situation is derived when it is read from a table."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ class CompiledRules:
         self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
 
     def define(self, table: Table) -> None:
-        """Make a table derive defined situations; call this before any function is bound to the table."""
+        """Make a table derive its defined situations.
+
+        Call this function before any compiled function is bound to the table.
+        """
         for group in strata(self.domain.rules):
             stratum = Stratum(table)
             for name in group:
@@ -54,7 +57,7 @@ def _lines(writer: PythonWriter) -> Iterator[str]:
 
 
 class DerivedCells(dict[Key, str]):
-    """Replaces the cells of a defined situation type: it stores nothing, and `get` derives a value."""
+    """A mapping in place of the cells of a defined situation type: it stores no values, and `get` derives each value."""
 
     def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
         super().__init__()
@@ -68,10 +71,11 @@ class DerivedCells(dict[Key, str]):
 
 
 class Stratum:
-    """Mutually dependent defined situation types, and their known values at one age of the table.
+    """Mutually dependent defined situation types, with the values known at one age of the table.
 
-    The requested situations, and all situations that their rules read, are evaluated in rounds until no more become true; the
-    others are false. No other situations are evaluated, and the interpreter's stack doesn't limit the depth of a chain.
+    The requested situations, and all situations that their rules read, are evaluated in rounds until no more become
+    true; the remaining ones are false. Other situations aren't evaluated, and the interpreter's stack doesn't limit the
+    depth of a derivation.
     """
 
     def __init__(self, table: Table) -> None:
@@ -81,7 +85,7 @@ class Stratum:
         self.asked: dict[Cell, None] | None = None  # during a derivation: the cells read, with the results
 
     def holds(self, cell: Cell) -> bool:
-        """Return whether a symbol is true; while another symbol is derived, return what is known so far."""
+        """Return whether a symbol is true; during another derivation, return the value known so far."""
         if self.age != self.table.age:
             self.age = self.table.age
             self.known.clear()

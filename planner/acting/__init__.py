@@ -1,1 +1,1 @@
-"""Acting in a world: executing a plan, observing, repairing, replanning, and scheduling both hands."""
+"""Acting in a world: the executive carries out a plan, observes, repairs the plan, replans, and schedules several hands."""

@@ -1,4 +1,4 @@
-"""The agenda of an episode: remaining steps, postponed goals, and requests to check the steps."""
+"""The agenda of an episode: the steps still to be executed, postponed goals, and requests to check the steps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 @dataclass
 class Agenda:
-    """The steps that are still to be done; the first may be partly done.
+    """The steps still to be executed; the first step may be partly executed.
 
     Attributes
     ----------
@@ -41,7 +41,10 @@ class Agenda:
 
 @dataclass
 class ReplanRequest:
-    """A request to check the agenda: the reason, empty if there is none, and the expected values that were not observed."""
+    """A request to check the agenda.
+
+    It contains the reason (empty if there is no request) and the expected values that were not observed.
+    """
 
     why: str = ""
     missed: dict[Symbol, str | None] = field(default_factory=dict)
@@ -54,7 +57,7 @@ class ReplanRequest:
 
 @dataclass
 class Postponed:
-    """Goals that are not pursued for now, each with its value and the reason.
+    """Postponed goals, each with its value and the reason for postponing it.
 
     Attributes
     ----------
@@ -72,12 +75,12 @@ class Postponed:
         yield from (reason for _, reason in (*self.aside.values(), *self.put_off.values()))
 
     def forget(self, symbols: Iterable[Symbol]) -> None:
-        """Drop goals that were set aside or put off."""
+        """Remove goals from the goals that were dropped or postponed."""
         for symbol in symbols:
             self.aside.pop(symbol, None)
             self.put_off.pop(symbol, None)
 
     def clear(self) -> None:
-        """Drop all of them."""
+        """Remove all postponed goals."""
         self.aside.clear()
         self.put_off.clear()

@@ -1,4 +1,4 @@
-"""An asynchronous world as a synchronous one: its coroutines run on an event loop in a separate thread."""
+"""Adapter from an asynchronous world to a synchronous one: the coroutines run on an event loop in a separate thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The executive's belief: the situation as last observed, the goal, the static facts, and the doubts about them."""
+"""The executive's belief: the last observed situation, the goal, the static facts, and the facts in doubt."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ from confab.reasoner.symbols import (
 
 @dataclass
 class Belief:
-    """The task as the executive believes it to be.
+    """The planning task as the executive believes it to be.
 
-    `problem` has the situation, the goal, and the static facts and behaviours without those in doubt; `certain` has all static
-    facts and behaviours. `obstacles` are discovered objects that can't be moved: behaviours that would move them
-    are excluded, in `certain`, too. `withdrawn` and `refuted` are the doubts. `unseen` are the symbols that the first observation
+    `problem` contains the situation, the goal, and those static facts and behaviours that aren't in doubt; `certain`
+    contains all static facts and behaviours, including those in doubt. `obstacles` are discovered objects that can't be
+    moved; behaviours that would move such an object are excluded from `problem` and from `certain`. `withdrawn` and
+    `refuted` contain the static facts and the behaviours in doubt. `unseen` are the symbols that the first observation
     didn't include.
     """
 
@@ -53,7 +54,7 @@ class Belief:
 
     @property
     def state(self) -> dict[Symbol, str]:
-        """The situation as last observed."""
+        """The last observed situation."""
         return dict(self.problem.initial)
 
     @property
@@ -71,11 +72,11 @@ class Belief:
         self.problem = replace(self.problem, goal=dict(sorted(goal.items())))
 
     def boolean(self, symbol: Symbol) -> bool:
-        """Return whether a symbol is boolean, so that not observing it means that it is false."""
+        """Return whether a symbol is boolean; a boolean symbol that isn't observed is false."""
         return self.problem.domain.situations[symbol.situation].boolean
 
     def fault(self, symbol: Symbol, value: str) -> str:
-        """Return the reason for which an observed value can't be believed; an empty text if it can be believed."""
+        """Return the reason why an observed value isn't credible; an empty text if it is credible."""
         situation = self.problem.domain.situations.get(symbol.situation)
         if situation is None:
             return f"the scene has no situation type {symbol.situation}"
@@ -90,7 +91,10 @@ class Belief:
         return f"which is no value of {symbol.situation} ({listed})"
 
     def take_in(self, expected: State, seen: State) -> tuple[Surprise, ...]:
-        """Believe the observation, and the expectation for symbols that can't be observed; return the differences between them."""
+        """Update the belief with an observation, and with the expected values of unobservable symbols.
+
+        Return the differences between expectation and observation.
+        """
         if self.unseen is None:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
@@ -106,7 +110,7 @@ class Belief:
         return tuple(surprises)
 
     def could_begin(self, behavior: str, arguments: tuple[str, ...], state: State) -> bool:
-        """Return whether a behaviour is applicable in a state."""
+        """Return whether a behaviour is applicable in a state with the given arguments."""
         return successor(self.problem, self.problem.domain.behaviors[behavior], arguments, state) is not None
 
     # ------------------------------------------------------------------------------------------------- knowledge of the scene
@@ -135,7 +139,7 @@ class Belief:
     # ------------------------------------------------------------------------------------------------- doubts
 
     def withdraw(self, facts: Iterable[Static] = (), refutations: Iterable[Refutation] = ()) -> None:
-        """Doubt static facts, or the applicability of behaviours."""
+        """Put static facts, or the applicability of behaviours, in doubt."""
         self.withdrawn.update(facts)
         self.refuted |= dict.fromkeys(refutations)
         self._apply_doubts()
@@ -153,7 +157,7 @@ class Belief:
 
 
 def _with_obstacle(problem: Problem, individual: str) -> Problem:
-    """Return the problem in which no behaviour takes hold of an individual, or changes its place."""
+    """Return the problem without the behaviours that would grasp an individual or change its place."""
     behaviors = {}
     for behavior in problem.domain.behaviors.values():
         values = [effect for effect in behavior.effects if isinstance(effect, ValueEffect)]
@@ -168,7 +172,7 @@ def _with_obstacle(problem: Problem, individual: str) -> Problem:
 
 
 def _without_room(problem: Problem, places: Iterable[str], by: Fact) -> Problem:
-    """Return the problem in which no behaviour brings another object to some places while a fact holds."""
+    """Return the problem in which no behaviour may bring another object to any of `places` while the fact `by` holds."""
     occupant, behaviors = by.symbol.arguments[0], {}
     holds = ValueCondition(by.symbol.situation, by.symbol.arguments, by.value)
     for behavior in problem.domain.behaviors.values():
@@ -191,6 +195,6 @@ def _terms(behavior: Behavior) -> Iterable[Parameter]:
 
 
 def _excluding(behavior: Behavior, never: Iterable[tuple[Condition, ...]]) -> Behavior:
-    """Return a behaviour with additional preconditions: none of some conjunctions may hold."""
+    """Return a behaviour with additional preconditions: none of the conjunctions in `never` may hold."""
     new = [AnyOf((together,), negated=True) for together in never]
     return replace(behavior, preconditions=(*behavior.preconditions, *new)) if new else behavior

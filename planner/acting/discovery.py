@@ -1,4 +1,4 @@
-"""A discovery: an individual that a world has found and the scene doesn't have."""
+"""A discovery: an individual that the world has found and that the scene doesn't contain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from confab.reasoner.symbols import Fact
 
 @dataclass(frozen=True)
 class Discovery:
-    """An individual that a world has found and the scene doesn't have: an object, or a spot that isn't a place of the scene.
+    """An individual that the world has found and that the scene doesn't contain: an object, or a free spot.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 
 class InterventionKind(Enum):
-    """What an intervention changes."""
+    """The part of the task that an intervention changes."""
 
     WORLD = "world"  # an object gets another value: moved, emptied, filled
     REMOVE = "remove"  # an object is taken away
@@ -29,8 +29,9 @@ class InterventionKind(Enum):
 class Intervention:
     """An intervention by a person during an episode.
 
-    It takes place as soon as a step is done: the step of the most abstract level with the ID `after` (an int), or the step with
-    the path `after` (a tuple). Otherwise it takes place when the world's clock shows `at` seconds, possibly during a primitive.
+    An intervention with `after` takes place when a step is finished: the first-level step with that ID (an int), or the
+    step with that path (a tuple). An intervention with `at` takes place when the world's clock shows that number of
+    seconds, possibly while a primitive is running.
 
     Attributes
     ----------
@@ -61,12 +62,12 @@ class Intervention:
 
     @property
     def of_world(self) -> bool:
-        """Whether it changes the world, and not the goal."""
+        """Whether the intervention changes the world instead of the goal."""
         return self.change not in (InterventionKind.GOAL, InterventionKind.DROP_GOAL)
 
 
 class End(Enum):
-    """How an episode ended."""
+    """The way in which an episode ended."""
 
     REACHED = "reached"
     IMPOSSIBLE = "impossible"  # proved: the goal has become unreachable
@@ -75,7 +76,10 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """A symbol with an unexpected value. A value is `None` if none was perceived, or none was expected."""
+    """A symbol with an unexpected value.
+
+    The observed value is `None` if no value was observed; the expected value is `None` if no value was expected.
+    """
 
     symbol: Symbol
     expected: str | None
@@ -84,7 +88,10 @@ class Surprise:
 
 @dataclass(frozen=True)
 class Seen:
-    """A believed change of a symbol; `None` if its value could no longer be observed."""
+    """A change of a symbol's value in the executive's belief.
+
+    The new value is `None` if the symbol is no longer observable.
+    """
 
     seconds: float
     symbol: Symbol
@@ -93,7 +100,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed primitive: the situation, the failure, and the objects that took part."""
+    """A failed primitive with the situation before it, the kind of failure, and the objects involved."""
 
     step: Step
     code: str
@@ -104,9 +111,10 @@ class Failure:
 
 @dataclass(frozen=True)
 class ExecutedPrimitive:
-    """An executed primitive: its times, its verdict, and the surprises after it.
+    """An executed primitive with its begin and end, the world's verdict, and the unexpected values observed after it.
 
-    `relied_on` are the static facts (relation and individuals) on which the primitive, or the behaviour above it, relied.
+    `relied_on` lists the static facts (relation and individuals) that the primitive, or the behaviour that it refines,
+    relied on.
     """
 
     step: Step
@@ -122,9 +130,9 @@ class ExecutedPrimitive:
 class Replan:
     """A change of the plan.
 
-    `after` is the path of the last primitive that was begun. `kind` is ``repair`` if valid steps of the old plan were kept,
-    otherwise ``replan``. `steps` are the steps to be done from then on, of cost `cost`; `dropped` and `added` count the
-    primitives removed from and added to the steps planned before.
+    `after` is the path of the last primitive that was begun before the change. `kind` is ``repair`` if steps of the old
+    plan were kept, otherwise ``replan``. `steps` are the new remaining steps, and `cost` is their cost; `dropped` and
+    `added` count the primitives that the change removed from the plan and added to it.
     """
 
     after: tuple[int, ...]
@@ -138,13 +146,13 @@ class Replan:
 
     @property
     def distance(self) -> int:
-        """Primitives dropped plus primitives added."""
+        """Number of dropped primitives plus number of added primitives."""
         return self.dropped + self.added
 
 
 @dataclass(frozen=True)
 class Episode:
-    """The plan, the executed steps, the observations, the interventions, and the changes of the plan.
+    """An episode: the plan, the executed steps, the observations, the interventions, and the changes of the plan.
 
     Attributes
     ----------
@@ -200,8 +208,8 @@ class Episode:
 class Event:
     """An event for observers of the execution.
 
-    `seconds` is the time on the world's clock, `belief` the task as the executive believes it to be, with the present situation as
-    its initial state.
+    `seconds` is the time on the world's clock; `belief` is the executive's task, with the present situation as its
+    initial state.
     """
 
     what: str  # plan, begin, end, intervention, discovery, repair, replan, over

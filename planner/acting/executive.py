@@ -1,4 +1,4 @@
-"""The executive: plans, acts, observes, handles interventions, and repairs.
+"""The executive: it plans, executes primitives, observes, handles interventions, and repairs the plan.
 
 belief    the situation as last observed, the current goal, and doubts that failures have raised
 agenda    the steps still to be done; the first may be partly done
@@ -6,10 +6,10 @@ expected  the situation that the next observation should show
 aside     goals that are impossible in the present situation; pursued again after an unexpected observation
 put off   goals that are unreachable while doubts hold; tried again when all other goals are done
 
-Rule 1: no primitive is begun whose precondition doesn't hold in the last observation.
-Rule 2: after every primitive the world is observed; after an unexpected observation the agenda is checked again.
-Rule 3: an unreachable goal is set aside or put off alone; the others are still pursued.
-Rule 4: every loop ends: primitives and failures are counted, planning has limits.
+Rule 1: a primitive is begun only if its precondition holds in the last observation. Rule 2: the world is observed after
+every primitive; an unexpected observation triggers a check of the remaining plan. Rule 3: an unreachable goal is
+dropped or postponed; the other goals are still pursued. Rule 4: every loop terminates, because primitives and failures
+are counted and planning has limits.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def act(
     repairs: bool = True,
     caution: Caution | None = None,
 ) -> Episode:
-    """Execute a task in a world until it is done, it is proved impossible, or a limit is reached.
+    """Execute a task in a world until all goals are achieved, the task is proved impossible, or a limit is reached.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def act(
 
 @dataclass
 class _Run:
-    """An episode in progress. `act` is the loop; each other method is one of its actions."""
+    """An episode in progress. `act` is the main loop; each other method is one action of the loop."""
 
     belief: Belief
     world: Guarded
@@ -133,7 +133,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- beginning, end
 
     def start(self, plan: Plan | None) -> None:
-        """Plan, unless a first plan is given."""
+        """Make a plan, unless the caller has given one."""
         record = self.record
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
@@ -153,7 +153,7 @@ class _Run:
         self.say("plan", text="; ".join(reason.text for _, reason in self.goals.aside.values()))
 
     def finish(self) -> None:
-        """End the episode, check the agenda again, or take up a goal that was put off; called when no step is left."""
+        """Handle an empty agenda: check the agenda again, resume a postponed goal, or end the episode."""
         record = self.record
         if missing := open_goals(self.belief.problem):
             self.request_replan(f"{missing[0]} doesn't hold yet")
@@ -170,7 +170,7 @@ class _Run:
         self.say("over", text=record.status.value)
 
     def break_off(self, why: str) -> None:
-        """Stop at once, since the world doesn't respond."""
+        """End the episode at once, because the world doesn't respond."""
         self.going, self.record.status = False, End.GAVE_UP
         self.record.reason(Reason(why))
         self.say("over", text=f"{End.GAVE_UP.value}: {why}")
@@ -199,14 +199,17 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- acting
 
     def expected(self) -> dict[Symbol, str] | None:
-        """Return the expected situation after the next primitive; None if its precondition doesn't hold."""
+        """Return the situation that is expected after the next primitive.
+
+        Return None if the precondition of the primitive doesn't hold.
+        """
         step, problem = first_chain(self.agenda.steps)[-1], self.belief.problem
         return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
-        """Execute the next primitive and observe; a failed primitive that had its effects counts as done.
+        """Execute the next primitive and observe; a failed primitive counts as done if its effects are observed.
 
-        Returns the primitive with its ancestors, the situation before, and the verdict.
+        Return the primitive with its ancestors, the situation before it, and the verdict.
         """
         chain, record = first_chain(self.agenda.steps), self.record
         step, before = chain[-1], self.belief.problem.initial
@@ -239,7 +242,7 @@ class _Run:
         return chain, before, verdict
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
-        """Return whether at least one expected change can be perceived, and none was perceived."""
+        """Return whether at least one expected change is perceptible and no such change was perceived."""
         found = [
             seen.get(fact.symbol, FALSE) == fact.value
             for fact in changes
@@ -248,7 +251,7 @@ class _Run:
         return bool(found) and not any(found)
 
     def look(self, expected: dict[Symbol, str], seen: State | None = None) -> tuple[Surprise, ...]:
-        """Observe the world unless `seen` is given, believe the observation, and return the differences from the expectation."""
+        """Update the belief with an observation (`seen`, or a new one), and return the differences from the expected situation."""
         seen = self.world.observe() if seen is None else seen
         self.meet()
         for symbol, value in seen.items():
@@ -270,7 +273,7 @@ class _Run:
     # ------------------------------------------------------------------------------------------------------- interventions
 
     def intervene(self) -> None:
-        """Execute the interventions that follow the last primitive."""
+        """Execute the interventions that are due after the last primitive."""
         if not self.waiting:
             return
         done = self.record.done
@@ -297,7 +300,7 @@ class _Run:
                 self.note(intervention, intervention.at or 0.0)
 
     def note(self, intervention: Intervention, seconds: float) -> None:
-        """Record an intervention, and change the goal if the intervention does."""
+        """Record an intervention; if the intervention changes the goal, change the goal of the belief."""
         self.record.interventions.append((intervention, seconds))
         goal = self.belief.goal
         if intervention.change is InterventionKind.GOAL:
@@ -314,7 +317,7 @@ class _Run:
         self.say("intervention", text=intervention.text)
 
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
-        """Request another check of the agenda."""
+        """Request that the agenda is checked again."""
         self.request.add(why)
         for surprise in surprises:
             self.request.missed.setdefault(surprise.symbol, surprise.expected)
@@ -327,7 +330,7 @@ class _Run:
     # --------------------------------------------------------------------------------------------------- repairing
 
     def reconsider(self) -> None:
-        """Repair the agenda, or replan; set aside unreachable goals."""
+        """Repair the plan, or replan; drop unreachable goals."""
         why, self.request.why, belief, record = self.request.why, "", self.belief, self.record
         if self.request.missed:
             self.want_again(self.goals.aside)
@@ -375,7 +378,7 @@ class _Run:
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
-        """Take up goals that were set aside or put off."""
+        """Resume goals that were dropped or postponed."""
         if goals:
             self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in goals.items()}})
             goals.clear()
@@ -385,9 +388,11 @@ class _Run:
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
     def on_no_plan(self, outcome: Outcome | None, limits: Limits) -> None:
-        """Look for free spots; otherwise set aside or put off the goals that are unreachable one by one; otherwise retry, or stop.
+        """Handle a failure of planning: look for free spots.
 
-        A goal that needs facts in doubt is put off until everything else is done.
+        Otherwise drop or postpone the goals that are unreachable one by one; otherwise retry, or end the episode.
+
+        A goal that needs facts in doubt is postponed until all other goals are handled.
         """
         belief = self.belief
         reason = outcome.reason if outcome is not None and outcome.reason else Reason("no plan was found")
@@ -416,7 +421,7 @@ class _Run:
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
     def make_room(self) -> bool:
-        """Request, once, spots besides the scene's places from the world; return whether it has any."""
+        """Ask the world, once, for spots besides the scene's places; return whether the world has any."""
         if self.retries.room_wanted:
             return False
         self.retries.room_wanted = True
@@ -429,7 +434,7 @@ class _Run:
         return bool(spots)
 
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
-        """Drop all goals, so that only rest values remain; stop at once if that was done already."""
+        """Drop all goals, so that only rest values remain to be restored; if that was done before, end the episode."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
@@ -444,9 +449,9 @@ class _Run:
     # ---------------------------------------------------------------------------------------------------- failures
 
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
-        """Retry a failed behaviour, then use an alternative.
+        """Handle a failed behaviour: retry it first, then look for an alternative.
 
-        Repeated failures make a behaviour impossible for the rest of the episode.
+        After repeated failures, the behaviour counts as impossible for the rest of the episode.
         """
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
@@ -476,13 +481,16 @@ class _Run:
         facts: Iterable[tuple[str, tuple[str, ...]]] = (),
         refutations: Iterable[Refutation] = (),
     ) -> None:
-        """Doubt static facts or the applicability of behaviours, and plan the step in progress again."""
+        """Put static facts, or the applicability of behaviours, in doubt, and plan the step in progress again."""
         self.belief.withdraw(facts, refutations)
         self.agenda.sound = False
         self.request_replan(why)
 
     def try_anew(self, why: str) -> bool:
-        """Drop all doubts and take up goals that were put off, if a round is left; return whether one was."""
+        """Trust all facts again and resume postponed goals, if another round is allowed.
+
+        Return whether one was allowed.
+        """
         if not self.retries.another_round():
             return False
         self.belief.trust_again()

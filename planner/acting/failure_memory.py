@@ -1,11 +1,11 @@
-"""Failures as experience: static facts that proved unreliable, and those to be avoided.
+"""Learning from failures: counts of static facts that proved unreliable, and removal of such facts from a problem.
 
-If a primitive fails although its preconditions hold, the static facts on which it relied are in doubt: for instance, that this
-hand can reach that place. Counts only grow, so that the counts of several robots can be added. A fact that failed in more cases
-than it held is avoided as long as there is a plan without it.
+If a primitive fails although its preconditions hold, the static facts that it relied on become doubtful (for instance,
+that this hand can reach that place). Counts never decrease, so the counts of several robots can be added. A fact that
+failed more often than it held is avoided, as long as there is a plan without this fact.
 
-A refutation by motion planning is certain and more specific: the behaviour is impossible while all objects are where they are
-(`refuted_by`).
+A refutation by motion planning is certain and more specific: the behaviour is impossible while the objects stay where
+they are (`refuted_by`).
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
 
 DOUBTFUL = 0.5
-"""Maximum probability of failure of a fact that plans may depend on."""
+"""Maximum probability of failure of a fact on which plans may rely."""
 
 
 @dataclass(frozen=True)
 class Caution:
-    """The number of times that each static fact was relied on, and that it failed.
+    """The number of times that plans relied on each static fact, and the number of times that it failed.
 
     >>> reach = ("canReach", ("hand", "shelf"))
     >>> round(Caution({reach: (3, 2)}).failure_probability(reach), 2)
@@ -43,7 +43,7 @@ class Caution:
         return (failed + 1) / (tried + 2)
 
     def learned(self, episode: Episode) -> Caution:
-        """Return the counts with those of one more episode."""
+        """Return the counts updated by one more episode."""
         counts = dict(self.counts)
         for event in episode.events:
             if event.code != "interrupted":
@@ -59,7 +59,10 @@ class Caution:
         return Caution({fact: (a[0] + b[0], a[1] + b[1]) for fact, (a, b) in pairs.items()})
 
     def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
-        """Return the problem without doubtful facts; facts are removed in order of doubt as long as there is a plan."""
+        """Return the problem without doubtful facts.
+
+        The most doubtful facts are removed first, as long as a plan exists.
+        """
         end = limits.end()
         doubtful = [fact for fact in self.counts if self.failure_probability(fact) > DOUBTFUL]
         for fact in sorted(doubtful, key=lambda fact: (-self.failure_probability(fact), fact)):
@@ -80,7 +83,7 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
 def refuted_by(
     problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
 ) -> tuple[Refutation, ...]:
-    """Return the refutations after a primitive failed under some facts: the primitive, and the behaviours above it.
+    """Return what a failed primitive refutes under some facts: the primitive, and the behaviours that it refines.
 
     Parameters
     ----------
@@ -104,13 +107,13 @@ def refuted_by(
 
 
 def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
-    """Return whether the level of a behaviour sees some facts."""
+    """Return whether all symbols of `facts` are visible on the level of a behaviour."""
     level = problem.domain.behaviors[behavior].level
     return all(problem.sees(level, fact.symbol, fact.value) for fact in facts)
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield behaviours of levels above that have the effect of a refuted one, if only behaviours in `likewise` have it."""
+    """Yield upper-level behaviours that have the same effect as a refuted one and that only `likewise` could refine."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:
@@ -130,12 +133,15 @@ def _same_effect(one: ValueEffect, other: ValueEffect) -> bool:
 
 
 def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
-    """Return the step of a plan at a path, after all its ancestors."""
+    """Return the step of a plan at a path, preceded by all its ancestors."""
     return tuple(step for step in plan.walk() if step.path == path[: len(step.path)])
 
 
 def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
-    """Return the static facts that a primitive, or otherwise the next behaviour above it, relied on."""
+    """Return the static facts that a primitive relied on.
+
+    If there are none, those of the nearest ancestor that relied on some.
+    """
     for step in reversed(chain):
         behavior = problem.domain.behaviors[step.behavior]
         env = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}

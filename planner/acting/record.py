@@ -22,7 +22,7 @@ from confab.reasoner.symbols import Problem, State
 
 @dataclass
 class Record:
-    """The events so far: executed steps by path, events, and reasons for unreached goals."""
+    """The record so far: executed steps by path, events, and reasons for unachieved goals."""
 
     initial: State
     planned: Plan = Plan(())  # noqa: RUF009 - frozen
@@ -40,21 +40,21 @@ class Record:
 
     @property
     def executed(self) -> Plan:
-        """The executed steps, as a tree."""
+        """The executed steps as a tree."""
         return Plan(tree_of(self.done))
 
     def changes(self, before: State, after: State, seconds: float) -> None:
-        """Record which symbols have other values than before."""
+        """Record the symbols whose values differ between two situations."""
         changed = (s for s in sorted(before.keys() | after.keys()) if before.get(s) != after.get(s))
         self.course += [Seen(seconds, symbol, after.get(symbol)) for symbol in changed]
 
     def reason(self, reason: Reason) -> None:
-        """Record a reason once."""
+        """Record a reason, unless it is recorded already."""
         if reason not in self.reasons:
             self.reasons.append(reason)
 
     def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...]) -> Episode:
-        """Return the episode: the record, with the final task."""
+        """Return the recorded episode with the final task."""
         return Episode(
             task.scene,
             self.status,

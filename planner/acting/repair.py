@@ -1,15 +1,16 @@
-"""Repair of a plan: valid steps are kept, the rest is planned again.
+"""Repair of a plan: the steps that are still valid are kept, and the rest is planned again.
 
-The remaining steps are replayed on one table from the present situation. A step is
+The remaining steps of the plan are replayed on a state table from the present situation. A step is
 
 dropped     if its purpose holds already, or is no longer a goal
 kept        if its primitives still have their effects; otherwise refined again (for another hand, for instance)
 put off     if it isn't applicable yet; later steps about the same individuals are then put off, too
 
-Steps put off are tried again as long as another step succeeds. The goals that are open in the end are achieved by the default
-planner, on the same table. A hand in the middle of a step first finishes it, or is brought to rest.
+Inapplicable steps are postponed and tried again after each successful step. The default planner then achieves the
+remaining goals, on the same table. If a hand is in the middle of a step, the step is finished first, or the hand is
+brought to rest.
 
-Every result is accepted by `confab.planner.validation`.
+`confab.planner.validation` checks every repaired plan.
 """
 
 from __future__ import annotations
@@ -34,18 +35,21 @@ from confab.reasoner.limits import LimitError, within
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1
-"""Maximum ratio of the cost of a repair to that of a new plan; beyond it, the new plan is taken."""
+"""Maximum ratio of a repair's cost to a new plan's cost; if the repair costs more, the new plan is taken."""
 
 MOST = 5_000
-"""Maximum number of expansions of a repair, before the whole task is planned again."""
+"""Maximum number of expansions of a repair; after these, the whole task is planned again."""
 
 SHARE = 0.5
-"""Share of the time for a repair; the rest is left for a new plan."""
+"""Share of the remaining time for a repair; the rest is reserved for a new plan."""
 
 
 @dataclass(frozen=True)
 class RepairResult:
-    """The steps to do from now on, and how they were found. `steps` is None if nothing was found."""
+    """The remaining steps after a repair or a new plan, and the way in which they were found.
+
+    `steps` is None if no plan was found.
+    """
 
     kind: str
     steps: tuple[Step, ...] | None
@@ -55,7 +59,7 @@ class RepairResult:
 
 @dataclass(frozen=True)
 class Repaired:
-    """The result of a repair: the steps, their cost, and `least`, a lower bound on the cost of any plan for the open goals."""
+    """The result of a repair: the steps, their cost, and `least`, a lower bound on the cost of every plan for the open goals."""
 
     steps: tuple[Step, ...]
     cost: float
@@ -72,7 +76,7 @@ def repair_or_replan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     begun: bool = False,
 ) -> RepairResult:
-    """Return the steps from a situation that differs from the one for which a plan was made.
+    """Return the remaining steps for a situation that differs from the expected one: a repair of `rest`, or a new plan.
 
     Parameters
     ----------
@@ -117,8 +121,8 @@ def repair(
 ) -> Repaired | None:
     """Return steps for the open goals that keep as many valid steps of `rest` as possible, or None if none were found.
 
-    The lower bound counts the planned steps that the changes don't touch, the step in progress, and one step per open goal; of the
-    steps about an individual that is touched, or that a new step concerns, it counts one.
+    The lower bound `least` counts the planned steps that the changes don't affect, the step in progress, and one step
+    per open goal; an affected individual adds one step.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
@@ -154,7 +158,7 @@ def repair(
 
 
 def changed_individuals(planned: Problem, now: Problem) -> set[str]:
-    """Return the individuals named by the differences of two situations and their goals."""
+    """Return the individuals in whose symbols or goals two problems differ."""
     touched: set[str] = set()
     for old, new in ((planned.initial, now.initial), (planned.goal, now.goal)):
         for symbol in old.keys() | new.keys():
@@ -167,7 +171,7 @@ def changed_individuals(planned: Problem, now: Problem) -> set[str]:
 def replan(
     problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
-    """Return steps planned from scratch: bring the hands to rest, then plan."""
+    """Return a new plan: first the hands are brought to rest, then the task is planned."""
     first: tuple[Step, ...] = ()
     now, end = problem, limits.end()
     call = Call(problem, using, end, limits.expansions)
@@ -188,18 +192,21 @@ def replan(
 
 
 def rejected(problem: Problem, steps: Sequence[Step]) -> Reason | None:
-    """Return why the independent checker rejects some steps; None if they lead from the present situation to the goal.
+    """Return the reason why the independent checker rejects some steps.
 
-    Only their primitives are checked: the first step may be in progress, so its parents' preconditions held earlier.
+    Return None if the steps lead from the present situation to the goal.
+
+    Only the primitives are checked: the first step may be in progress, so the preconditions of its ancestors held
+    earlier.
     """
     faults = validate(problem, Plan(renumbered(Plan(tuple(steps)).primitives)))
     return Reason(f"the steps that were found can't be followed: {faults[0].text}") if faults else None
 
 
 def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> list[tuple[Symbol, Reason]]:
-    """Return the goals that can't hold because their object is gone or at no perceived place, with the reason.
+    """Return the goals that can't hold because their object is gone or is at no perceived place, each with the reason.
 
-    `why` returns for an object why it has no perceived place, if that is known.
+    `why` maps an object to the reason why it has no perceived place, if the reason is known.
     """
     return [
         (
@@ -216,9 +223,9 @@ def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> li
 
 
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
-    """Return the number of old primitives that are dropped, and of new primitives that are added.
+    """Return the number of dropped primitives of the old steps and the number of added primitives of the new steps.
 
-    The two sequences are compared: a primitive at another position counts as dropped and added.
+    The two sequences are compared in order: a primitive at another position counts as dropped and added.
     """
     before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
     same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
@@ -229,10 +236,10 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 
 
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
-    """Apply the open steps of the step in progress, up to a situation of rest, and remove them from `pending`.
+    """Apply the unexecuted sub-steps of the step in progress until all symbols are at rest, and remove the step from `pending`.
 
-    If they don't lead to such a situation, or only to values that are no longer goals, none is applied; unless the situation is
-    one of rest already, the first is dropped.
+    If the sub-steps don't lead to rest, or achieve only values that are no longer goals, no sub-step is applied; the
+    step in progress is then dropped, unless all symbols are at rest already.
     """
     mark = len(call.table.trail)
     for count, step in enumerate(pending, 1):
@@ -252,7 +259,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
 
 
 def _restore(call: Call, pending: Sequence[Step]) -> None:
-    """Achieve first the open goals without a pending step, where one step does it: their symbols were disturbed."""
+    """Achieve the disturbed goals first: the open goals that no pending step achieves and that one step can achieve."""
     planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
     before = order(call) if orphans else {}
@@ -262,7 +269,7 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
 
 
 def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
-    """Apply as many pending steps as possible, in their order if possible; return whether none was dropped."""
+    """Apply as many pending steps as possible, preferably in their order; return whether all were applied."""
     progress, whole = True, True
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
@@ -291,9 +298,10 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
 
 
 def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
-    """Apply a step by its own primitives, or return None with the table unchanged.
+    """Apply a step with its own primitives; if that fails, leave the table unchanged and return None.
 
-    Of a step that was `begun` before, only the primitives count; any other step must be applicable and have its effects.
+    A step in `begun` was begun earlier, so only its primitives are checked; any other step must be applicable and have
+    its effects.
     """
     mark = len(call.table.trail)
     applicable = call.space.forward[step.behavior](*step.arguments)
@@ -320,14 +328,14 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
-    """Replace the value that a step gives by the present goal value, if one step achieves that value."""
+    """Achieve the present goal value of a symbol in place of the value that a step gives, if one step can achieve it."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
             call.achieve(call.program.levels[0], cell, ONE_STEP)
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
-    """Return whether all changes that the first level sees were goals once and no longer are."""
+    """Return whether all first-level changes of a step were goals once and no longer are."""
     situations, first = call.problem.domain.situations, call.program.levels[0]
     return all(
         call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value
@@ -337,7 +345,7 @@ def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
 
 
 def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapping[str, str]) -> dict[Cell, str]:
-    """Return the values that a step gives to symbols, whether or not it is applicable."""
+    """Return the values that a step would give to symbols, whether or not the step is applicable."""
     lifted = call.problem.domain.behaviors[behavior]
     env = {p.name: argument for p, argument in zip(lifted.parameters, arguments, strict=True)}
     env |= {f"?{name}": value for name, value in bindings.items()}
@@ -349,9 +357,9 @@ def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapp
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of the last steps that give an open goal its value.
+    """Return the positions of the steps that last give an open goal its value.
 
-    Consecutive steps below the first level serve one purpose.
+    Consecutive steps below the first level count as one group.
     """
     start, variables, first = call.problem.initial, call.program.variables, call.program.levels[0]
     last: dict[Cell, int] = {}

@@ -1,4 +1,4 @@
-"""Retries in an episode: their limits, and the attempts so far."""
+"""Retries during an episode: their limits, and the attempts so far."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from confab.planner.plan import Limits
 class RetryPolicy:
     """Limits of an episode: attempts per primitive, total failures, begun primitives per planned primitive, and planning limits.
 
-    `rounds` is the maximum number of new attempts of failed steps when no alternative is left: the situation may have changed,
-    or a hand may grasp differently. It also limits checks of the agenda while the situation doesn't change. `planning` limits
-    each planning call; the whole episode ends by the current deadline (`confab.reasoner.limits.within`).
+    `rounds` is the maximum number of times that failed steps are retried after all alternatives are exhausted: the
+    situation may have changed, or a hand may grasp differently. `rounds` also limits how often the agenda is checked in
+    an unchanged situation. `planning` limits each planning call; the whole episode ends by the current deadline
+    (`confab.reasoner.limits.within`).
     """
 
     attempts: int = 2
@@ -29,7 +30,7 @@ DEFAULT = RetryPolicy()
 
 @dataclass
 class Retries:
-    """The attempts so far.
+    """The attempts of an episode so far.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ class Retries:
     most: int = 0
 
     def another_round(self) -> bool:
-        """Begin another round, if one is left; return whether one was."""
+        """Begin another round, if one is allowed; return whether one was allowed."""
         if self.rounds >= self.policy.rounds:
             return False
         self.rounds += 1

@@ -1,8 +1,8 @@
-"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that keeps it.
+"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that respects it.
 
-Most of the order of a plan is arbitrary. A primitive must wait for an earlier primitive only if in the reverse order one of the
-two would be inapplicable or have other effects. The behaviours themselves are used for this test, so it covers all forms of
-conditions.
+Most of the order of a sequential plan is arbitrary. A primitive must wait for an earlier primitive only if exchanging
+the two would make one of them inapplicable or change its effects. The test applies the behaviours themselves, so it
+covers all kinds of conditions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 PartialOrder: TypeAlias = "networkx.DiGraph[int]"
 Compatible = Callable[[Step, Step], bool]
-"""Function of two primitives: whether there is enough room to execute both at the same time."""
+"""Function of two primitives that returns whether both can be executed at the same time in the available room."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,9 @@ class Slot:
 
 
 def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
-    """Return the necessary order of primitives as a transitively reduced graph over their positions.
+    """Return the necessary order of primitives as a transitively reduced graph.
+
+    The nodes are the primitives' positions in the sequence.
 
     Parameters
     ----------
@@ -68,7 +70,10 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
 
 
 def workers_of(problem: Problem) -> frozenset[str]:
-    """Return the workers: individuals with a situation type that has a rest value. A worker executes one primitive at a time."""
+    """Return the workers: individuals with a situation type that has a rest value.
+
+    A worker executes one primitive at a time.
+    """
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
     return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
 
@@ -79,7 +84,7 @@ def schedule(
     seconds_of: Mapping[int, float] | None = None,
     apart: Compatible = lambda one, other: True,
 ) -> list[Slot]:
-    """Return the slots of primitives if every worker begins each of them as early as possible.
+    """Return a schedule of primitives in which every worker begins each primitive as early as possible.
 
     Parameters
     ----------
@@ -121,7 +126,7 @@ def ready(
     urgency: Mapping[int, float],
     apart: Compatible,
 ) -> list[int]:
-    """Return the primitives that can begin now, the most urgent first, with room for all of them at once."""
+    """Return the primitives that can begin now and together, the most urgent first."""
     started, chosen = set(begun), list(running)
     busy = {worker_of(primitives[i], workers) for i in running}
     found = []
@@ -138,23 +143,23 @@ def ready(
 
 
 def urgency_of(order: PartialOrder) -> dict[int, float]:
-    """Return for each primitive the length of the longest chain of primitives that begins with it."""
+    """Return for each primitive the number of primitives in the longest chain that begins with it."""
     return _urgency(order, dict.fromkeys(order, 1.0))
 
 
 def worker_of(step: Step, workers: Iterable[str]) -> str:
-    """Return the worker of a step, the first of its arguments that is one; an empty string if there is none."""
+    """Return the worker of a step: the first argument that is a worker; an empty string if no argument is one."""
     known = workers if isinstance(workers, frozenset) else frozenset(workers)
     return next((argument for argument in step.arguments if argument in known), "")
 
 
 def makespan(slots: Sequence[Slot]) -> float:
-    """Return the end of the last primitive."""
+    """Return the time at which the last primitive ends."""
     return max((slot.end for slot in slots), default=0.0)
 
 
 def _urgency(order: PartialOrder, seconds: Mapping[int, float]) -> dict[int, float]:
-    """Return for each primitive the duration of the longest chain of primitives that begins with it."""
+    """Return for each primitive the total duration of the longest chain that begins with it."""
     found: dict[int, float] = {}
     for i in reversed(list(networkx.topological_sort(order))):
         found[i] = seconds[i] + max((found[j] for j in order.successors(i)), default=0.0)
@@ -185,6 +190,6 @@ def _needs(
 
 
 def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:
-    """Return whether a primitive is applicable in a state and has the same effects there as in the plan."""
+    """Return whether a primitive is applicable in a state and has the effects that it has in the plan."""
     after = _done(problem, step, state)
     return after is not None and all(after.get(s) == new for s, (_, new) in writes.items())

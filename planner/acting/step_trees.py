@@ -1,4 +1,4 @@
-"""Trees of partly executed steps: the next primitive, the rest, and the tree of executed steps."""
+"""Trees of partly executed steps: the next primitive, the remaining steps, and the executed steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def first_chain(steps: Sequence[Step]) -> tuple[Step, ...]:
 
 
 def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps without their first primitive, and without the steps that end with it."""
+    """Return the steps without their first primitive, and without the parents for which it is the last primitive."""
     if not steps[0].steps:
         return tuple(steps[1:])
     below = without_first(steps[0].steps)
@@ -25,12 +25,12 @@ def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
 
 
 def all_steps(steps: Sequence[Step]) -> Iterator[Step]:
-    """Yield the steps and everything below them."""
+    """Yield the steps and all their descendants."""
     return (step for root in steps for step in root.walk())
 
 
 def tree_of(steps: Mapping[tuple[int, ...], Step], above: tuple[int, ...] = ()) -> tuple[Step, ...]:
-    """Return steps, given by path, as trees."""
+    """Return steps, given as a mapping from paths, as trees."""
     below: dict[tuple[int, ...], list[Step]] = {}
     for path in sorted(steps, key=lambda p: (-len(p), p)):
         below.setdefault(path[:-1], []).append(replace(steps[path], steps=tuple(below.get(path, ()))))

@@ -1,4 +1,4 @@
-"""A symbolic world: behaviours have exactly their effects, except for interventions and injected faults."""
+"""A world of symbols: behaviours have exactly their stated effects, except for interventions and injected faults."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 DONE = Report(True)
 FaultInjection = Callable[[Step, State], Report | None]
-"""Decides whether a primitive fails in a situation, and how; for tests."""
+"""Function that decides, for tests, whether and how a primitive fails in a situation."""
 
 
 class SymbolicWorld:
@@ -51,7 +51,7 @@ class SymbolicWorld:
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
     def execute(self, step: Step) -> Report:
-        """Execute a primitive; an intervention meanwhile stops it if its precondition is lost."""
+        """Execute a primitive; an intervention during the primitive stops it if its precondition no longer holds."""
         end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
         disturbed = False
         while self._waiting and (self._waiting[0].at or 0.0) < end:
@@ -73,7 +73,7 @@ class SymbolicWorld:
         return DONE
 
     def stop(self) -> None:
-        """Do nothing: a primitive takes no computing time."""
+        """Do nothing, since a primitive takes no computing time."""
 
     def disturb(self, intervention: Intervention) -> None:
         """Apply an intervention.
@@ -96,20 +96,20 @@ class SymbolicWorld:
         self.state = after
 
     def discoveries(self) -> tuple[Discovery, ...]:
-        """Return the boxes and spots that have appeared since the last call."""
+        """Return the objects and spots that have appeared since the last call."""
         news, self._news = tuple(self._news), []
         return news
 
     def free_spots(self) -> tuple[Discovery, ...]:
-        """Return nothing: this world has no room besides its places."""
+        """Return no spots: a symbolic world has no room besides the places of the scene."""
         return ()
 
     def why_unplaced(self, individual: str) -> str:
-        """Return the text that an object lies, if the object still exists."""
+        """Return the text that an object lies on the floor, if the object still exists."""
         return "lies" if any(individual in symbol.arguments[:1] for symbol in self.state) else ""
 
     def _add_spot(self, individual: str) -> None:
-        """Put an object that stands at a place on a new spot beside it, with the same static facts as the place."""
+        """Put a displaced object on a new spot beside its place; the spot gets the static facts of the place."""
         symbols = place_symbols(self.problem, individual)
         there = next((self.state[s] for s in symbols if self.state.get(s) in self.problem.individuals), None)
         symbol = next((s for s in symbols if s in self.state), None)
@@ -136,8 +136,8 @@ class SymbolicWorld:
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
     """Return the state after an intervention.
 
-    An object that is moved, knocked over or removed is released: a hand that held it is at rest, and a hand that was at it stays
-    where it was. An object that lies has no place.
+    An object that is moved, knocked over or removed is released: a hand that held it comes to rest, and a hand that
+    touched it stays in place. An object that lies on the floor has no place.
     """
     after = dict(state)
     if intervention.change is InterventionKind.KNOCK:
@@ -161,7 +161,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Replace an individual as the value of other symbols: by its former place if possible, otherwise by their rest values."""
+    """Replace an individual as the value of other symbols: by its former place, or else by the rest value."""
     own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:
@@ -175,7 +175,7 @@ def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual
 
 
 def _is_whereabouts(problem: Problem, situation: str) -> bool:
-    """Return whether a situation type shares values with another one: a change of place then changes both."""
+    """Return whether a situation type shares values with another one, so that a change of place changes both."""
     own = set(problem.classes.get(problem.domain.situations[situation].range, ()))
     return any(
         own & set(problem.classes.get(other.range, ()))
@@ -185,7 +185,7 @@ def _is_whereabouts(problem: Problem, situation: str) -> bool:
 
 
 def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
-    """Return the problem with one more individual, which comes last in its classes."""
+    """Return the problem with one more individual, which comes last in the order of each of its classes."""
     kinds, waiting = {kind}, [kind]
     while waiting:
         for parent in problem.parents.get(waiting.pop(), ()):
@@ -210,7 +210,7 @@ def met(problem: Problem, found: Discovery) -> Problem:
 
 
 def shared_kinds(problem: Problem, individuals: Iterable[str]) -> tuple[str, ...]:
-    """Return the common classes of some individuals, without superclasses of others among them."""
+    """Return the common classes of some individuals; superclasses of other common classes are left out."""
     names = {*individuals}
     common = [kind for kind, members in problem.classes.items() if names and names <= {*members}]
     above = {parent for kind in common for parent in problem.parents.get(kind, ())}

@@ -1,4 +1,4 @@
-"""Reasons for unreached goals: blocking objects, discoveries, and failures."""
+"""Reasons for unachieved goals: blocking objects, discoveries, and failures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from confab.reasoner.symbols import Fact, Symbol
 
 
 def blocked(belief: Belief, fact: Fact, limits: Limits) -> Reason | None:
-    """Return the reason if a goal is blocked by immovable objects only; None otherwise."""
+    """Return the reason why a goal is unreachable, if only immovable objects block it; None otherwise."""
     if not belief.obstacles:
         return None
     free = belief.without_obstacles({fact.symbol: fact.value})
@@ -27,14 +27,14 @@ def blocked(belief: Belief, fact: Fact, limits: Limits) -> Reason | None:
 
 
 def with_discoveries(belief: Belief, record: Record, fact: Fact, reason: Reason) -> Reason:
-    """Return the reason why a goal is unreachable, with the discoveries about its objects."""
+    """Return the reason why a goal is unreachable, extended by discoveries about its objects."""
     there = {v for s, v in belief.state.items() if {*s.arguments[:1]} & {*fact.symbol.arguments}}
     found = [one.text for one, _ in record.discovered if one.individual in there and one.text]
     return replace(reason, text="; ".join((*found, reason.text))) if found else reason
 
 
 def blamed(record: Record, symbol: Symbol, value: str) -> Reason:
-    """Return the reason for giving up a goal: the last failure that concerns the goal, otherwise the last failure."""
+    """Return the reason for dropping a goal: the last failure that concerns the goal, otherwise the last failure of the episode."""
     concerned = {*symbol.arguments, value}
     failures = record.failures
     near = [f for f in failures if concerned & {*f.objects, *f.step.arguments, *f.step.bindings.values()}]

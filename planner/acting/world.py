@@ -1,7 +1,8 @@
 """The world in which the executive acts: a simulation, a set of symbols, or a robot (docs/connecting.md).
 
-A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same time.
-`stop` is the exception: it is called while `execute` runs, from another thread, or after an exception has left it.
+A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same
+time. `stop` is the exception: another thread may call it while `execute` runs, and it is called after an exception in
+`execute`.
 """
 
 from __future__ import annotations
@@ -25,18 +26,21 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
-"""The code of a primitive that was stopped: this isn't a failure, so it isn't learned from."""
+"""Code of a primitive that was stopped; a stopped primitive isn't a failure, so nothing is learned from it."""
 
 WITHOUT_EFFECT = "without effect"
-"""The code of a primitive that was reported as done, though none of its effects is observed."""
+"""Code of a primitive that was reported as done, although none of its effects is observed."""
 
 
 class WorldError(Exception):
-    """The world itself failed: it raised an exception, or returned something other than an observation or a verdict."""
+    """The world itself failed: a call raised an exception, or returned something other than an observation or a verdict."""
 
 
 class Verdict(Protocol):
-    """The world's report on a primitive. Whether its effects hold is decided by the next observation, not by the verdict."""
+    """The world's report on a primitive.
+
+    The next observation, and not the verdict, decides whether the effects of the primitive hold.
+    """
 
     @property
     def ok(self) -> bool:
@@ -44,20 +48,20 @@ class Verdict(Protocol):
 
     @property
     def code(self) -> str | None:
-        """The kind of failure; `INTERRUPTED` if the primitive was stopped, None if it succeeded."""
+        """The kind of failure; `INTERRUPTED` if the primitive was stopped; None if it succeeded."""
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """The objects that took part in the failure."""
+        """The objects that were involved in the failure."""
 
     @property
     def message(self) -> str:
-        """The failure as a sentence."""
+        """The description of the failure as a sentence."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """A verdict as a value. `facts` are those under which motion planning refuted the primitive."""
+    """A verdict as an immutable value. `facts` are the facts under which motion planning refuted the primitive."""
 
     ok: bool
     code: str | None = None
@@ -70,24 +74,27 @@ class World(Protocol):
     """The world in which the executive acts."""
 
     def observe(self) -> State:
-        """Return the facts that are perceived now; symbols that can't be perceived are left out."""
+        """Return the facts that are perceived now; symbols that aren't perceptible are left out."""
 
     def execute(self, step: Step) -> Verdict:
         """Execute a primitive and return when it has ended, failed, or was stopped."""
 
     def stop(self) -> None:
-        """Stop the running primitive, so that `execute` returns with the code `INTERRUPTED`. Return at once; never raise."""
+        """Stop the running primitive, so that `execute` returns with the code `INTERRUPTED`.
+
+        Return at once; never raise an exception.
+        """
 
     @property
     def seconds(self) -> float:
-        """The world's clock; it never runs backwards."""
+        """The time on the world's clock; the clock never runs backwards."""
 
 
 class Disturbable(World, Protocol):
     """A simulated world in which interventions can take place."""
 
     def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention take place now."""
+        """Make an intervention take place now."""
 
     def announce(self, interventions: tuple[Intervention, ...]) -> None:
         """Record interventions with their times on the world's clock."""
@@ -95,23 +102,29 @@ class Disturbable(World, Protocol):
 
 @runtime_checkable
 class Discoverer(Protocol):
-    """A world that finds individuals which the scene doesn't have."""
+    """A world that discovers individuals that the scene doesn't contain."""
 
     def discoveries(self) -> Sequence[Discovery]:
-        """Return the discoveries since the last call. Observations may name them from then on."""
+        """Return the discoveries since the last call.
+
+        From then on, observations may name the discovered individuals.
+        """
 
     def free_spots(self) -> Sequence[Discovery]:
-        """Return spots at which an object can be put down; called once, when the places of the scene don't suffice."""
+        """Return free spots for putting objects down; called once, when the places of the scene don't suffice."""
 
     def why_unplaced(self, individual: str) -> str:
-        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``; an empty text if unknown."""
+        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``.
+
+        Return an empty text if the reason is unknown.
+        """
 
 
 @dataclass(frozen=True)
 class Guarded:
-    """A world whose exceptions and malformed results become one `WorldError` that names the call.
+    """A wrapper of a world: each exception or malformed result becomes a `WorldError` that names the call.
 
-    A primitive that still runs at the current deadline (`confab.reasoner.limits`) is stopped.
+    A primitive that is still running at the current deadline (`confab.reasoner.limits`) is stopped.
     """
 
     world: World
@@ -130,7 +143,7 @@ class Guarded:
         return seen
 
     def execute(self, step: Step) -> Verdict:
-        """Execute a primitive; stop it at the deadline."""
+        """Execute a primitive; at the deadline, stop the primitive."""
         left = current().left
         timer = None if left is None else Timer(left, self.stop)
         if timer is not None:
@@ -150,12 +163,12 @@ class Guarded:
         return said
 
     def stop(self) -> None:
-        """Stop the running primitive; ignore an error of a world that can't."""
+        """Stop the running primitive; ignore an error raised by the world's `stop`."""
         with suppress(WorldError), _asking("stop()"):
             self.world.stop()
 
     def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention take place now."""
+        """Make an intervention take place now."""
         with _asking(f"disturb({intervention.text or intervention.change.value})"):
             self._disturbable().disturb(intervention)
 
@@ -166,21 +179,21 @@ class Guarded:
                 self._disturbable().announce(interventions)
 
     def discoveries(self) -> tuple[Discovery, ...]:
-        """Return the discoveries since the last call; none if the world is no `Discoverer`."""
+        """Return the discoveries since the last call; the list is empty if the world isn't a `Discoverer`."""
         if not isinstance(self.world, Discoverer):
             return ()
         with _asking("discoveries()"):
             return tuple(self.world.discoveries())
 
     def free_spots(self) -> tuple[Discovery, ...]:
-        """Return spots that are free to put an object down."""
+        """Return free spots for putting an object down."""
         if not isinstance(self.world, Discoverer):
             return ()
         with _asking("free_spots()"):
             return tuple(self.world.free_spots())
 
     def why_unplaced(self, individual: str) -> str:
-        """Return why an object has no perceived place; an empty text if the world can't say."""
+        """Return why an object has no perceived place; an empty text if the world doesn't know the reason."""
         if not isinstance(self.world, Discoverer):
             return ""
         with _asking(f"why_unplaced({individual})"):
@@ -203,7 +216,7 @@ class Guarded:
 
 @contextmanager
 def _asking(call: str) -> Iterator[None]:
-    """Turn an exception of the world into a `WorldError`; log the traceback at level DEBUG."""
+    """Turn an exception of the world into a `WorldError`, and log the traceback at level DEBUG."""
     try:
         yield
     except (ImpossibleStateError, WorldError):  # the first is an error of the caller, not of the world

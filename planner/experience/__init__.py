@@ -1,1 +1,1 @@
-"""Experience in planning: learned rules with counts, their evaluation, and their use before search."""
+"""Experience in planning: learned rules with counts, their scores, and their use before search."""

@@ -1,4 +1,4 @@
-"""Planning with experience: rules propose steps, and can cost only a bounded share of the effort.
+"""Planning with experience: learned rules propose steps, and may use only a bounded share of the effort.
 
 =========  ====================================================================================================
 guarded    rules are used for kinds of goals that they have achieved at least as often as not
@@ -6,10 +6,9 @@ leading    rules are used regardless of their record
 strict     rules aren't used; their record is still updated when an episode is learned
 =========  ====================================================================================================
 
-Rules are used for goals and for refinements, on every level, before these are searched
-(`confab.planner.experience.following`).
-Only the search can prove that there is no plan. Planning is as without memory if the memory isn't trusted, has no rules for the
-goals, or hasn't achieved such goals yet.
+On every level, rules are tried for goals and for refinements before a search begins
+(`confab.planner.experience.following`). Only the search can prove that there is no plan. Experience isn't used if the
+memory isn't trusted, has no rules for the goals, or has never achieved such goals.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from confab.reasoner.symbols import Problem
 
 @dataclass
 class Memory:
-    """Experience in the form that the planner uses.
+    """Experience in the form in which the planner uses it.
 
     Parameters
     ----------
@@ -47,17 +46,17 @@ class Memory:
 
     @cached_property
     def rules(self) -> list[Rule]:
-        """The rules that may be followed."""
+        """The rules that the planner may follow."""
         return rules_in(self.experience)
 
     @cached_property
     def orders(self) -> list[Order]:
-        """The orders that held in nearly all cases."""
+        """The orders of goals that held in nearly all observed cases."""
         return usable(self.experience)
 
     @cached_property
     def totals(self) -> Counts:
-        """The counts of all replicas together."""
+        """The counts of all replicas of the memory, added up."""
         return self.experience.totals()
 
     @cached_property
@@ -66,19 +65,19 @@ class Memory:
         return Scorer(self.experience)
 
     def record(self, rule: Rule) -> Tally:
-        """Return how often rules achieved goals of this kind, and how often not."""
+        """Return how often the rules achieved goals of this kind, and how often they failed."""
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
 
     def helps(self, rule: Rule) -> bool:
-        """Return whether rules have achieved goals of this kind at least as often as not."""
+        """Return whether the rules have achieved goals of this kind at least as often as they failed."""
         return self.record(rule).chosen >= max(1, self.record(rule).failed)
 
     def harms(self, rule: Rule) -> bool:
-        """Return whether they have failed more often than not."""
+        """Return whether the rules have failed for goals of this kind more often than they succeeded."""
         return self.record(rule).chosen < self.record(rule).failed
 
     def leads(self, problem: Problem, mode: str) -> bool:
-        """Return whether rules may be used: some open goal has rules with a good record, or the mode requires it."""
+        """Return whether rules may be used: the mode requires them, or some open goal has rules with a good record."""
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
         return (
             mode != "strict"
@@ -94,7 +93,10 @@ class Memory:
     def policy(
         self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
     ) -> RulePolicy:
-        """Return the rules for a call, with scores for rules and for individuals in roles; `joins` as for `RulePolicy`."""
+        """Return the rules for a call, with scores of rules and of the individuals in their roles.
+
+        `joins` has the meaning that it has in `RulePolicy`.
+        """
         reader = cache(lambda: FactReader(call.program, call.table, call.goal))
 
         def score(instance: RuleInstance) -> float:
@@ -112,7 +114,10 @@ class Memory:
         return RulePolicy(call, [*rules, *also], self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
-        """Return the compiled problem, with the methods that succeeded more often than not as the first refinements."""
+        """Return the compiled problem.
+
+        Its methods that succeeded more often than they failed are the first refinements to be tried.
+        """
         methods = {name: list(known) for name, known in using.methods.items()}
         for name, one in sorted(self.experience.said.items()):
             if isinstance(one, Method) and name not in self.experience.disabled and self._fits(one, using):
@@ -124,7 +129,7 @@ class Memory:
         return replace(using, methods=methods)
 
     def _fits(self, method: Method, using: Compiled) -> bool:
-        """Return whether a domain has the behaviours of a method, with the same numbers of roles."""
+        """Return whether a domain has all behaviours of a method, with the same numbers of parameters."""
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)
         if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:

@@ -1,4 +1,4 @@
-"""The share of a call's effort that learned rules may waste: a wrong rule costs a bounded part of the same budget."""
+"""Limit on wasted effort: unsuccessful rules may use only a bounded share of a call's search effort."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import TypeVar
 from confab.planner.hierarchical.workspace import Workspace
 
 WASTE, FREE = 10, 500_000
-"""Inverse of the share of expansions, and of effort, that unsuccessful rules may take, and the effort assumed before the call."""
+"""Inverse of the share of expansions and effort that unsuccessful rules may use, and the effort credited before the call."""
 Found = TypeVar("Found")
 
 
 class OverspentError(Exception):
-    """Following rules has wasted more effort than it may."""
+    """The rules have wasted more effort than the limit allows."""
 
 
 class Allowance:
-    """Counts the effort of rules in a call, and limits the part of it that leads to nothing.
+    """Counts the effort of rules in a call, and limits the effort of unsuccessful rules.
 
     Attributes
     ----------
@@ -36,23 +36,23 @@ class Allowance:
         self.wasted_effort, self.wasted_expansions = 0.0, 0
 
     def left(self) -> float:
-        """Return how much more effort may be wasted."""
+        """Return how much more effort unsuccessful rules may use."""
         return (self.space.effort + self.spent + FREE) / WASTE - self.wasted_effort
 
     def ready(self) -> bool:
-        """Return whether both more effort and more expansions may be wasted."""
+        """Return whether the limits of effort and of expansions both allow another attempt."""
         return self.wasted_expansions * WASTE <= self.space.expanded and self.left() > 0
 
     def spend(self, effort: int) -> None:
-        """Count the effort of matching, and raise `OverspentError` at the limit of the current attempt."""
+        """Count the effort of matching rules; raise `OverspentError` at the limit of the current attempt."""
         self.spent += effort
         if self.spent > self.limit:
             raise OverspentError
 
     def bounded(self, attempt: Callable[[], Found | None]) -> Found | None:
-        """Return the result of an attempt; None if it fails, or exceeds the allowance by matching alone.
+        """Return the result of an attempt; None if the attempt fails, or if matching rules exceeds the limit.
 
-        Attempts may be nested: the effort of an inner attempt doesn't count against the limit of the outer one.
+        Attempts may be nested: the effort of an inner attempt doesn't count towards the limit of the outer attempt.
         """
         outer, wasted, began = self.limit, self.wasted_effort, self.spent
         self.limit = min(outer, began + self.left())

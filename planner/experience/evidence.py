@@ -1,12 +1,12 @@
-"""Choice among rule instances: cogency, from the facts of earlier choices and rejections.
+"""Choice among rule instances by cogency, which is learned from the facts of earlier choices and rejections.
 
-The facts about an individual in a role of a rule are generated from the domain: the classes that behaviours distinguish, its values
-and the task's goals for them, whether some object has it, or should have it, as a value, and its static relations to the other
+The facts about an individual in a role are generated from the domain: its classes that behaviours distinguish, its
+values and their goals, the objects that have it or should have it as a value, and its static relations to the other
 roles.
 
-Cogency is eq. (1) of the paper as log odds: ln((c + ½)/(p + ½)) for c choices and p rejections or failures of the rule, and for
-each fact ln(p(fact | chosen)/p(fact | not)), since the facts of two candidates differ. An unseen fact counts nothing; an unseen
-class is judged by its superclasses. Preferences for single individuals decay by a tenth with each episode.
+Cogency is eq. (1) of the paper in log odds: a rule contributes ln((c + ½)/(p + ½)) for c choices and p rejections or
+failures, and each fact contributes ln(p(fact | chosen)/p(fact | not)). An unseen fact counts nothing; an unseen class
+is judged by its superclasses. Preferences for single individuals decay by a tenth with each episode.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class FactReader:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
-    """Return the individuals in the open roles of a method that few can fill: alone, and with each of its behaviour's."""
+    """Return the individuals in the open roles of a method that few can fill: alone, and with each individual of the step."""
     found = list[Fact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:
@@ -143,7 +143,10 @@ class Scorer:
         self._asked: dict[str, frozenset[str]] = {}
 
     def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
-        """Return the summand of each counted fact in the cogency of a rule, in ln odds; the rule's own is always included."""
+        """Return the summand of each counted fact in the cogency of a rule, in ln odds.
+
+        The rule's own is always included.
+        """
         found = self._weights.get(rule.name)
         if found is None:
             counted = self.totals.get(rule.name, {})
