@@ -24,6 +24,7 @@ from confab.planner.amount_transitions import amount, change, comparison, settle
 from confab.planner.generated import code, identifier, key_written, tuple_written, written
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.language import DomainError, needs, nothing_determines
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -211,12 +212,8 @@ class PythonWriter:
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
     ) -> list[str]:
         """Return the conditions as expressions, in an order that binds each variable before its use; `bound` grows."""
-        waiting, found = list(conditions), []
-        while waiting:
-            ready = ready_condition(waiting, bound, where)
-            waiting.remove(ready)
-            found.append(self.expression(ready, bound, kinds, where))
-        return found
+        check("compiling conditions")
+        return [self.expression(ready, bound, kinds, where) for ready in in_binding_order(conditions, bound, where)]
 
     def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
         """Return a condition as a Python expression; the expression assigns the variable that the condition determines."""
@@ -342,9 +339,17 @@ _COST: Mapping[type[Condition], int] = {
 }
 
 
-def ready_condition(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
-    """Return the cheapest condition to test among those whose variables are bound."""
-    ready = [condition for condition in waiting if not needs(condition) - bound]
-    if not ready:
-        raise nothing_determines(where, waiting, bound)
-    return min(ready, key=lambda condition: _COST[type(condition)])
+def in_binding_order(conditions: Iterable[Condition], bound: AbstractSet[str], where: str) -> Iterator[Condition]:
+    """Yield the cheapest remaining condition whose variables are bound; the caller adds newly bound variables to `bound`.
+
+    Raises
+    ------
+    DomainError
+        Nothing binds the variables of the remaining conditions.
+    """
+    waiting = [(_COST[type(condition)], needs(condition), condition) for condition in conditions]
+    while waiting:
+        ready = [place for place, (_, needed, _) in enumerate(waiting) if needed <= bound]
+        if not ready:
+            raise nothing_determines(where, [condition for _, _, condition in waiting], bound)
+        yield waiting.pop(min(ready, key=lambda place: waiting[place][0]))[2]

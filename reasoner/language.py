@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
 
 from confab.reasoner.amounts import Measure, inside, situations_in, terms_of
 from confab.reasoner.symbols import (
@@ -118,7 +119,7 @@ def _unbound(group: Sequence[Condition]) -> set[str]:
     return {term for c in group for term in needs(c)} - determined
 
 
-def nothing_determines(where: str, waiting: Sequence[Condition], bound: set[str]) -> DomainError:
+def nothing_determines(where: str, waiting: Sequence[Condition], bound: AbstractSet[str]) -> DomainError:
     """Return the error for a behaviour with conditions whose variables nothing binds."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

@@ -20,7 +20,7 @@ from confab.planner.amount_transitions import approaches_goal
 from confab.planner.derived_facts import CompiledRules
 from confab.planner.generated import identifier, tuple_written, written
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
-from confab.planner.transitions import Forward, Key, PythonWriter, Table, ready_condition
+from confab.planner.transitions import Forward, Key, PythonWriter, Table, in_binding_order
 from confab.reasoner.amounts import Amount, inside, terms_of
 from confab.reasoner.language import measures, mentions, terms, walk
 from confab.reasoner.symbols import (
@@ -201,9 +201,7 @@ class Program:
         bound = set(hard)
         soft: list[Condition] = []
         determined: dict[str, tuple[str, tuple[str, ...]]] = {}
-        while waiting:
-            condition = ready_condition(waiting, bound, behavior.name)
-            waiting.remove(condition)
+        for condition in in_binding_order(waiting, bound, behavior.name):
             if (
                 isinstance(condition, ValueCondition)
                 and condition.value.startswith("?")
@@ -233,14 +231,12 @@ class Program:
     @staticmethod
     def _rule(rule: Behavior) -> tuple[tuple[str, ...], Achiever]:
         """Return a rule's parameters, and the rule as an achiever of its situation type, with conditions in binding order."""
-        waiting, soft = list(rule.preconditions), list[Condition]()
+        soft = list[Condition]()
         parameters = tuple(p.name for p in rule.parameters)
         bound = set(parameters)
         determined: dict[str, tuple[str, tuple[str, ...]]] = {}
         determining: list[Condition] = []
-        while waiting:
-            condition = ready_condition(waiting, bound, rule.name)
-            waiting.remove(condition)
+        for condition in in_binding_order(rule.preconditions, bound, rule.name):
             soft.append(condition)
             if (
                 isinstance(condition, ValueCondition)
