@@ -36,7 +36,7 @@ from worlds.mixed import RandomWorld
 from worlds.scenes import scene
 from worlds.walking import cost, faults
 
-SECONDS, CPU = 1.5, 3.0
+SECONDS, CPU = 3.0, 4.0
 """Time limit of a call, and CPU seconds after which the call counts as endless."""
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
