@@ -27,6 +27,8 @@ Search: TypeAlias = "Callable[[Problem], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices that are planned for to prove that no other one is cheaper."""
+PRECISION = 1_000_000
+"""Maximum denominator of the stated cost of meeting a soft goal, since plans' costs are sums of floating-point numbers."""
 
 
 def preferred(problem: Problem, search: Search, exact: bool = False) -> tuple[Problem, Outcome]:
@@ -161,7 +163,8 @@ class _Choices:
             if symbol not in kept:
                 other = self.cost(kept | {symbol})
                 fact = Fact(symbol, self.problem.goal[symbol])
-                forgone.append(Forgone(fact, self.weights[symbol], None if other is None else other - cost))
+                more = None if other is None else (other - cost).limit_denominator(PRECISION)
+                forgone.append(Forgone(fact, self.weights[symbol], more))
         bound = outcome.bound if proved else None
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
 
