@@ -11,7 +11,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from math import inf
 from typing import TypeAlias
 
 Number: TypeAlias = "Fraction | float"
@@ -22,6 +23,11 @@ NOTHING = float("nan")
 
 LARGEST = 10**60
 """Maximum numerator and denominator of an amount, so that repeated multiplication can't exhaust the memory."""
+
+
+def simplified(amount: int | Fraction) -> int | Fraction:
+    """Return an amount as an integer if it is whole."""
+    return amount.numerator if amount.denominator == 1 else amount
 
 
 @dataclass(frozen=True)
@@ -38,15 +44,22 @@ class Quantity:
         """Whether the amounts have a lower or an upper bound."""
         return self.least is not None or self.most is not None
 
+    @cached_property
+    def _bounds(self) -> tuple[Number, Number]:
+        """The bounds, as integers where they are whole: integers are compared much faster than fractions."""
+        return -inf if self.least is None else simplified(self.least), inf if self.most is None else simplified(
+            self.most
+        )
+
     def allows(self, amount: Number) -> bool:
         """Return whether an amount is a number within the bounds, and a whole number if this is required."""
+        if isinstance(amount, float):  # `NOTHING`
+            return False
+        least, most = self._bounds
         return (
-            isinstance(amount, Fraction)  # and not `NOTHING`
-            and (self.least is None or amount >= self.least)
-            and (self.most is None or amount <= self.most)
-            and (not self.whole or amount.denominator == 1)
+            least <= amount <= most
+            and amount.denominator <= (1 if self.whole else LARGEST)
             and abs(amount.numerator) <= LARGEST
-            and amount.denominator <= LARGEST
         )
 
 

@@ -129,7 +129,10 @@ class Memory:
         return replace(using, methods=methods)
 
     def _fits(self, method: Method, using: Compiled) -> bool:
-        """Return whether a domain has all behaviours of a method, with the same numbers of parameters."""
+        """Return whether a domain has all behaviours, classes and situation types of a method, with the same numbers of arguments.
+
+        The parameters and variables of the method's own behaviour together are as many as the roles of the method.
+        """
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)
         if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:

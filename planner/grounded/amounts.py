@@ -20,12 +20,12 @@ from typing import TypeAlias
 from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import (
     COMPARING,
-    LARGEST,
     Amount,
     Calculation,
     Expression,
     Measure,
     Quantity,
+    simplified,
     situations_in,
     written,
 )
@@ -72,7 +72,7 @@ class Linear:
         for place, factor in other.terms:
             found[place] += factor * times
         terms = tuple(sorted((place, factor) for place, factor in found.items() if factor))
-        return Linear(terms, _exact(self.constant + other.constant * times))
+        return Linear(terms, simplified(self.constant + other.constant * times))
 
     def times(self, factor: Exact) -> Linear:
         """Return a multiple of the expression."""
@@ -109,7 +109,7 @@ class AmountTable:
         changed = {effect.situation for behavior in problem.domain.at_level(level) for effect in behavior.amounts}
         counted = {s.name for s in situations.values() if s.quantity is not None and s.level <= level}
         self.now: dict[Symbol, Exact] = {
-            symbol: _exact(Fraction(initial[symbol]))
+            symbol: simplified(Fraction(initial[symbol]))
             for symbol in sorted(symbol for symbol in initial if symbol.situation in counted)
         }
         self.place = {s: i for i, s in enumerate(symbol for symbol in self.now if symbol.situation in changed)}
@@ -150,15 +150,15 @@ class AmountTable:
                     did = f"multiplies {one_of} by {by}, which both" if sign == "*" else f"divides by {by}, which"
                     raise UngroundableError(f"a calculation {did} change; a flat search requires linear calculations")
                 if sign == "/":
-                    return one.times(_exact(Fraction(1) / other.constant)) if other.constant else None
+                    return one.times(simplified(Fraction(1) / other.constant)) if other.constant else None
                 return other.times(one.constant) if other.terms else one.times(other.constant)
             case constant:
-                return Linear((), _exact(constant))
+                return Linear((), simplified(constant))
 
     def _measured(self, relation: str) -> Mapping[tuple[str, ...], Exact]:
         if relation not in self._measures:
             rows = self.problem.relations.get(relation, ())
-            self._measures[relation] = {row[:-1]: _exact(Fraction(row[-1])) for row in rows}
+            self._measures[relation] = {row[:-1]: simplified(Fraction(row[-1])) for row in rows}
         return self._measures[relation]
 
     def comparison(
@@ -251,18 +251,6 @@ class Amounts:
                 found[place].append((bit, difference, sign))
         return found
 
-    @cached_property
-    def bounds(self) -> Sequence[tuple[Exact | float, Exact | float, int]]:
-        """The least and the greatest allowed amount at each place, and the greatest denominator."""
-        return [
-            (
-                -inf if its.least is None else _exact(its.least),
-                inf if its.most is None else _exact(its.most),
-                1 if its.whole else LARGEST,
-            )
-            for its in self.quantities
-        ]
-
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
         """Return the number of a tuple; for a new tuple, store `mask` (another tuple's bits), updated at the `changed` places."""
         number = self._number.get(vector)
@@ -319,9 +307,8 @@ class Amounts:
                     new[move.place] = old - by
         changed = list(vector)
         for place, amount in new.items():
-            changed[place] = exact = _exact(amount)
-            least, most, denominator = self.bounds[place]
-            if not (least <= exact <= most and exact.denominator <= denominator and abs(exact.numerator) <= LARGEST):
+            changed[place] = simplified(amount)
+            if not self.quantities[place].allows(changed[place]):
                 return None
         number = self.numbered(tuple(changed), self._masks[number], new)
         return after & self.keep | self._masks[number] | number << self.size
@@ -341,7 +328,7 @@ def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
     }
     if any(place not in given for place, _ in difference.terms):
         return None
-    return _exact(difference.constant + sum(given[place] * factor for place, factor in difference.terms))
+    return simplified(difference.constant + sum(given[place] * factor for place, factor in difference.terms))
 
 
 def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
@@ -355,8 +342,4 @@ def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
         if move.operation not in ("increase", "decrease") or move.by is None or move.by.terms:
             return None
         total += factors[move.place] * move.by.constant * (1 if move.operation == "increase" else -1)
-    return _exact(total)
-
-
-def _exact(amount: Exact) -> Exact:
-    return amount.numerator if amount.denominator == 1 else amount
+    return simplified(total)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, product
+from itertools import product
 
 from confab.reasoner.afterwards import (
     OPPOSITE,
@@ -53,8 +53,8 @@ from confab.reasoner.symbols import (
 
 MOST_CONDITIONS = 5_000
 """Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts (one second to compile)."""
-MOST_CANDIDATES = 300
-"""Maximum number of candidates of a total; each is compared with each earlier one (one second)."""
+MOST_COMPARED = 300
+"""Maximum number of candidates of a total that are compared with each other (one second)."""
 
 
 def kept(
@@ -161,8 +161,8 @@ class _Keeping:
         self.linear = self.after.linear(self.amount)
         quantity = situations[aggregate.situation].quantity
         self.forbidden = aggregate.function == "count" and quantity is not None and quantity.most == 0
-        self.candidates = list(islice(self._candidates(), MOST_CANDIDATES + 1))
-        if len(self.candidates) > MOST_CANDIDATES:
+        self.candidates = list(self._candidates())
+        if not self.forbidden and sum(1 for one in self.candidates if one.term is None) > MOST_COMPARED:
             raise TooManyCasesError
 
     def behavior(self) -> Behavior:
