@@ -50,7 +50,7 @@ Afterwards all goals are examined with the full limit.
 PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 """Maximum number of tests for each pair of goals, and for removing symbols from a certificate.
 
-And the share of the remaining tests for each kind of certificate.
+The last number is the share of the remaining tests that each kind of certificate may use.
 """
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
