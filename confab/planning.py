@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
@@ -176,15 +176,21 @@ def _plan(
             return problem, search(problem)
         from confab.planner.preferences import preferred
 
-        return preferred(problem, search, exact)
+        if options.strategy != "optimal":
+            return preferred(problem, search)
+        alike = with_unit_costs(problem) if options.minimise == "steps" else problem
+        task, outcome = preferred(alike, partial(search, mode=DEFAULT_MODE, share=0.5), partial(search, share=0.5))
+        return replace(problem, goal=task.goal, weights=task.weights), outcome
 
-    def search(problem: Problem) -> Outcome:
+    def search(problem: Problem, mode: str = mode, share: float = 1.0) -> Outcome:
         deadline.check("reading the problem")
         if options.by_engine:
             from confab.engines import plan_by_engine
 
             return certified(problem, plan_by_engine(problem, engine, options.level, deadline.left))
         others, seconds = options.leave_levels and engine != NO_ENGINE, deadline.left
+        if seconds is not None:
+            seconds *= share
         if others and seconds is not None:
             from confab.engines import some_installed
 
@@ -206,7 +212,7 @@ def _plan(
         reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
-    timed, exact = None, options.strategy == "optimal"
+    timed = None
     in_part = problem is seen.problem and not seen.whole
     if needs_others_meanwhile(problem):
         if problem.weights:

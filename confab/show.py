@@ -106,8 +106,9 @@ def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
     best = "shortest" if cost is None else "cheapest"
     if (len(plan.primitives) if cost is None else cost) <= bound:
         return f"{said}, proved {best} on the lowest level"
-    least = f"any plan has at least {bound:g} primitives" if cost is None else f"any plan costs at least {bound:g}"
-    return f"{said}; not proved {best}: {least}; a longer --time-limit may prove more, or find a better plan"
+    least = f"has at least {bound:g} primitives" if cost is None else f"costs at least {bound:g}"
+    least = f": any plan for these goals {least}" if bound > 0 else ""
+    return f"{said}; not proved {best}{least}; a longer --time-limit may prove more, or find a better plan"
 
 
 def summary(outcome: Outcome) -> str:

@@ -37,6 +37,10 @@ def written(tmp_path: Path, old: str, new: str) -> str:
     return str(tmp_path / "scene.ttl")
 
 
+def default(problem: Problem) -> Outcome:
+    return solve(Request(problem))
+
+
 def optimal(problem: Problem) -> Outcome:
     return solve(Request(problem, "optimal", Limits(seconds=20.0)))
 
@@ -64,6 +68,14 @@ def test_a_soft_goal_that_cannot_be_met_is_left_and_a_hard_one_makes_the_task_un
     assert "no plan that meets it was found" in str(outcome.forgone[-1])
     hard = confab.load(heavy).plan(goal="glass IN shop").outcome
     assert hard.status is Status.UNSOLVABLE
+
+
+def test_a_proof_that_gives_up_leaves_the_choice_of_the_default_search() -> None:
+    problem = confab.load("wishes-small").problem
+    chosen, outcome = preferred(problem, default)
+    same, unproved = preferred(problem, default, lambda task: Outcome(Status.GAVE_UP))
+    assert (chosen, outcome.plan, outcome.forgone) == (same, unproved.plan, unproved.forgone)
+    assert unproved.bound == 0.0
 
 
 def test_a_goal_that_a_user_gives_has_to_be_met() -> None:
@@ -102,7 +114,7 @@ def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_p
         weights = {symbol: Fraction(rng.choice((1, 1, 2, 3)), 2) for symbol in problem.goal if rng.random() < 0.8}
         if not weights:
             continue
-        task, outcome = preferred(replace(problem, weights=weights), optimal, exact=True)
+        task, outcome = preferred(replace(problem, weights=weights), default, optimal)
         best = least(world.problem, weights)
         if outcome.status is Status.GAVE_UP:
             continue
@@ -112,7 +124,10 @@ def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_p
             continue
         assert outcome.plan is not None, seed
         unmet = sum((one.weight for one in outcome.forgone), Fraction(0))
-        assert Fraction(cost_of(task, outcome.plan)) + unmet == best, seed
+        cost = Fraction(cost_of(task, outcome.plan))
+        assert cost + unmet == best, seed
+        assert outcome.bound is not None, seed
+        assert Fraction(outcome.bound) <= cost, seed
     assert judged > 15
 
 
