@@ -11,7 +11,7 @@ from time import perf_counter
 import networkx
 
 from confab.planner.plan import Plan, Reason, Step, renumbered
-from confab.planner.timed.activities import InapplicableError, StepEvent, activities, in_sequence
+from confab.planner.timed.activities import Activity, InapplicableError, StepEvent, activities, in_sequence
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
 from confab.planner.timed.order import Order, order_of
@@ -25,8 +25,8 @@ from confab.planner.timed.schedules import (
     turn_edges,
 )
 from confab.planner.timed.validation import validate_timed
-from confab.planner.validation import validate
-from confab.reasoner.symbols import Problem
+from confab.planner.validation import Cell, validate
+from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
 """Maximum number of seconds for a schedule if no limit is given; exchanges of turns are also bounded by their work."""
@@ -74,13 +74,15 @@ def in_time(
         bound = least(order, network, choices)
         found = shortest(order, network, choices, until, bound)
         if found is None:
-            return Timed(reason=_infeasible(problem, order, network))
+            return Timed(reason=Reason("these steps have no schedule: they exclude each other's order"))
         scheduler = "exchanges"
-        if found.makespan > bound and find_spec("ortools") is not None:
+        if found.begins.cost > (0, bound) and find_spec("ortools") is not None:
             from confab.planner.timed.cpsat import shorter
 
             found, bound = shorter(order, network, choices, found, bound, until - perf_counter())
             scheduler = "CP-SAT"
+        if found.begins.late:
+            return Timed(reason=_late(problem, order, network, choices, found))
         timed = _timed(problem, plan, order, network, choices, found)
         if timed is not None:
             timed = replace(timed, bound=bound * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
@@ -96,25 +98,44 @@ def in_time(
         choices = Choices()  # a plan with required concurrency keeps its actors
 
 
-def _infeasible(problem: Problem, order: Order, network: Network) -> Reason:
-    """Return why there is no schedule: the activity that would be late, and by how much."""
-    free = replace(network, latest=[None] * len(network.latest))
-    found = shortest(order, free, Choices(), perf_counter())
-    if found is None:
-        return Reason("these steps have no schedule: windows, fixed times and durations exclude each other")
-    late = []
-    for i, latest in enumerate(network.latest):
-        end = found.begins.begins[i] + network.durations[i]
-        if latest is not None and end > latest:
-            late.append((end - latest, i))
-    excess, i = max(late, default=(0, 0))
-    step = order.activities[i].step
-    by, ends = float(order.latest.get(i, 0)), float((found.begins.begins[i] + network.durations[i]) * network.unit)
+def _late(problem: Problem, order: Order, network: Network, choices: Choices, found: CandidateSchedule) -> Reason:
+    """Return which times the latest activity of a schedule misses: windows of individuals, a deadline, or a fixed time."""
+    i, times = found.begins.latest, problem.times or Times()
+    one = order.activities[i]
+    begin = found.begins.begins[i] * network.unit
+    lasts = durations_with(network, choices, found.turns)[i] * network.unit
+    end, missed = begin + lasts, []
+    for individual in dict.fromkeys((*one.step.arguments, *one.actors)):
+        windows = times.windows.get(individual)
+        if windows is not None and not any(low <= begin and (high is None or end <= high) for low, high in windows):
+            missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
+    if i in order.latest and end > order.latest[i]:
+        goals = [
+            str(Fact(symbol, problem.goal[symbol]))
+            for symbol, by in times.deadlines.items()
+            if by == order.latest[i]
+            and symbol in problem.goal
+            and (symbol.situation, symbol.arguments) in _changed(one)
+        ]
+        missed.append(f"{' and '.join(goals)} is a goal by {float(order.latest[i]):g} s")
+    if one.at is not None and begin > one.at:
+        missed.append(f"it happens at {float(one.at):g} s")
     return Reason(
-        f"these steps miss a deadline: {step} ends at {ends:g} s in the schedule that was found; it has to by {by:g} s "
-        f"({float(excess * network.unit):g} s less)",
-        (str(step),),
+        f"no schedule was found that keeps all windows and deadlines; in the best one, {one.step} "
+        f"takes from {float(begin):g} to {float(end):g} s, but {', and '.join(missed)}",
+        (str(one.step),),
     )
+
+
+def _changed(activity: Activity) -> set[Cell]:
+    """Return the symbols that an activity changes."""
+    return {cell for access in activity.accesses for cell in access.changes}
+
+
+def _written(window: tuple[Fraction, Fraction | None]) -> str:
+    """Return a window as text."""
+    low, high = window
+    return f"from {float(low):g} s on" if high is None else f"from {float(low):g} to {float(high):g} s"
 
 
 def _timed(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from confab.planner.timed.network import Network, earliest
+from confab.planner.timed.network import ALWAYS, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Order
 from confab.planner.timed.schedules import CandidateSchedule, Choices, TurnId, durations_with, turn_edges
 
@@ -56,7 +56,7 @@ def shorter(
         return found, bound if status == cp_model.INFEASIBLE else best
     turns = made.turns(solver)
     begins = earliest(network, turn_edges(order, turns), durations_with(network, choices, turns))
-    if begins is None or begins.makespan >= found.makespan:
+    if begins is None or begins.cost >= found.begins.cost:
         return found, min(best, found.makespan)
     return CandidateSchedule(turns, begins), min(best, begins.makespan)
 
@@ -68,15 +68,23 @@ class _Model:
         self, model: Any, order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int
     ) -> None:
         self.model, self.order, self.network, self.choices, self.found = model, order, network, choices, found
-        self.horizon = found.makespan + network.separation
-        self.horizon = max([self.horizon, *(at for at in network.at if at is not None)])
+        fixed = [at for at in network.at if at is not None]
         self.lasts = [self.duration(i) for i in range(len(network.durations))]
+        most = found.makespan
+        if found.begins.late:  # a schedule that isn't late may be longer
+            opens = [low for windows in network.windows for low, _ in windows]
+            longest = [
+                max(network.durations[i], *(m.get(i, 0) for m in choices.lasts.values()), 0)
+                for i in range(len(self.lasts))
+            ]
+            most = max([most, *opens, *fixed]) + sum(longest) + len(longest) * network.tick
+        self.horizon = max([most + network.separation, *fixed])
         self.begins = [model.NewIntVar(0, self.horizon, "") for _ in network.durations]
         self.begin_of: dict[TurnId, Any] = {}
         self.present: dict[tuple[TurnId, int], Any] = {}
         self.activities()
         self.resources()
-        makespan = model.NewIntVar(bound, found.makespan, "")
+        makespan = model.NewIntVar(min(bound, most), most, "")
         for i, at in enumerate(network.at):
             if at is None:
                 model.Add(makespan >= self.begins[i] + self.lasts[i])
@@ -100,10 +108,10 @@ class _Model:
                 model.Add(self.begins[i] == at)
             if latest is not None:
                 model.Add(self.begins[i] + self.lasts[i] <= latest)
-            inside = [model.NewBoolVar("") for _ in windows]
-            if inside:
+            inside = [model.NewBoolVar("") for _ in windows] if windows is not ALWAYS else []
+            if windows is not ALWAYS:
                 model.AddExactlyOne(inside)
-            for one, (opens, closes) in zip(inside, windows, strict=True):
+            for one, (opens, closes) in zip(inside, windows, strict=False):
                 model.Add(self.begins[i] >= opens).OnlyEnforceIf(one)
                 if closes is not None:
                     model.Add(self.begins[i] + self.lasts[i] <= closes).OnlyEnforceIf(one)

@@ -16,6 +16,8 @@ from confab.planner.timed.order import BEGIN, END, Edge, Order
 
 Arc = tuple[int, int, int]
 Window = tuple[int, int | None]
+ALWAYS: tuple[Window, ...] = ((0, None),)
+"""The windows of an activity that can take place at any time."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Network:
     at, latest : list of int or None
         The fixed begin of an activity; the latest end.
     windows : list of tuple of pairs
-        Windows of each activity; empty for any time.
+        Windows of each activity, sorted by their begins; without windows it can never take place.
     """
 
     unit: Fraction
@@ -66,11 +68,29 @@ class Network:
 
 @dataclass(frozen=True)
 class Begins:
-    """The earliest begins, and for each the activity that it waits for (-1: none)."""
+    """The earliest begins, and for each the activity that it waits for (-1: none).
+
+    Attributes
+    ----------
+    begins, waits_for : list of int
+    makespan : int
+    late : int
+        The sum of the times by which activities are late: they end after their latest end or their last window, or begin after
+        their fixed time. If it is 0, the begins satisfy the network.
+    latest : int
+        The activity that is late by the most; -1 if none is late.
+    """
 
     begins: list[int]
     waits_for: list[int]
     makespan: int
+    late: int = 0
+    latest: int = -1
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """The value to be minimised: first the lateness, then the makespan."""
+        return self.late, self.makespan
 
 
 def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[Fraction] = ()) -> Network:
@@ -93,14 +113,18 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
         [None if time is None else whole(time) for time in fixed],
         [whole(order.latest[i]) if i in order.latest else None for i in count],
         [
-            tuple((whole(low), None if high is None else whole(high)) for low, high in order.windows.get(i, ()))
+            tuple((whole(low), None if high is None else whole(high)) for low, high in order.windows[i])
+            if i in order.windows
+            else ALWAYS
             for i in count
         ],
     )
 
 
 def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
-    """Return the earliest begins that satisfy a network and further edges; None if there are none.
+    """Return the earliest begins that satisfy a network and further edges; None if the edges exclude each other.
+
+    An activity that misses its times is late: see `Begins`.
 
     Parameters
     ----------
@@ -115,11 +139,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
     count = len(lasts)
     begins, waits = [0] * count, [-1] * count
     for i in range(count):
-        first = network.at[i] or 0
-        fitting = _fitting(network.windows[i], first, lasts[i])
-        if fitting is None:
-            return None
-        begins[i] = fitting
+        begins[i] = _fitting(network.windows[i], network.at[i] or 0, lasts[i])
     before = [0] * count
     for after in arcs:
         for j, _ in after:
@@ -130,30 +150,35 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
             before[j] -= 1
             if not before[j]:
                 ready.append(j)
-            if not _moved(network, lasts, begins, waits, i, j, apart):
-                return None
+            _move(network, lasts, begins, waits, i, j, apart)
     if len(ready) < count and not _settled(network, lasts, arcs, begins, waits):
         return None
-    for i, fixed in enumerate(network.at):
-        latest = network.latest[i]
-        if (fixed is not None and begins[i] != fixed) or (latest is not None and begins[i] + lasts[i] > latest):
-            return None
     makespan = max((b + d for b, d, at in zip(begins, lasts, network.at, strict=True) if at is None), default=0)
-    return Begins(begins, waits, makespan)
+    late = [_lateness(network, i, begins[i], lasts[i]) for i in range(count)]
+    worst = max(range(count), key=late.__getitem__, default=-1)
+    return Begins(begins, waits, makespan, sum(late), worst if worst >= 0 and late[worst] else -1)
 
 
-def _moved(
+def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
+    """Return the time by which an activity is late."""
+    late, end, latest, fixed = 0, begin + lasts, network.latest[i], network.at[i]
+    if latest is not None:
+        late = max(end - latest, 0)
+    if fixed is not None:
+        late = max(late, begin - fixed)
+    windows = network.windows[i]
+    if windows is ALWAYS or any(low <= begin and (high is None or end <= high) for low, high in windows):
+        return late
+    return max(late, end - max((high or 0 for _, high in windows), default=0), 1)
+
+
+def _move(
     network: Network, lasts: Sequence[int], begins: list[int], waits: list[int], i: int, j: int, apart: int
-) -> bool:
-    """Move the begin of `j` so that it satisfies an arc from `i`; return whether there is a time for it."""
+) -> None:
+    """Move the begin of `j` so that it satisfies an arc from `i`."""
     wanted = begins[i] + apart
-    if wanted <= begins[j]:
-        return True
-    fitting = _fitting(network.windows[j], wanted, lasts[j])
-    if fitting is None:
-        return False
-    begins[j], waits[j] = fitting, i
-    return True
+    if wanted > begins[j]:
+        begins[j], waits[j] = _fitting(network.windows[j], wanted, lasts[j]), i
 
 
 def _settled(
@@ -171,8 +196,7 @@ def _settled(
         queued[i] = False
         for j, apart in arcs[i]:
             old = begins[j]
-            if not _moved(network, lasts, begins, waits, i, j, apart):
-                return False
+            _move(network, lasts, begins, waits, i, j, apart)
             if begins[j] != old:
                 count[j] += 1
                 if count[j] > len(lasts):  # a positive cycle
@@ -183,12 +207,10 @@ def _settled(
     return True
 
 
-def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int | None:
-    """Return the first time from `begin` on at which an activity fits into a window."""
-    if not windows:
-        return begin
+def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int:
+    """Return the first time from `begin` on at which an activity fits into a window, otherwise one after the last window opens."""
     for low, high in windows:
         first = max(low, begin)
         if high is None or first + lasts <= high:
             return first
-    return None
+    return max(begin, windows[-1][0]) if windows else begin

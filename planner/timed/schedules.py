@@ -50,9 +50,10 @@ class CandidateSchedule:
 def shortest(
     order: Order, network: Network, choices: Choices, until: float, bound: int = 0
 ) -> CandidateSchedule | None:
-    """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`; None if none is found.
+    """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`.
 
-    The search ends with a schedule as short as the lower bound.
+    None if none is found in which the activities can follow one another. The schedule may be late (`Begins.late`). The search ends
+    with a schedule that isn't late and is as short as the lower bound.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def shortest(
     found = [start for start in starts if start is not None]
     if not found:
         return None
-    return search.improved(min(found, key=lambda one: one.makespan), until, bound)
+    return search.improved(min(found, key=lambda one: one.begins.cost), until, bound)
 
 
 def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
@@ -158,23 +159,23 @@ class _Search:
         left = MOST_ARCS // (1 + len(self.network.edges) + len(self.network.durations))
         tabu: dict[tuple[TurnId, TurnId], int] = {}
         step = 0
-        while best.makespan > bound and barren < ROUNDS and left > 0 and perf_counter() < until:
+        while best.begins.cost > (0, bound) and barren < ROUNDS and left > 0 and perf_counter() < until:
             step += 1
             barren += 1
-            options: list[tuple[int, int, tuple[TurnId, TurnId], CandidateSchedule]] = []
+            options: list[tuple[tuple[int, int], int, tuple[TurnId, TurnId], CandidateSchedule]] = []
             for pair, turns in self.neighbours(now):
                 left -= 1
                 if left < 0 or perf_counter() > until:
                     break
                 other = self.evaluated(turns)
-                if other is None or (tabu.get(pair, 0) > step and other.makespan >= best.makespan):
+                if other is None or (tabu.get(pair, 0) > step and other.begins.cost >= best.begins.cost):
                     continue
-                options.append((other.makespan, len(options), pair, other))
+                options.append((other.begins.cost, len(options), pair, other))
             if not options:
                 break
             _, _, pair, now = min(options)[:4]
             tabu[pair[1], pair[0]] = step + TABU
-            if now.makespan < best.makespan:
+            if now.begins.cost < best.begins.cost:
                 best, barren = now, 0
         return best
 
@@ -214,10 +215,12 @@ class _Search:
         return not critical.isdisjoint(self.order.resources[turn[0]].turns[turn[1]].members)
 
     def critical(self, now: CandidateSchedule) -> list[int]:
-        """Return the activities on the critical path, the last first."""
+        """Return the activities on the critical path, or on the path to the activity that is latest; the last first."""
         durations = durations_with(self.network, self.choices, now.turns)
         ends = [b + d for b, d in zip(now.begins.begins, durations, strict=True)]
-        found, current = list[int](), max(range(len(ends)), key=lambda i: (self.network.at[i] is None, ends[i]))
+        found, current = list[int](), now.begins.latest
+        if current < 0:
+            current = max(range(len(ends)), key=lambda i: (self.network.at[i] is None, ends[i]))
         while current >= 0 and current not in found:
             found.append(current)
             current = now.begins.waits_for[current]

@@ -79,7 +79,7 @@ def test_a_window_and_a_deadline_are_kept_or_said_to_be_missed() -> None:
     told = in_time(strict, found)
     assert told.plan is None
     assert told.reason is not None
-    assert "miss a deadline" in told.reason.text
+    assert "is a goal by 1 s" in told.reason.text
 
 
 def planned(problem: Problem) -> tuple[Outcome, Timed | None]:

@@ -1,0 +1,104 @@
+"""Windows of individuals and deadlines of goals: plans that keep them, and what is said if none is found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import confab
+from confab.planner.plan import Status
+from confab.planning import Result
+
+ROBOTS = '''
+@prefix : <https://example.org/robots#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/robots> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Robot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :IN, :CHARGED .
+:Room a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :IN ; c:hasSituationType :CLEAN .
+:Charger a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:IN a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :in .
+:CLEAN a owl:Class, owl:NamedIndividual, c:SituationType .
+:CHARGED a owl:Class, owl:NamedIndividual, c:SituationType .
+:in a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Robot ; rdfs:range :IN .
+:stands a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Charger ; rdfs:range :Room .
+:GO a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:actor :GO.robot ;
+  c:duration "PT2S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?robot :in ?from } INSERT { ?robot :in ?to }
+  WHERE { ?robot a :Robot . ?to a :Room . ?from a :Room . ?robot :in ?from FILTER(?from != ?to) }""" .
+:WASH a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:actor :WASH.robot ;
+  c:duration "PT10S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?robot :CHARGED true } INSERT { ?room :CLEAN true }
+  WHERE { ?robot a :Robot . ?room a :Room . ?robot :in ?room ; :CHARGED true }""" .
+:CHARGE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 3 ; c:actor :CHARGE.robot, :CHARGE.charger ;
+  c:duration "PT4S"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?robot :CHARGED true }
+  WHERE { ?robot a :Robot . ?charger a :Charger . ?room a :Room . ?robot :in ?room . ?charger :stands ?room }""" .
+:GO.robot a owl:NamedIndividual . :WASH.robot a owl:NamedIndividual .
+:CHARGE.robot a owl:NamedIndividual . :CHARGE.charger a owl:NamedIndividual .
+'''
+"""Robots go to rooms and wash them; washing takes a charge, which chargers give."""
+EVER = "DELETE { ?robot :CHARGED true }"
+
+
+def planned(
+    folder: Path,
+    robots: Mapping[str, str],
+    goals: Mapping[str, int | None],
+    windows: Sequence[tuple[str, int, int | None]] = (),
+    chargers: Mapping[str, str] | None = None,
+) -> Result:
+    """Plan a world: robots with their rooms, rooms to be washed with deadlines, windows, chargers with their rooms.
+
+    Without chargers, robots stay charged.
+    """
+    given = ROBOTS if chargers else ROBOTS.replace(EVER, "")
+    chargers = chargers or {}
+    rooms = dict.fromkeys([*robots.values(), *chargers.values(), *goals])
+    lines = [f":{one} a :Room, owl:NamedIndividual ." for one in rooms]
+    for one, room in robots.items():
+        lines += [
+            f":{one} a :Robot, owl:NamedIndividual ; :in :{room} .",
+            f":{one}.charged a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :{one} ; c:situationType :CHARGED .",
+        ]
+    lines += [f":{one} a :Charger, owl:NamedIndividual ; :stands :{room} ." for one, room in chargers.items()]
+    every = " ".join(f":{one}" for one in (*rooms, *robots, *chargers))
+    lines.append(f"[] a owl:AllDifferent ; owl:distinctMembers ( {every} ) .")
+    for number, (one, low, high) in enumerate(windows):
+        until = "" if high is None else f' ; c:availableUntil "PT{high}S"^^xsd:dayTimeDuration'
+        lines.append(
+            f":window{number} a owl:NamedIndividual, c:Window ; c:ofIndividual :{one} ; "
+            f'c:availableFrom "PT{low}S"^^xsd:dayTimeDuration{until} .'
+        )
+    lines.append(f":task a owl:NamedIndividual, c:Task ; c:goal {', '.join(f':{one}.goal' for one in goals)} .")
+    for one, by in goals.items():
+        deadline = "" if by is None else f' ; c:by "PT{by}S"^^xsd:dayTimeDuration'
+        lines.append(
+            f":{one}.goal a owl:NamedIndividual, c:ValueCondition ; c:situationType :CLEAN ; c:about :{one}{deadline} ."
+        )
+    (folder / "robots.ttl").write_text(given + "\n".join(lines), "utf-8")
+    return confab.load(folder / "robots.ttl").plan()
+
+
+def said(result: Result) -> str:
+    """Return why there is no plan."""
+    assert result.outcome.status is Status.GAVE_UP
+    assert result.outcome.reason is not None
+    return result.outcome.reason.text
+
+
+def test_a_deadline_that_no_plan_keeps_is_named_with_its_goal(tmp_path: Path) -> None:
+    assert "a CLEAN true is a goal by 5 s" in said(planned(tmp_path, {"r1": "hall"}, {"a": 5}))
+
+
+def test_a_window_that_no_plan_keeps_is_named_with_its_individual(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall"}, {"a": None, "b": None}, [("r1", 0, 9), ("r1", 20, 25)])
+    assert "r1 is available only from 0 to 9 s and from 20 to 25 s" in said(result)
+
+
+def test_windows_without_common_time_are_both_named(tmp_path: Path) -> None:
+    windows = [("r1", 0, 9), ("a", 20, None)]
+    text = said(planned(tmp_path, {"r1": "hall"}, {"a": None}, windows))
+    assert "r1 is available only from 0 to 9 s" in text or "a is available only from 20 s on" in text
