@@ -19,7 +19,7 @@ from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
-from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
@@ -183,7 +183,7 @@ class Claims:
     def range(self, symbol: Symbol) -> Range:
         """Return the range of amounts of a symbol in all cases."""
         if symbol not in self._ranges:
-            found = self.allowed(symbol)
+            found = self.lowest.allowed(symbol)
             always = self.certificate.always.get(symbol)
             if always is not None:
                 low, high = found.low, found.high
@@ -193,13 +193,6 @@ class Claims:
                 found = Range(low, high)
             self._ranges[symbol] = found
         return self._ranges[symbol]
-
-    def allowed(self, symbol: Symbol) -> Range:
-        """Return the range that the situation type of a symbol allows, extended by the initial amount."""
-        quantity, first = self.lowest.quantity(symbol.situation), number(self.lowest.initial(symbol))
-        low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
-        high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
-        return Range(min(low, first), max(high, first))
 
     def broken(self, symbol: Symbol, value: str) -> bool:
         """Return whether a symbol with this value violates a claim "never" or "always"."""

@@ -9,7 +9,7 @@ from fractions import Fraction
 from confab.planner.certificate_checks import CaseView, Claims, own_variables, unified
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Reason
-from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, compared, variables
 from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
@@ -145,6 +145,8 @@ class _Causes:
             return [Cause(f"there is no {symbol} on level {lowest.level}")]
         if limits := self.exceeded(fact):
             return [Cause(limits, (*symbol.arguments, situation))]
+        if (total := self.too_much(fact)) is not None:
+            return [total]
         found: list[Cause] = []
         for rule in self.problem.domain.rules.get(situation, ()):
             given = {p.name: a for p, a in zip(rule.parameters, symbol.arguments, strict=True) if a not in free}
@@ -220,6 +222,22 @@ class _Causes:
                 return f"{words} is at least {written(quantity.least)}"
         return ""
 
+    def too_much(self, fact: Fact) -> Cause | None:
+        """Return the range of a sum or count as a cause, if no number in the range satisfies a goal; otherwise None."""
+        aggregate = self.problem.domain.aggregates.get(fact.symbol.situation)
+        if aggregate is None or not aggregate.kept:
+            return None
+        reading, view = self.reading()
+        total, words = reading.total(aggregate, fact.symbol.arguments), _named(fact.symbol)
+        what = "count of all individuals" if aggregate.function == "count" else "sum of all numbers"
+        for sign, limit in bounds(fact.value):
+            if not compared(total, sign, Range(limit, limit), must=False):
+                most = limit > total.high or (limit == total.high and sign[0] == ">")
+                end, bound = ("most", total.high) if most else ("least", total.low)
+                text = f"{words} is at {end} {written(Fraction(bound))}, the {what} that {'may' if most else 'must'} belong to it"
+                return Cause(text, (*fact.symbol.arguments, fact.symbol.situation), tuple(map(Claim, view.claimed)))
+        return None
+
     def direction(self, fact: Fact) -> str:
         """Return `MORE` or `LESS`: the direction in which an amount must change to satisfy its goal."""
         return towards(self.problem.initial.get(fact.symbol), fact.value)
@@ -237,7 +255,7 @@ class _Causes:
 
     def bounds_of(self, symbol: Symbol) -> str:
         """Return the bounds of an amount as text."""
-        allowed, words = self.claims.allowed(symbol), _named(symbol)
+        allowed, words = self.claims.lowest.allowed(symbol), _named(symbol)
         least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
         most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
         return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words

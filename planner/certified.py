@@ -38,7 +38,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     from confab.planner.certificate_reasons import told
     from confab.planner.certifying import certify
 
-    why = "none was found within the work that is allowed"
+    why = "no certificate was found within the work limit"
     certificate, tried = outcome.certificate, False
     while certificate is not None or not tried:
         if certificate is None:
@@ -49,13 +49,10 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
             if refused is None:
                 reason = _added_up(problem, certificate) or told(problem, certificate)
                 return replace(outcome, certificate=certificate, reason=reason)
-            why = f"the checker refuses it: {refused}"
+            why = f"the checker refuses the certificate: {refused}"
             certificate = None
-    said = f"; {outcome.reason.text}" if outcome.reason else ""
-    reason = Reason(
-        f"no plan was found, and that there is none couldn't be certified: {why}{said}",
-        outcome.reason.terms if outcome.reason else (),
-    )
+    searched = outcome.reason.text if outcome.reason else "the search found no plan"
+    reason = Reason(f"{searched}; this isn't certified: {why}", outcome.reason.terms if outcome.reason else ())
     return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)
 
 

@@ -164,7 +164,9 @@ class Relaxed:
         return self._ask((LEAVES, symbol, value))
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol can get."""
+        """Return the amounts that a symbol can get; a derived amount can get all that its definition allows."""
+        if symbol.situation in self.problem.domain.aggregates:
+            return self.lowest.allowed(symbol)
         first = self.lowest.initial(symbol)
         self._ask((LEAVES, symbol, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))

@@ -16,11 +16,22 @@ from time import perf_counter
 from typing import Protocol, TypeAlias
 
 from confab.planner.checked_definitions import Definitions, stratum_of
-from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds, situations_in, terms_of
+from confab.reasoner.amounts import (
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+    Quantity,
+    bounds,
+    number,
+    situations_in,
+    terms_of,
+)
 from confab.reasoner.limits import current
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -139,6 +150,13 @@ class Lowest:
         """Return the quantity of a situation type; None if its values aren't amounts."""
         return self.problem.domain.situations[situation].quantity
 
+    def allowed(self, symbol: Symbol) -> Range:
+        """Return the range that the situation type of a symbol allows, extended by the initial amount."""
+        quantity, first = self.quantity(symbol.situation), number(self.initial(symbol))
+        low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
+        high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
+        return Range(min(low, first), max(high, first))
+
     def rows(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
         """Return the tuples of a relation, indexed by the individual at a position."""
         if (relation, position) not in self._rows:
@@ -206,6 +224,14 @@ class Lowest:
             self._inner[id(witness)] = (ClassCondition(witness.variable, witness.kind), *witness.conditions)
         return self._inner[id(witness)]
 
+    def over(self, aggregate: Aggregate) -> tuple[Condition, ...]:
+        """Return the conditions of an aggregate, including the classes of its variables."""
+        if id(aggregate) not in self._inner:
+            self._kept.append(aggregate)
+            kinds = (ClassCondition(variable.name, variable.kind) for variable in aggregate.variables)
+            self._inner[id(aggregate)] = (*aggregate.conditions, *kinds)
+        return self._inner[id(aggregate)]
+
 
 class Reading:
     """Evaluates conditions and effects of the lowest level on a set of states, which it doesn't change."""
@@ -213,6 +239,7 @@ class Reading:
     def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
         self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
         self._definitions: dict[bool, Definitions] = {}
+        self._totals: dict[tuple[str, tuple[str, ...]], Range] = {}
 
     # ------------------------------------------------------------------------------------------------------- values
 
@@ -255,7 +282,37 @@ class Reading:
         if situation not in self.lowest.changing:
             exactly = Fraction(self.lowest.initial(symbol))
             return Range(exactly, exactly)
-        return self.knowledge.between(symbol)
+        known = self.knowledge.between(symbol)
+        aggregate = self.problem.domain.aggregates.get(situation)
+        if aggregate is None or not aggregate.kept or known.low == known.high:
+            return known
+        total = self.total(aggregate, arguments)
+        return Range(max(known.low, total.low), min(known.high, total.high))
+
+    def before(self, symbol: Symbol) -> Range | None:
+        """Return the range of an amount before an effect; that of a total without bounds isn't calculated, since it may change."""
+        quantity = self.lowest.quantity(symbol.situation)
+        free = symbol.situation in self.problem.domain.aggregates and quantity is not None and not quantity.bounded
+        if free and self.lowest.exists(symbol.situation, symbol.arguments):
+            return self.knowledge.between(symbol)
+        return self.between(symbol.situation, symbol.arguments)
+
+    def total(self, aggregate: Aggregate, arguments: tuple[str, ...]) -> Range:
+        """Return the range of a sum or a count by its definition: each solution that may hold may contribute its number."""
+        key = aggregate.situation, arguments
+        if key not in self._totals:
+            conditions = self.lowest.over(aggregate)
+            env = dict(zip((p.name for p in aggregate.parameters), arguments, strict=True))
+            low: Bound = Fraction(0)
+            high: Bound = Fraction(0)
+            for solution in self.solutions(conditions, env, aggregate.kinds):
+                found = self.expression(aggregate.amount, solution)
+                if found is not None:
+                    certain = all(self.holds(one, solution, aggregate.kinds, must=True) for one in conditions)
+                    low += found.low if certain and not found.partial else min(found.low, 0)
+                    high += found.high if certain and not found.partial else max(found.high, 0)
+            self._totals[key] = Range(low, high)
+        return self._totals[key]
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
         """Return whether an amount may, or must, satisfy a goal: a number, or bounds."""
@@ -418,7 +475,7 @@ class Reading:
                 ways, sure = [dict(env)], True
             for way in ways:
                 symbol = Symbol(effect.situation, tuple(way.get(a, a) for a in effect.arguments))
-                before = self.between(effect.situation, symbol.arguments)
+                before = self.before(symbol)
                 if before is None:
                     continue
                 old, surely = after.get(symbol, (before, True))

@@ -159,7 +159,7 @@ def search(
         if deadline is not None and perf_counter() > deadline:
             return gave_up(Reason("the time limit came first"))
     if order.best is None:
-        reason = Reason("no plan exists: all states that can be reached were searched")
+        reason = Reason("none of the reachable states that were searched satisfies the goal")
         return Flat(Status.UNSOLVABLE, (), reason, counts, total)
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:

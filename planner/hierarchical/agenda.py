@@ -277,6 +277,8 @@ class Agenda:
             return False
         self._tried[level] = len(call.steps)
         open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
+        if open_ and not self.solvable:
+            self._certify(WHOLE.work)
         return bool(open_) and call.reach(level, open_, WHOLE)
 
     # ------------------------------------------------------------------------------------------------------------ proofs
@@ -295,10 +297,13 @@ class Agenda:
         self._certify()
         self._examine()
 
-    def _certify(self) -> None:
-        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, up to a limit."""
+    def _certify(self, ahead: int = 0) -> None:
+        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, up to a limit.
+
+        `ahead` is the work of a search that is about to begin.
+        """
         call = self.call
-        tests = max(FIRST_TESTS, min(call.space.effort // TEST, PAIRS))
+        tests = max(FIRST_TESTS, min(max(call.space.effort, ahead) // TEST, PAIRS))
         if self._tested < tests >= min(2 * self._tested, PAIRS) and not self._expects_a_plan():
             self._tested = tests
             if proof := impossible(call.problem, tests, call.space.deadline):
