@@ -1,6 +1,6 @@
-"""Arms: read from a URDF, with the hand's pose for given postures.
+"""Arms read from a URDF, and forward kinematics: the pose of the hand for given postures.
 
-All functions compute many postures at once.
+The functions of kinematics compute many postures at once.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes.
 """
@@ -25,10 +25,10 @@ DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm with its hand, at the zero posture in world coordinates, and its posture at rest.
+    """An arm with its hand, at the zero posture in world coordinates, and its rest posture `home`.
 
-    `wrist` is the intersection of the two axes before the last one. In an arm without a closed form it is a point of the last
-    joint.
+    `wrist` is the intersection of the two axes before the last one. In an arm without a closed form of the inverse kinematics,
+    `wrist` is the origin of the last joint.
     """
 
     joints: tuple[str, ...]
@@ -63,17 +63,17 @@ class Arm:
 
     @cached_property
     def spherical(self) -> bool:
-        """Whether the last axis also goes through the wrist."""
+        """Whether the axes of the last three joints meet at the wrist."""
         return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
 
     @property
     def swivels(self) -> bool:
-        """Whether the arm can move while the hand doesn't."""
+        """Whether the arm is redundant: the elbow can move while the hand keeps its pose."""
         return len(self.joints) > 6
 
     @cached_property
     def hang(self) -> Array:
-        """Direction of the elbow at swivel 0: down; up if the upper arm points up at the zero posture."""
+        """Direction of the elbow at swivel 0: up if the upper arm points up at the zero posture, otherwise down."""
         return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
 
     @cached_property
@@ -89,7 +89,7 @@ class Arm:
 
     @cached_property
     def limbs(self) -> tuple[float, float, Array, float, float]:
-        """Lengths of upper arm and forearm, the elbow's frame (3, 3), its bend in radians, and the side (1 or -1) of the bend."""
+        """Lengths of upper arm and forearm, the elbow's frame (3, 3), the elbow's bend in radians, and its sign (1 or -1)."""
         a, b, hinge = self.upper_length, self.lower_length, self.axes[3]
         upper, fore = (self.elbow - self.shoulder) / a, (self.wrist - self.elbow) / b
         bent = float(np.arctan2(cross(upper, fore) @ hinge, upper @ fore))
@@ -104,14 +104,15 @@ def read_arm(
     turned: Sequence[float] = (0.0, 0.0, 0.0),
     home: Sequence[float] | None = None,
 ) -> Arm:
-    """Return the arm of `joints` that ends in link `tip`, in which the hand's frame is `turned` by roll, pitch and yaw.
+    """Return the arm of `joints` that ends in link `tip`; the hand's frame is turned by `turned` (roll, pitch, yaw) in the link.
 
-    Its posture at rest is `home`; if that is empty, the middle of the joints' limits.
+    The rest posture of the arm is `home`, or the middle of the joints' limits if `home` is None.
 
     Raises
     ------
     ValueError
-        The robot has no such joint or tip, or the arm has too few, too many or unsuitable joints. The message says which.
+        The URDF has no such joint or link, the arm has not 6 or 7 joints, or a joint is unsuitable. The message names the
+        fault.
     """
     if missing := [
         *(f"joint '{name}'" for name in joints if name not in model.joints),
@@ -151,7 +152,7 @@ def read_arm(
 
 
 def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
-    """Return shoulder, elbow and wrist if neighbouring axes of the arm meet at right angles (closed form); otherwise None."""
+    """Return shoulder, elbow and wrist of an arm with a closed form of the inverse kinematics, otherwise None."""
     if len(axes) != 7 or any(abs(axes[i] @ axes[j]) > 1e-6 for i, j in ((0, 1), (1, 2), (4, 5), (5, 6))):
         return None
     shoulder, wrist = _meeting(origins[:3], axes[:3]), _meeting(origins[4:6], axes[4:6])
@@ -162,7 +163,7 @@ def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
 
 
 def _meeting(origins: Array, axes: Array) -> Array | None:
-    """Return the point where axes meet (least squares), or None if they don't."""
+    """Return the point where axes meet (least squares), or None if they don't meet."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     point = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, origins))
     gap = np.abs(np.einsum("nij,nj->ni", across, point - origins)).max()
@@ -176,7 +177,7 @@ def cross_matrix(axis: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return vector products (..., 3); `numpy.cross` takes four times as long over a few of them."""
+    """Return vector products (..., 3); `numpy.cross` takes four times as long for a few vectors."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     product = np.empty((*np.broadcast(x, u).shape, 3))
@@ -191,13 +192,13 @@ def turn(axis: Array, angle: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _turning(axis: bytes) -> tuple[Array, Array]:
-    """Return the cross-product matrix (3, 3) of an axis, and its square. Cached, since an arm has few axes."""
+    """Return the cross-product matrix (3, 3) of an axis, and the square of the matrix. The result is cached."""
     crosses = cross_matrix(np.frombuffer(axis))
     return crosses, crosses @ crosses
 
 
 def turn_about(vectors: Array) -> Array:
-    """Return rotation matrices (n, 3, 3) about axes times angles (n, 3)."""
+    """Return rotation matrices (n, 3, 3) for rotation vectors (n, 3): unit axis times angle in radians."""
     angle = np.linalg.norm(vectors, axis=-1)
     x, y, z = (vectors / np.maximum(angle, 1e-12)[:, None]).T
     zero = np.zeros(len(angle))

@@ -12,7 +12,7 @@ from confab.reasoner.embodiment.values import Hand, Robot
 from confab.sim.urdf import Array, UrdfModel, mesh_file, read_model, read_urdf
 
 DRIVE = (("drive_x", "prismatic", "1 0 0"), ("drive_y", "prismatic", "0 1 0"), ("drive_yaw", "continuous", "0 0 1"))
-"""Joints below the base of a mobile robot: along x, along y and about z."""
+"""Joints below the base of a mobile robot, along x, along y and about z: name, URDF type and axis."""
 
 FARTHEST = 100.0
 """Limits in metres of the joints along x and y."""
@@ -24,7 +24,7 @@ def read_robot(robot: Robot, base: Array | None = None) -> UrdfModel:
     Raises
     ------
     ValueError
-        A file isn't a URDF robot, or a gripper's flange isn't there; the message names file and reason.
+        A file isn't a URDF robot, or the URDF lacks the flange of a gripper. The message names the file and the reason.
     """
     x, y, z = robot.position
     place, yaw = (x, y, z), robot.yaw
@@ -69,7 +69,7 @@ def _base(root: ET.Element) -> str:
 
 
 def _mount(root: ET.Element, hand: Hand) -> None:
-    """Add a hand's gripper, its names prefixed by the hand's."""
+    """Add a hand's gripper to the robot; the name of the hand is the prefix of the gripper's names."""
     if all(link.get("name") != hand.flange for link in root.findall("link")):
         raise ValueError(f"the robot's URDF has no link '{hand.flange}', the flange of '{hand.name}'; correct the name")
     gripper = _parsed(hand.gripper)

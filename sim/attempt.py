@@ -1,4 +1,4 @@
-"""One execution of a skill: its state at the beginning, the choice of poses, motions and common checks."""
+"""One execution of a skill: the state at its beginning, the choice of poses, the motions and the common checks."""
 
 from __future__ import annotations
 
@@ -34,25 +34,25 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres on short lines whose ends were chosen with the full margin; the load may have slipped a little since then."""
+"""Margin in metres on short lines. It is less than `MARGIN`, since the load may have slipped after the ends were chosen."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Minimum distance in metres of a pose that counts as unreachable for the hand."""
+"""Minimum missing distance in metres of a pose that no level hand can take."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
 
-Above `CLOSE`, since the load may slip on the way.
+All margins are above `CLOSE`, since the load may slip on the way.
 """
 
 ROUNDED = 3
 """Maximum number of samples on either side over which corners of a path are rounded."""
 
 THIN = 0.01
-"""Opening in metres of fingers that are closed around a handle."""
+"""Assumed opening in metres of fingers that are closed around a handle."""
 
 WITHDRAWAL_SPEED = 0.5
 """Share of its speed at which a stopped hand withdraws."""
@@ -61,17 +61,17 @@ SAMPLES = 1500
 """Maximum number of samples in the search for a path to one of the goals."""
 
 FINER = 4
-"""Factor by which a line that ends at a guard is sampled more finely than others."""
+"""Factor by which a line that a sensor condition ends is sampled more finely than other lines."""
 
 BATCH, ENOUGH = 24, 6
-"""Number of candidates that are checked for collisions at a time, and number of free candidates that end the check."""
+"""Number of candidates that are checked for collisions at a time, and number of collision-free candidates that end the check."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One execution of a skill: the world, the hand, the body it holds, and the bodies and stray beads before the skill.
+    """One execution of a skill: the world, the hand, the held body, and the bodies and stray beads before the skill.
 
-    `before` has for each body its carrier, such as a drawer, its position in the carrier's frame, and its tilt.
+    `before` maps each body to its carrier, such as a drawer, its position in the carrier's frame, and its tilt in radians.
     """
 
     world: Engine
@@ -90,13 +90,13 @@ class Attempt:
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
-        """Return the attempt with an empty hand, and store the last felt pose of the released body."""
+        """Return the attempt with an empty hand, and store the pose of the released body."""
         if self.held in self.world.bodies:
             self.world.remember(self.held, *self.world.truth(self.held))
         return replace(self, held=None)
 
     def body(self, name: str) -> str:
-        """Return the name of a body; raise `SkillError` if it isn't in the world, or its pose is unknown."""
+        """Return `name`; raise `SkillError` if the world has no such body, or if the pose of the body is unknown."""
         if name not in self.world.bodies or not self.world.knows(name):
             raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen", seen=0.0)
         return name
@@ -115,7 +115,7 @@ class Attempt:
     def reacher(
         self, *ignored: str, margin: float = MARGIN, opening: float | None = None, whole: bool = False
     ) -> Reacher:
-        """Return the arm with its load among all obstacles but the `ignored`, with fingers open by `opening` if given."""
+        """Return the arm with its load among all obstacles except the `ignored` ones, with fingers open by `opening` if given."""
         mover = self.hand.mover(opening)
         if self.held is not None:
             mover = mover.holding(self.world.load_spheres(self.hand, self.held, whole))
@@ -123,14 +123,14 @@ class Attempt:
         return Reacher(mover, around, margin)
 
     def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None) -> list[int]:
-        """Return the numbers of candidates whose stages are all reachable and free, the most comfortable first.
+        """Return the indices of the candidate poses that are reachable and collision-free at all stages, the cheapest first.
 
         `opening` is the assumed opening of the fingers in metres, as after a release.
 
         Raises
         ------
         SkillError
-            No candidate is left: `unreachable` with the missing metres, or `goal in collision` with the obstacles.
+            No candidate is left. The code is `unreachable` with the missing metres, or `goal in collision` with the obstacles.
         """
         with self.planning():
             reacher = self.reacher(opening=opening)
@@ -157,7 +157,7 @@ class Attempt:
             return [int(left[i]) for i in found]
 
     def _unreachable(self, stages: Sequence[Stage], at: Stage, objects: tuple[str, ...]) -> SkillError:
-        """Return the error for a stage without a posture: the missing metres, and the value of the moved joint at that stage."""
+        """Return the error for a stage without a posture, with the missing metres and the value of the moved joint at the stage."""
         if at.joint is None:
             return SkillError("unreachable", objects, beyond_m=max(beyond(self.hand.arm, one.poses) for one in stages))
         missing = beyond(self.hand.arm, at.poses)
@@ -169,7 +169,7 @@ class Attempt:
         )
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
-        """Return the costs of candidates: for cramped postures, for pointing aside, and for the distance from the present pose."""
+        """Return the costs of candidate poses: for cramped postures, for pointing aside, and for turns from the present pose."""
         arm, now = self.hand.arm, self.hand.pose
         ahead = np.arctan2(*(poses[:, :2] - arm.shoulder[:2]).T[::-1])
         cost: Array = np.sum([comfort(arm, q) for q in postures], axis=0)
@@ -188,9 +188,9 @@ class Attempt:
     def follow(
         self, q: Array, speed: float = 1.0, stop: Callable[[], bool] | None = None, corners: int = ROUNDED
     ) -> None:
-        """Drive the arm along sampled postures at a share `speed` of its speed, or until `stop` returns true.
+        """Drive the arm along sampled postures at a share `speed` of the hand's speed, or until `stop` returns true.
 
-        The path begins at the present posture; its corners are rounded over `corners` samples.
+        The path begins at the present posture. Its corners are rounded over `corners` samples.
         """
         with self.planning():
             q, limits = np.concatenate([self.hand.posture[None], q[1:]]), self.limits
@@ -209,7 +209,7 @@ class Attempt:
     def move_to_any(
         self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None
     ) -> int:
-        """Move along a free path to one of the goal poses, the first if possible; return its number.
+        """Move along a collision-free path to one of the goal poses, the first if possible; return the index of the reached pose.
 
         `opening` is the assumed opening of the fingers in metres.
         """
@@ -240,7 +240,7 @@ class Attempt:
         return reached[0]
 
     def _withdraw(self, q: Array) -> None:
-        """Move back along the postures that the arm has passed before it was stopped."""
+        """Move back along the postures that the arm passed before it was stopped."""
         now = self.hand.measured()
         self.hand.command(now)
         passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
@@ -254,9 +254,9 @@ class Attempt:
         speed: float = 1.0,
         stop: Callable[[], bool] | None = None,
     ) -> None:
-        """Move along the straight line to a pose, or until `stop` returns true; raise `SkillError` if the line isn't free.
+        """Move along the straight line to a pose, or until `stop` returns true; raise `SkillError` if the line is blocked.
 
-        With `stop`, the line only has to be free at its beginning. Without `stop`, the elbow may turn on the way.
+        With `stop`, only the beginning of the line has to be collision-free. Without `stop`, the elbow may turn on the way.
         """
         start = self.hand.pose
         if stop is not None:
@@ -277,10 +277,10 @@ class Attempt:
         partly: bool = False,
         others: Iterable[Array] = (),
     ) -> None:
-        """Move along the first of `poses` and `others` that is free, or until `stop` returns true.
+        """Move along the first collision-free path among `poses` and `others`, or until `stop` returns true.
 
-        With `partly`, the free beginning of a path suffices, and the margin is reduced by the noise: contact ends the motion.
-        `SkillError` is raised if no path is free.
+        With `partly`, a path with a collision-free beginning suffices, and the noise reduces the margin, since contact ends the
+        motion. Raise `SkillError` if all paths are blocked.
         """
         with self.planning():
             reacher = self.reacher(*ignored, margin=CLOSE - 2 * self.world.noise if partly else CLOSE)
@@ -296,7 +296,7 @@ class Attempt:
         self.follow(q, speed, stop)
 
     def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
-        """Move straight up with the elbow free to turn, or around the obstacles if the line is blocked."""
+        """Move the hand straight up to a goal pose, or around the obstacles if the line is blocked."""
         if goal[2] - self.hand.pose[2] < 1e-3:
             return
         try:
@@ -318,14 +318,14 @@ class Attempt:
             if tilt_of(rotation) > TOPPLED > tilt:
                 raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
             if shift > numbers["disturbance"]:
-                most = f"at most {numbers['disturbance'] * 1000:.0f} mm are let pass"
+                most = f"at most {numbers['disturbance'] * 1000:.0f} mm are allowed"
                 message = f"{name} was moved by {shift * 1000:.0f} mm; {most}"
                 raise SkillError("object disturbed", (name,), message, moved_m=shift)
 
     def check_grip(self, numbers: Numbers) -> dict[str, float]:
-        """Return the distance that the held object has slipped since the grasp.
+        """Return the distance and the angle by which the held object has slipped since the grasp.
 
-        Raise `SkillError` if it slipped too far or is lost.
+        Raise `SkillError` if the object slipped too far or was lost.
         """
         if self.held is None or self.hand.grasp is None:
             return {}
@@ -355,7 +355,7 @@ class Attempt:
 
 
 def rounding(reacher: Reacher, q: Array) -> int:
-    """Return the largest number of samples over which the corners of a path can be rounded so that it stays free."""
+    """Return the largest number of samples over which the corners of a path can be rounded without a collision."""
     return next((n for n in range(ROUNDED, 0, -1) if reacher.free(smooth(q, n)).all()), 0)
 
 
@@ -367,11 +367,11 @@ def _position_in(world: Engine, carrier: str, body: str) -> Array:
 
 
 Scene = tuple[Mover, Surroundings, float]
-"""The arm at a stage, its obstacles, and the margin in metres."""
+"""The moving spheres of the arm at a stage, the obstacles, and the margin in metres."""
 
 
 def _free(scenes: Sequence[Scene], postures: Sequence[Array], order: NDArray[np.intp]) -> list[int]:
-    """Return the first few candidates, in `order`, that are free at every stage."""
+    """Return the first candidates, in `order`, that are collision-free at every stage."""
     chosen: list[int] = []
     for start in range(0, len(order), BATCH):
         left = order[start : start + BATCH]
@@ -384,14 +384,14 @@ def _free(scenes: Sequence[Scene], postures: Sequence[Array], order: NDArray[np.
 
 
 def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage, margin: float) -> Scene:
-    """Return the scene of a stage."""
+    """Return the arm and the obstacles of a stage."""
     around = reacher.around if stage.around is None else stage.around
     mover = closed if stage.closed else bare if stage.released else reacher.mover
     return mover, around.without(*stage.ignored), margin
 
 
 def _blocked(scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
-    """Return the error for stages without a free candidate; it names the bodies that block most candidates."""
+    """Return the error for stages without a collision-free candidate. The error names the bodies that block most candidates."""
     nearest: dict[str, Array] = {}
     for (mover, around, margin), q in zip(scenes, postures, strict=True):
         for name, gap in mover.clearances(q, around).items():

@@ -20,7 +20,7 @@ FORCE = 5000.0
 class Base:
     """The base of a robot in a physics world, on joints along x and y and about z.
 
-    A drive misses its goal by at most `miss` metres and radians.
+    The base stops at most `miss` metres and `miss` radians off its goal.
     """
 
     client: int
@@ -44,13 +44,13 @@ class Base:
         return [cos * dx + sin * dy, cos * dy - sin * dx, pose[2] - yaw]
 
     def set(self, pose: Array) -> None:
-        """Place the base at a pose (x, y, yaw) before the first step; later it moves by its motors only."""
+        """Place the base at a pose (x, y, yaw) before the first simulation step. Later, only the motors move the base."""
         for joint, value in zip(self.joints, self._values(pose), strict=True):
             pybullet.resetJointState(self.body, joint, value, physicsClientId=self.client)
         self.command(pose)
 
     def command(self, pose: Array) -> None:
-        """Set the motors' target to a pose (x, y, yaw); they hold it until the next command."""
+        """Set the target of the motors to a pose (x, y, yaw); the motors hold the pose until the next command."""
         pybullet.setJointMotorControlArray(
             self.body,
             self.joints,

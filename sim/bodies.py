@@ -1,8 +1,9 @@
-"""Bodies of the world: their shape, mass and appearance. `KINDS` has a `ShapeKind` for each kind of shape.
+"""Bodies of the world: their shape, mass and appearance.
 
-The function that creates the body in PyBullet, and the cylinder that represents the body in motion planning. A vessel is a wall
-of revolution. Its collision shape is a bottom cylinder and a ring of flat boxes for each segment of the profile; its visual
-shape is a smooth mesh. Metres and kilograms; a body's frame has its origin in the middle of the base, z up.
+`KINDS` maps each kind of shape to the function that creates the body in PyBullet, and to the cylinder that represents the body
+in motion planning. A vessel is a solid of revolution. The collision shape of a vessel is a bottom cylinder and a ring of flat
+boxes for each segment of the profile. Its visual shape is a smooth mesh. The origin of a body's frame is the middle of its
+base, with z up. Units are metres and kilograms.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ from numpy.typing import ArrayLike
 from confab.reasoner.embodiment.values import Shape
 from confab.sim.urdf import Array
 
-with suppress(ImportError):  # shapes are measured without PyBullet, too
+with suppress(ImportError):  # shapes can be measured without PyBullet
     import pybullet
 
 PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
 
 STEP = 0.001
-"""Maximum height in metres of a segment in the outline of a turned solid that gets no cylinder because it is only a step."""
+"""Maximum height in metres of a segment of a turned solid's outline that gets no cylinder."""
 
 SIDES = 40
-"""Number of corners of a circle in a visual mesh."""
+"""Number of corners of the polygon that stands for a circle in a visual mesh."""
 
 
 @dataclass(frozen=True)
 class ShapeKind:
-    """A kind of shape: `make` creates a body from (client, shape, position, orientation); `outer` and `height` give a cylinder."""
+    """A kind of shape: `make` creates a body; `outer` and `height` return radius and height of the cylinder around a shape."""
 
     make: Callable[[int, Shape, Array, Array], int]
     outer: Callable[[Shape], float]
@@ -51,17 +52,17 @@ class ShapeKind:
 
 
 def wall(shape: Shape) -> float:
-    """Return a vessel's wall thickness."""
+    """Return the thickness of a vessel's wall in metres."""
     return float(shape.numbers.get("wall", 0.004))
 
 
 def vessel_height(shape: Shape) -> float:
-    """Return the height of the rim above the base."""
+    """Return the height of a vessel's rim above its base."""
     return shape.profile[-1][0]
 
 
 def vessel_radius(shape: Shape) -> float:
-    """Return the largest outer radius."""
+    """Return the largest outer radius of a vessel."""
     return max(radius for _, radius in shape.profile) + wall(shape)
 
 
@@ -71,7 +72,7 @@ def inner_radius(shape: Shape, height: Array) -> Array:
 
 
 def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a vessel from a generated URDF, since PyBullet's compound shapes have at most 16 parts and a wall has more."""
+    """Make a vessel from a generated URDF, since PyBullet's compound shapes are limited to 16 parts."""
     planks = [*_planks(shape)]
     base = shape.profile[0][1] + wall(shape)
     inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
@@ -94,8 +95,8 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
 def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
     """Load a URDF given as text, with an optional OBJ mesh that the URDF refers to by `file_name`; return the body.
 
-    The files are temporary. Equal texts get equal names, since PyBullet caches files by name for ever: new names would cost 50
-    KB per vessel.
+    The files are temporary. Equal texts get equal file names, since PyBullet never frees its cache of files: a new name costs
+    50 KB.
     """
     with _LOADING:
         folder = Path(tempfile.gettempdir()) / _folder(os.getpid())
@@ -143,9 +144,9 @@ PLANK = """<collision>
 
 
 def _planks(shape: Shape) -> Iterator[str]:
-    """Yield the boxes of the wall as URDF text, a ring for each segment of the profile.
+    """Yield the boxes of a vessel's wall as URDF text, one ring for each segment of the profile.
 
-    Lines are short, as PyBullet's parser requires.
+    PyBullet's parser requires short lines.
     """
     thickness = wall(shape)
     for (low, r_low), (high, r_high) in pairwise(shape.profile):
@@ -165,7 +166,7 @@ def _planks(shape: Shape) -> Iterator[str]:
 
 
 def _revolved(shape: Shape) -> str:
-    """Return the visual mesh as OBJ text: the outside upwards, the rim, the inside downwards, the bottom."""
+    """Return the visual mesh of a vessel as OBJ text: outside, rim, inside and bottom."""
     thickness = wall(shape)
     inner = [(h, r) for h, r in reversed(shape.profile)][:-1]
     bottom = [(thickness, shape.profile[0][1]), (thickness, 0.0)]
@@ -245,7 +246,7 @@ def center_height(shape: Shape) -> float:
 
 
 def _body(client: int, shape: Shape, collision: int, visual: int, position: Array, orientation: Array) -> int:
-    """Create the body and set its friction; maximal coordinates are three times as fast as a multibody."""
+    """Create a body in PyBullet's maximal coordinates, which are three times as fast as a multibody, and set its friction."""
     body = pybullet.createMultiBody(
         baseMass=shape.mass,
         baseCollisionShapeIndex=collision,
@@ -303,7 +304,7 @@ def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
 
 
 def outline(shape: Shape) -> tuple[Array, Array]:
-    """Return the heights and outer radii of the side view of an upright shape."""
+    """Return heights and outer radii of the outline of an upright shape."""
     if shape.profile:
         heights, radii = np.array(shape.profile).T
         return heights, radii + (wall(shape) if shape.kind == "vessel" else 0.0)
@@ -311,12 +312,12 @@ def outline(shape: Shape) -> tuple[Array, Array]:
 
 
 def packed(shape: Shape, count: int, radius: float) -> Array:
-    """Return positions (count, 3) in a vessel's frame at which beads of `radius` fit: layers of rings, bottom up.
+    """Return positions (count, 3) of beads of `radius` in a vessel's frame: layers of rings from the bottom up.
 
     Raises
     ------
     ValueError
-        The vessel has room for fewer; the message has the number.
+        The vessel has no room for `count` beads. The message gives the number of beads that fit.
     """
     spots: list[tuple[float, float, float]] = []
     height, pitch, layer = wall(shape) + radius * 1.05, radius * 2.06, 0

@@ -1,7 +1,7 @@
 """Distances between an arm and its obstacles, for many postures at once.
 
-The arm and its load are a set of spheres. The obstacles are solids (boxes and upright or lying cylinders) and the spheres of the
-robot's body and of other arms. A distance below zero is a collision. Metres throughout.
+The arm and its load are a set of spheres. The obstacles are boxes, cylinders, and the spheres of the robot's body and of other
+arms. A distance below zero is a collision. All lengths are in metres.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from confab.sim.arms import Arm, Flags, link_transforms, turn
 from confab.sim.urdf import Array, Spheres, UrdfModel
 
 EDGE, BETWEEN = 0.004, 0.02
-"""Radius of the spheres along the lower edge of a load, and distance between neighbours, in metres."""
+"""Radius of the spheres along the lower edge of a load, and distance between neighbouring spheres, in metres."""
 
 POINTS = 4000
 """Number of points whose distances are computed at once; larger arrays don't fit into the processor's cache."""
@@ -28,7 +28,7 @@ POINTS = 4000
 class Solid:
     """A named box (half extents) or cylinder (radius, radius, half height) with its centre and rotation in the world.
 
-    `part` names one of several solids of the same thing.
+    `part` distinguishes several solids of the same name.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The obstacles of an arm: solids, and the spheres of the robot's body and other arms with their owners' names."""
+    """The obstacles of an arm: solids, and the spheres of the robot's body and of other arms with the names of their owners."""
 
     solids: tuple[Solid, ...] = ()
     centers: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -65,7 +65,7 @@ class Surroundings:
     owners: tuple[str, ...] = ()
 
     def without(self, *names: str) -> Surroundings:
-        """Return the surroundings without the solids, parts and robots of these names."""
+        """Return the surroundings without the solids, parts and sphere owners of the given names."""
         left = replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
         if names and (gone := {*names} & {*self.owners}):
             kept = np.array([owner not in gone for owner in self.owners])
@@ -77,7 +77,7 @@ class Surroundings:
     def packed(self) -> tuple[Array, Array, Array, Array, Array]:
         """The solids as arrays, boxes before cylinders.
 
-        Axes (s, 3, 3), centres along these axes (s, 3), half extents (s, 3), lower and upper bounds (s, 3).
+        The arrays are axes (s, 3, 3), centres along these axes (s, 3), half extents (s, 3), and lower and upper bounds (s, 3).
         """
         solids = sorted(self.solids, key=lambda solid: solid.kind == "cylinder")
         turned = np.array([solid.rotation for solid in solids]).reshape(-1, 3, 3)
@@ -92,7 +92,7 @@ class Surroundings:
         return sum(solid.kind != "cylinder" for solid in self.solids)
 
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
-        """Return the surroundings with an owner's spheres added."""
+        """Return the surroundings and the spheres of `owner`."""
         return replace(
             self,
             centers=np.concatenate([self.centers, spheres.centers]),
@@ -103,7 +103,7 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Mover:
-    """An arm's spheres at the zero posture, the joint that carries each, and the arm itself."""
+    """An arm, its spheres at the zero posture, and the joint that carries each sphere."""
 
     arm: Arm
     spheres: Spheres
@@ -116,7 +116,7 @@ class Mover:
         return centers
 
     def holding(self, spheres: Spheres) -> Mover:
-        """Return the arm with a load of spheres, given in the hand's frame."""
+        """Return the arm with a load; the spheres of the load are given in the hand's frame."""
         world = spheres.centers @ self.arm.tip_rotation.T + self.arm.tip
         together = Spheres(
             np.concatenate([self.spheres.centers, world]), np.concatenate([self.spheres.radii, spheres.radii])
@@ -131,9 +131,9 @@ class Mover:
 
 
 def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
-    """Return a flag for each of n postures: True if the spheres (m,) at centres (n, m, 3) keep the margin.
+    """Return for each of n postures whether spheres of `radii` (m,) at `centers` (n, m, 3) keep the margin.
 
-    It is faster than `clearances`.
+    This function is faster than `clearances`.
     """
     some = max(POINTS // max(len(radii), 1), 1)
     return np.concatenate(
@@ -173,9 +173,9 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
 
 
 def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the boxes `low` to `high` (m, 3) and the boxes `bottom` to `top` (s, 3) that meet a box of the other group.
+    """Return the indices of the boxes `low` to `high` (m, 3) and `bottom` to `top` (s, 3) that meet a box of the other group.
 
-    Most spheres of an arm on a path are far from most obstacles, so this filter pays.
+    The filter saves time, since most spheres of an arm are far from most obstacles.
     """
     near = np.ones((len(low), len(bottom)), dtype=bool)
     for i in range(3):
@@ -203,15 +203,15 @@ def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, 
 
 
 def box(fixture: Fixture) -> Solid:
-    """Return a fixture as a solid."""
+    """Return the solid of a fixture."""
     turned = turn(np.array([0.0, 0.0, 1.0]), np.array(fixture.yaw))
     return Solid(fixture.name, "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
 
 
 def read_mover(model: UrdfModel, arm: Arm, openings: Mapping[str, float]) -> Mover:
-    """Return the arm's moving spheres, with finger joints at `openings` (metres).
+    """Return an arm with the spheres of its moving links, with finger joints at `openings` (metres).
 
-    The links between the first and the second joint are left out, since they turn on the spot and touch the mount of the arm.
+    The links between the first and the second joint are left out: they turn on the spot and touch the mount of the arm.
     """
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():
@@ -226,7 +226,7 @@ def read_mover(model: UrdfModel, arm: Arm, openings: Mapping[str, float]) -> Mov
 
 
 def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
-    """Return the spheres of the robot that no arm moves."""
+    """Return the spheres of the links of a robot that no arm moves."""
     joints = {name for arm in arms for name in arm.joints}
     still = [s for link, s in model.spheres.items() if not joints & {joint.name for joint in model.chains[link]}]
     return Spheres(np.concatenate([s.centers for s in still]), np.concatenate([s.radii for s in still]))
@@ -235,7 +235,7 @@ def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
 def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     """Return spheres that cover an upright body of revolution above `bottom`, except its edges.
 
-    `heights` (ascending) and `radii` are its outline; each sphere is as wide as the body at its centre.
+    Ascending `heights` and `radii` give the outline of the body. Each sphere is as wide as the body at the sphere's centre.
 
     >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()
     [0.02, 0.04, 0.06, 0.08]

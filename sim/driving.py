@@ -1,7 +1,7 @@
 """Motions of a mobile base among obstacles, with the arms at rest in their present postures.
 
-A path is planned as a hand's is (`confab.sim.motion.connect`). The base's pose is (x, y, 0, yaw, 0, 0); it is free if no sphere
-of robot and load touches anything. After the drive the arms' kinematics start from the base's new pose.
+`confab.sim.motion.connect` plans paths of bases as well as of hands. The pose of a base is (x, y, 0, yaw, 0, 0). A pose is free
+if no sphere of the robot or its load touches an obstacle. After a drive, the arms' kinematics start from the base's new pose.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ MARGIN = 0.02
 """Margin in metres between a driving robot and its obstacles."""
 
 RAMP_SECONDS = 0.8
-"""Seconds in which a base reaches its speed, so slowly that no load slips and no full cup spills."""
+"""Seconds in which a base reaches its speed; a faster start lets loads slip and full cups spill."""
 
 STOPPED_LAG = 0.03
-"""Minimum lag in metres or radians behind its command of a base that counts as stopped."""
+"""Minimum lag, in metres or radians, of a base behind its command at which the base counts as blocked."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
 """Distances in metres that are tried in turn.
 
-The robot backs off by the distance before it turns, and approaches its goal from this distance.
+The robot backs off by the distance before it turns, and approaches its goal from the same distance.
 """
 
 SAMPLES = 600
@@ -54,7 +54,7 @@ class Roller:
 
     @property
     def spread(self) -> Array:
-        """Size of the search region beyond start and goal (6,)."""
+        """Size (6,) of the search region beyond start and goal, in metres and radians."""
         return np.array([1.0, 1.0, 0.0, np.pi, 0.0, 0.0])
 
     def at(self, q: Array) -> Array:
@@ -65,24 +65,24 @@ class Roller:
         return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return x, y and yaw of the base at poses, and flags that all poses are within reach."""
+        """Return x, y and yaw of the base at poses, and a true flag for each pose, since a base reaches all poses."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
     def free(self, q: Array) -> Flags:
-        """Return the positions of the base at which the robot touches nothing."""
+        """Return for each position of the base whether the robot is free of collisions."""
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
-        """Return x, y and yaw of the base along poses; None if the robot touches something."""
+        """Return x, y and yaw of the base along poses; None if the robot collides with an obstacle."""
         q = poses[:, BASE]
         return q if self.free(q).all() else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some paths that can be followed, or None."""
+        """Return the index of the first collision-free path, or None."""
         return next((i for i, way in enumerate(ways) if self.follow(way) is not None), None)
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield paths that back off, turn, and approach the goal from the front."""
+        """Yield the intermediate poses of paths that back off, and of paths that back off, turn and approach the goal forwards."""
         for back in BACKING:
             ends = []
             for pose in (start, goal):
@@ -153,7 +153,7 @@ def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | Non
 
 
 def _check(engine: Engine, base: Base, wanted: Array, hands: tuple[str, ...]) -> None:
-    """Raise `SkillError` if the skill's time limit has passed or the base lags behind its command."""
+    """Raise `SkillError` if the skill's time limit has passed, or if the base lags too far behind its command."""
     hand = engine.hands[hands[0]]
     if engine.steps > hand.deadline:
         raise SkillError("too slow", (base.robot.name,), seconds=hand.limit)

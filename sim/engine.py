@@ -1,9 +1,9 @@
 """PyBullet with the bodies of a scene: simulation steps and perception.
 
-Rule 1: time is counted in steps of ``1 / RATE`` seconds, and every loop has a bound in steps.
-Rule 2: only motor targets are set. Exceptions: `confab.sim.staging` before the first step, planted faults (`confab.sim.faults`) and
-interventions (`confab.sim.live`).
-Rule 3: every random number comes from `Engine.rng`, so the same arguments give the same world, bit by bit.
+Rule 1: time is counted in steps of ``1 / RATE`` seconds, and every loop has a maximum number of steps.
+Rule 2: skills set only targets of motors. `confab.sim.staging` (before the first step), planted faults (`confab.sim.faults`)
+and interventions (`confab.sim.live`) may set positions.
+Rule 3: every random number comes from `Engine.rng`, so equal arguments give equal worlds, bit by bit.
 """
 
 from __future__ import annotations
@@ -35,12 +35,11 @@ RATE = 240.0
 CONTACT_SHIFT = 0.005
 """Distance in metres that two bodies may shift along each other before Bullet drops their contact and detects it again.
 
-Bullet's default of 2 cm is for larger bodies: with it, a finger that has left a ledge would still press at the position of the
-ledge.
+Bullet's default of 2 cm suits larger bodies. With the default, a finger that has left a ledge would still press on the ledge.
 """
 
 LAG = 0.08
-"""Maximum lag in radians of a joint behind its command."""
+"""Lag in radians of a joint behind its command above which a motion is stopped."""
 
 LOOKS = 6
 """Number of noisy measurements whose mean is a perceived position."""
@@ -53,7 +52,7 @@ NEAR_PLACE = 0.05
 
 
 STEP_UP = 0.01
-"""Metres between the heights above a place that are tried for a load."""
+"""Distance in metres between neighbouring heights that `clear_height` tries."""
 
 
 def whole_spheres(shape: Shape) -> Spheres:
@@ -72,7 +71,7 @@ class Thing:
 
 @dataclass(frozen=True)
 class Bead:
-    """A drop of a beverage."""
+    """A small ball that represents a drop of a beverage; `filling` names the beverage."""
 
     body: int
     filling: str
@@ -98,7 +97,7 @@ class Engine:
     noise : float
         Standard deviation in metres of perceived positions.
     gui : bool
-        Open PyBullet's window. Call `confab.sim.screen.require_screen` first: without a screen PyBullet ends the process.
+        Open PyBullet's window. Call `confab.sim.screen.require_screen` first, since PyBullet ends the process without a screen.
     """
 
     def __init__(self, embodiment: Embodiment, seed: int = 0, noise: float = 0.0, gui: bool = False) -> None:
@@ -114,13 +113,13 @@ class Engine:
         self.bases: dict[str, Base] = {}
         self.standing: dict[str, Spheres] = {}
         self.mechanics: list[Mechanic] = []
-        self.links: dict[str, Mechanic] = {}  # by the names of their links
-        self.shifts: dict[int, Array] = {}  # by the mechanism's body: error of its perceived position
-        # by body: step of the last look, error of the perceived position
+        self.links: dict[str, Mechanic] = {}  # by the name of the link
+        self.shifts: dict[int, Array] = {}  # error of a mechanism's perceived position, by the mechanism's body
+        # step of the last look, and error of the perceived position, by body
         self.errors: dict[str, tuple[int, Array]] = {}
-        # by body: its carrier when last seen, and its rotation and base in the carrier's frame
+        # carrier of a body when it was last seen, and the body's rotation and base in the carrier's frame, by body
         self.known: dict[str, tuple[str, Array, Array]] = {}
-        self.last_amounts: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
+        self.last_amounts: dict[tuple[str, str], float] = {}  # servings when last seen, by vessel and filling
         self.sighted: tuple[int, Sight] | None = None
         self.remembered: dict[str, int] = {}
         self.beads: list[Bead] = []
@@ -148,7 +147,7 @@ class Engine:
     # ------------------------------------------------------------------------------------------------- stepping
 
     def run(self, steps: int) -> None:
-        """Simulate a number of steps with the motors' targets as they are."""
+        """Simulate a number of steps with unchanged targets of the motors."""
         begin, rendering = time.process_time(), self.clock.rendering
         hands = [hand for hand in self.hands.values() if hand.closing]
         latching = [mechanic for mechanic in self.mechanics if mechanic.latching]
@@ -169,7 +168,7 @@ class Engine:
     def follow(
         self, hand: Manipulator, positions: Array, velocities: Array, stop: Callable[[], bool] | None = None
     ) -> None:
-        """Drive an arm along timed postures, or until `stop` returns true; raise `SkillError` if it lags behind its command."""
+        """Drive an arm along timed postures, or until `stop` returns true; raise `SkillError` if the arm lags too far behind."""
         for i, (q, v) in enumerate(zip(positions, velocities, strict=True)):
             hand.command(q, v)
             self.run(1)
@@ -185,7 +184,7 @@ class Engine:
     def check_course(self, hand: Manipulator) -> None:
         """Raise `SkillError` if the skill's time limit has passed, or if a joint lags too far behind its command.
 
-        In the second case the error names the bodies that the arm touches; if the arm touches none, the error names the hand.
+        If a joint lags, the error names the bodies that the robot touches, or the hand if the robot touches no body.
         """
         if self.steps > hand.deadline:
             raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)
@@ -208,7 +207,7 @@ class Engine:
         return tuple(sorted(around - {held, hand.robot.name}))
 
     def contacts(self, body: int) -> Sequence[Sequence[Any]]:
-        """Return PyBullet's contact points of a body with others."""
+        """Return PyBullet's contact points of a body with other bodies."""
         found = pybullet.getContactPoints(body, physicsClientId=self.client)
         return [contact for contact in found if contact[2] != body]
 
@@ -218,7 +217,7 @@ class Engine:
         return found - {""}
 
     def name_of(self, body: int, part: int) -> str:
-        """Return the name of a body, or of its link `part` if that moves; an empty string if it has no name."""
+        """Return the name of a moving link `part` of a mechanism, or otherwise of the body; an empty string without a name."""
         links = (name for name, one in self.links.items() if (one.body, one.joints.get(name)) == (body, part))
         return next(links, self.names.get(body, ""))
 
@@ -250,7 +249,7 @@ class Engine:
         return rotation, np.array(position) - rotation[:, 2] * center_height(thing.shape)
 
     def sense(self, name: str) -> tuple[Array, Array]:
-        """Return a body's perceived rotation and base: the mean of several noisy measurements.
+        """Return a body's perceived rotation (3, 3) and base (3,): the mean of several noisy measurements.
 
         The result stays the same until the next simulation step. A hidden body keeps its last perceived pose in the frame of its
         carrier.
@@ -277,7 +276,8 @@ class Engine:
     def remember(self, name: str, rotation: Array, position: Array) -> None:
         """Store a body's perceived pose in the frame of its carrier.
 
-        With noise, a body that may not have moved keeps its stored position, shifted a little towards the new measurement.
+        With noise, the stored position of a body that has not clearly moved is only shifted a little towards the new
+        measurement.
         """
         carrier = self.carried_by(name, position)
         frame, origin = self.carrier(carrier)
@@ -289,7 +289,7 @@ class Engine:
         self.remembered[name] = self.steps
 
     def sight(self) -> Sight:
-        """Return the observations of the cameras, and drop the believed poses of bodies that they see to be gone."""
+        """Return the observations of the cameras, and forget the poses of bodies that the cameras see to be gone."""
         if self.sighted is None or self.sighted[0] != self.steps:
             self.sighted = self.steps, Sight()
             poses = {name: self._believed(name) for name in self.known}
@@ -314,7 +314,7 @@ class Engine:
         return frame @ turned, origin + frame @ base
 
     def _cameras(self) -> Array:
-        """Return the positions (n, 3) of the cameras: those of the scene; if it has none, two over the shoulders of each robot."""
+        """Return the positions (n, 3) of the scene's cameras; without any, of two cameras over the shoulders of each robot."""
         if self.embodiment.cameras:
             return np.array(self.embodiment.cameras)
         found = []
@@ -343,8 +343,9 @@ class Engine:
     def look(self, before: int = 0) -> None:
         """Draw new perception errors.
 
-        The error of a mechanism holds until the next look, the error of a body until the next simulation step. Errors are means
-        over several measurements; after `before` earlier looks at an unchanged world, they are means over all looks.
+        The error of a mechanism holds until the next look, and the error of a body until the next simulation step. An error is
+        the mean of several measurements. After `before` earlier looks at an unchanged world, the error is the mean of all
+        looks.
         """
         seen = {name: error for name, (steps, error) in self.errors.items() if before and steps == self.steps}
         self.errors.clear()
@@ -364,7 +365,7 @@ class Engine:
         return self.shifts.get(mechanic.body, np.zeros(3))
 
     def carrier(self, name: str, sensed: bool = False) -> tuple[Array, Array]:
-        """Return the frame of a link or body that carries places, true or `sensed`; the world's frame for an empty name."""
+        """Return the true or `sensed` frame of a link or body that carries places; for an empty name, the frame of the world."""
         if not name:
             return np.eye(3), np.zeros(3)
         if name not in self.links:
@@ -373,16 +374,16 @@ class Engine:
         return turned, origin + self.shift(self.links[name]) if sensed else origin
 
     def place(self, name: str, sensed: bool = False) -> Array:
-        """Return a place's present position (3,), with `sensed` as far as its carrier is perceived."""
+        """Return a place's present position (3,); with `sensed`, from the perceived pose of its carrier."""
         place = self.embodiment.places[name]
         turned, origin = self.carrier(place.carrier, sensed)
         point: Array = origin + turned @ np.array(place.position)
         return point
 
     def carried_by(self, name: str, base: Array | None = None) -> str:
-        """Return the carrier (a link or body) of the place at which a body is; an empty string if no carried place is near.
+        """Return the link or body that carries the place of a body; an empty string if no place of a carrier is near.
 
-        `base` stands in for the body's true position.
+        `base` replaces the true position of the body.
         """
         carried = [place for place in self.embodiment.places.values() if place.carrier not in ("", name)]
         base = self.truth(name)[1] if base is None else base
@@ -391,14 +392,14 @@ class Engine:
         return self.embodiment.places[best].carrier if best and gaps[best] < NEAR_PLACE else ""
 
     def top(self, name: str) -> Array:
-        """Return the middle of a body's perceived top, which for a vessel is the mouth."""
+        """Return the perceived middle (3,) of a body's top, such as the mouth of a vessel."""
         rotation, base = self.sense(name)
         return base + rotation[:, 2] * height_of(self.bodies[name].shape)
 
     def nearest_place(self, point: Array) -> tuple[str, float]:
-        """Return the horizontally nearest place to a point, and its distance.
+        """Return the place that is horizontally nearest to a point, and its distance.
 
-        Of several places above one another, the next one below the point is returned.
+        Among several places above one another, the next place below the point is returned.
         """
         points = {name: self.place(name) for name in self.embodiment.places}
         gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
@@ -409,12 +410,12 @@ class Engine:
         return best, gaps[best]
 
     def acting(self, roles: Mapping[str, str]) -> str:
-        """Return the hand in the roles of a skill, or the first hand of the robot in them; an empty string if there is neither."""
+        """Return the hand among the roles of a skill, or the first hand of the robot among the roles, or an empty string."""
         own = (name for name, hand in self.hands.items() if hand.robot.name == roles.get("robot"))
         return roles.get("hand") or next(own, "")
 
     def held(self, hand: str, force: float = 1.0) -> str | None:
-        """Return the body that both fingers of a hand press with at least `force` newtons."""
+        """Return the body that both fingers of a hand press with at least `force` newtons, or None."""
         manipulator = self.hands[hand]
         for name, thing in self.bodies.items():
             if min(manipulator.pressing(thing.body)) >= force:
@@ -422,7 +423,7 @@ class Engine:
         return None
 
     def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> list[Bead]:
-        """Return the beads (of one filling, or all) inside a vessel at its true pose; with `sensed`, at its perceived pose."""
+        """Return the beads, of one filling if given, inside a vessel at its true pose; with `sensed`, at its perceived pose."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
@@ -449,7 +450,7 @@ class Engine:
         return self.last_amounts.get((vessel, filling), 0.0)
 
     def servings(self, vessel: str) -> Fraction:
-        """Return the perceived number of servings in a vessel; without beads, the counted number."""
+        """Return the perceived number of servings in a vessel; in a world without beads, the number that skills have counted."""
         if not self.beads:
             return Fraction(
                 self.filled.get(vessel, self.embodiment.bodies[vessel].servings if self.contents.get(vessel) else 0)
@@ -503,7 +504,7 @@ class Engine:
         return after @ before.T @ rotation, target + after @ before.T @ (base - origin)
 
     def in_hand(self, hand: Manipulator, body: str) -> tuple[Array, Array]:
-        """Return a body's rotation and base in the hand's frame."""
+        """Return the perceived rotation and base of a body in the hand's frame."""
         rotation, point = hand.frame()
         turned, base = self.sense(body)
         return rotation.T @ turned, rotation.T @ (base - point)
@@ -511,7 +512,7 @@ class Engine:
     def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
         """Return spheres for a held body in the hand's frame.
 
-        The lowest centimetres, which may touch a table, are included if `whole`.
+        The lowest centimetres of the body, which may touch a table, are covered only with `whole`.
         """
         rotation, base = self.in_hand(hand, body)
         shape = self.bodies[body].shape
@@ -519,10 +520,10 @@ class Engine:
         return Spheres(spheres.centers @ rotation.T + base, spheres.radii)
 
     def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
-        """Return the height from `least` on above a point at which an upright load has the margin to everything around it.
+        """Return the lowest height between `least` and `most` above a point at which an upright load keeps the margin to obstacles.
 
-        From a hole or a mouth the load has to rise above the rim. The result is `least` if the load gets nearer to a solid
-        on the way up, such as the top of a cupboard.
+        A load in a hole has to rise above the rim. The result is `least` if the load gets nearer to an obstacle on the way up,
+        such as the top of a cupboard.
         """
         spheres = whole_spheres(self.bodies[body].shape)
         rises = np.arange(least, max(most, least) + STEP_UP / 2, STEP_UP)

@@ -1,12 +1,12 @@
-"""Faults that tests plant in a world to see that verification detects them.
+"""Faults that tests plant in a world to check that verification detects faults.
 
-Pass a fault to `confab.sim.verify.verify` as `prepare`.
+Pass a fault to `confab.sim.verify.verify` as its argument `prepare`.
 
-Each function of the table below returns a `PlantedFault`, which can be sent to another process. A fault that may occur during a
-task takes `step`, the number of a primitive, and `seconds` after the beginning of that primitive.
+Each function of the table below returns a `PlantedFault`, which can be sent to another process. The time of a fault during a
+task is given by `step`, the number of a primitive, and `seconds` after the beginning of the primitive.
 
 ==================================================== ============================================================
-`hidden_wall`, `stranger`                            an obstacle that the robot does not, or does, perceive
+`hidden_wall`, `stranger`                            an unexpected obstacle, not perceived or perceived
 `displaced`, `knocked`, `gone`, `lying`              an object in another pose
 `heavy`, `slippery`, `sealed`, `drained`             an object with other properties
 `place_displaced`, `settings`                        wrong knowledge
@@ -14,7 +14,7 @@ task takes `step`, the number of a primitive, and `seconds` after the beginning 
 `weak_arm`, `slow_arm`, `weak_grip`, `shut`          a weakness of the robot
 `noisy`, `misaligned`, `misread`                     a defect of perception
 `stiff`, `stopped`, `swung`, `sprung`                a defective joint of furniture
-`unlatched`, `greasy`                                a button that does not latch, a handle that slips
+`unlatched`, `greasy`                                a button without a latch, a slippery handle
 ==================================================== ============================================================
 """
 
@@ -44,7 +44,7 @@ PLANTS: dict[str, Callable[..., None]] = {}
 
 @dataclass(frozen=True)
 class PlantedFault:
-    """A fault with its arguments. Calling it with a world plants it there."""
+    """A fault with its arguments. A call with a world plants the fault in the world."""
 
     kind: str
     arguments: tuple[Any, ...]
@@ -61,7 +61,7 @@ class PlantedFault:
 
 
 def fault(plant: Callable[Concatenate[Engine, P], None]) -> Callable[P, PlantedFault]:
-    """Register a function that plants a fault, and return a function that creates the `PlantedFault` from the arguments."""
+    """Register a function that plants a fault; return a function that makes a `PlantedFault` from the same arguments."""
     PLANTS[plant.__name__] = plant
 
     @wraps(plant)
@@ -97,7 +97,7 @@ def hidden_wall(
 ) -> None:
     """Put up a wall that the robot does not perceive, at `distance` metres from an object or place, on the robot's side.
 
-    `size` is its extent in metres along the line from robot to object, across it, and up.
+    `size` is the extent of the wall in metres along the line from robot to object, across the line, and upwards.
     """
     target = world.place(before) if before in world.embodiment.places else world.truth(before)[1]
     base = np.array(world.embodiment.robots[0].position)
@@ -117,7 +117,7 @@ def hidden_wall(
 def stranger(
     world: Engine, point: tuple[float, float, float], size: tuple[float, float, float] = (0.06, 0.06, 0.12)
 ) -> None:
-    """Put a box on the table that the robot perceives but no fact mentions."""
+    """Put a box at a point; the robot perceives the box, but no fact mentions it."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", mass=1.0, grasp_height=size[2] / 2, numbers=numbers)
     body = KINDS["box"].make(world.client, shape, np.array(point), np.array(UPRIGHT))
@@ -128,7 +128,7 @@ def stranger(
 
 
 def _put(world: Engine, name: str, base: Array, orientation: tuple[float, float, float, float] = UPRIGHT) -> None:
-    """Move a body to a base position and orientation, and wake it."""
+    """Move the base of a body to a position and orientation, and activate the body in PyBullet."""
     thing = world.bodies[name]
     up = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)[:, 2]
     middle = (base + center_height(thing.shape) * up).tolist()
@@ -210,7 +210,7 @@ def slippery(world: Engine, body: str, friction: float = 0.022) -> None:
 
 @fault
 def sealed(world: Engine, vessel: str, radius: float = 0.0235, height: float = 0.075) -> None:
-    """Put a ball into a vessel that is too large for its neck, so that it blocks the neck when the vessel is tilted."""
+    """Put a ball into a vessel, too large for the vessel's neck, which blocks the neck when the vessel is tilted."""
     rotation, base = world.truth(vessel)
     ball = pybullet.createMultiBody(
         0.01,
@@ -242,7 +242,7 @@ def drained(world: Engine, vessel: str, left: int = 0) -> None:
 
 @fault
 def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
-    """Shift a place, by metres along x and y, after reach was computed."""
+    """Shift a place by metres along x and y without an update of the reach facts."""
     known = world.embodiment.places[place]
     x, y, z = known.position
     moved = replace(known, position=(x + by[0], y + by[1], z))
@@ -251,7 +251,7 @@ def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
 
 @fault
 def settings(world: Engine, /, behavior: str, **numbers: float) -> None:
-    """Execute a behaviour with numbers that differ from the ontology's."""
+    """Replace numbers that the ontology states for a behaviour."""
     use = world.embodiment.skills[behavior]
     changed = replace(use, numbers={**use.numbers, **numbers})
     world.embodiment = replace(world.embodiment, skills={**world.embodiment.skills, behavior: changed})
@@ -276,7 +276,7 @@ def stiff(world: Engine, link: str, friction: float) -> None:
 
 @fault
 def stopped(world: Engine, link: str, lower: float, upper: float, step: int = -1, seconds: float = 0.0) -> None:
-    """Narrow the limits of a joint of furniture without the robot's knowledge."""
+    """Set the limits of a joint of furniture without the robot's knowledge."""
     mechanic = world.links[link]
 
     def stop(world: Engine) -> None:
@@ -356,7 +356,7 @@ def lets_go(world: Engine, hand: str, step: int, seconds: float) -> None:
 
 @fault
 def arm_at(world: Engine, hand: str, point: tuple[float, float, float], yaw: float, step: int) -> None:
-    """Move an arm without a command, so that its hand is at a point and points along `yaw`."""
+    """Place an arm at once so that its hand is at a point and points along `yaw`."""
 
     def go(world: Engine) -> None:
         arm = world.hands[hand].arm
@@ -399,20 +399,20 @@ def joint_range(world: Engine, hand: str, joint: int, lower: float, upper: float
 
 @fault
 def weak_arm(world: Engine, hand: str, share: float) -> None:
-    """Reduce the torque of an arm's motors to a share."""
+    """Multiply the torques of an arm's motors by `share`."""
     manipulator = world.hands[hand]
     manipulator.efforts = tuple(effort * share for effort in manipulator.efforts)
 
 
 @fault
 def slow_arm(world: Engine, hand: str, share: float) -> None:
-    """Reduce the speeds of an arm to a share, with the robot's knowledge."""
+    """Multiply the speeds of an arm by `share`, with the robot's knowledge."""
     world.hands[hand].pace = share
 
 
 @fault
 def weak_grip(world: Engine, hand: str, newtons: float) -> None:
-    """Set the force with which the fingers of a hand press."""
+    """Set the force in newtons with which the fingers of a hand press."""
     manipulator = world.hands[hand]
     manipulator.hand = replace(manipulator.hand, grip=newtons)
 
@@ -439,7 +439,7 @@ def noisy(world: Engine, metres: float) -> None:
 
 @fault
 def misaligned(world: Engine, by: tuple[float, float]) -> None:
-    """Shift all perceived positions by metres along x and y, as a displaced camera would."""
+    """Shift the perceived positions of all bodies by metres along x and y, like a displaced camera."""
     true_sense = world.sense
 
     def sense(name: str) -> tuple[Array, Array]:
@@ -451,7 +451,7 @@ def misaligned(world: Engine, by: tuple[float, float]) -> None:
 
 @fault
 def misread(world: Engine, link: str, by: float) -> None:
-    """Shift a joint's perceived value by metres or radians."""
+    """Shift the perceived value of a furniture joint by metres or radians."""
     mechanic = world.links[link]
     true_values = mechanic.values
 

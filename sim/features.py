@@ -1,7 +1,8 @@
-"""Grasp features of things as frames, and the hand's candidate turns at them.
+"""Grasp features of things as frames, and candidate orientations of a hand at the features.
 
-In a feature's frame, x is the fingers' direction, y leads from finger to finger, and z is the axis that the fingers close
-around. A hand always points horizontally. This allows every turn about z if z is vertical, otherwise at most two turns.
+In a feature's frame, x is the direction in which the fingers point, y leads from finger to finger, and z is the axis around
+which the fingers close. A hand always points horizontally. If z is vertical, every turn of the hand about z is allowed;
+otherwise at most two turns are allowed.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 AROUND = 2 * np.pi - 0.01
-"""Minimum range in radians that counts as a full turn."""
+"""Minimum range of angles, in radians, that counts as a full turn."""
 
 TURNS = 13
-"""Number of turns tried about an upright bar with limited range."""
+"""Number of turns that are tried about a vertical axis with a limited range."""
 
 
 @dataclass(frozen=True)
 class FeatureFrame:
-    """A feature in the world: rotation (3, 3), point (3,), and the range of a hand's turn about its z, in radians."""
+    """A feature in the world: rotation (3, 3), point (3,), and the range in radians of a hand's turn about the feature's z."""
 
     rotation: Array
     point: Array
@@ -37,7 +38,7 @@ class FeatureFrame:
 
     @property
     def upright(self) -> bool:
-        """Whether z is vertical, so that every turn about it leaves the hand level."""
+        """Whether z is vertical, so that the hand stays level in every turn about z."""
         return bool(np.hypot(self.rotation[2, 0], self.rotation[2, 1]) < 1e-6)
 
     def turns(self) -> Array:
@@ -57,7 +58,7 @@ class FeatureFrame:
 
 @dataclass(frozen=True)
 class Ways:
-    """Candidates (n,) for a hand at a feature: turn about its z at first and after the joint's motion, and the elbow's swivel."""
+    """Candidates (n,) for a hand at a feature: turns about the feature's z before and after a joint's motion, and swivels."""
 
     first: Array
     last: Array
@@ -69,7 +70,7 @@ class Ways:
 
 
 def ways(frame: FeatureFrame, moving: bool) -> Ways:
-    """Return all candidates at a feature; if its joint is `moving`, the hand may turn during the motion."""
+    """Return all candidates at a feature; if the feature's joint is `moving`, the hand may turn during the motion."""
     turns = frame.turns()
     if not moving or not frame.upright or len(turns) == len(YAWS):
         turn, swivel = (part.ravel() for part in np.meshgrid(turns, SWIVELS))
@@ -78,7 +79,7 @@ def ways(frame: FeatureFrame, moving: bool) -> Ways:
 
 
 def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
-    """Return the frame of a feature: perceived for an object and a place, true for a link, with joints at `values` if given.
+    """Return the frame of a feature: perceived for an object or place, true for a link, with joints at `values` if given.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] 
 
 
 def touched(engine: Engine, name: str, feature: str) -> tuple[str, ...]:
-    """Return the parts of a link that a hand touches at a feature; for an object or a place, return its name."""
+    """Return the parts of a link that a hand touches at a feature; for an object or place, its own name."""
     if name in engine.links:
         found: Feature | None = engine.links[name].link(name).features.get(feature)
         return found.parts if found is not None else ()

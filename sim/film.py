@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from confab.sim.world import PrimitiveStep
 
 SIZES = (17, 15, 13, 11)
-"""Font sizes of the caption, of which the first that fits is used."""
+"""Font sizes of the caption; the first size that fits is used."""
 
 BAR = 46
 """Height in pixels of the bar at the bottom with caption and plan strip."""
 
 NAMED = 480
-"""Minimum width in pixels of a picture with names."""
+"""Minimum width in pixels of a picture that shows names."""
 
 SPEED = 2.5
 """Ratio of simulated time to the film's time."""
@@ -46,14 +46,14 @@ VIEWS = (
 )
 """Cameras: radians around the tables, and the tangent of the angle downwards.
 
-The camera that sees most participants shows a primitive.
+A primitive is shown by the camera that sees most of its objects.
 """
 
 ABOVE = 0.01
-"""Height in metres, above a place or the top of an object, of the point that has to be visible for the name to be written."""
+"""Height in metres above a place, or above the top of an object, of the point that must be visible for a name to be shown."""
 
 NEARLY = 0.97
-"""Minimum share of the distance to a point of a link at which a ray has reached the handle, and not other furniture."""
+"""Minimum share of a ray from the camera to a handle at which a hit counts as a hit of the handle."""
 
 STACKED = 3
 """Number of rows in which names are stacked if they would overlap."""
@@ -62,7 +62,7 @@ DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
 
 
 class Film:
-    """A film of a world: pass it to `verify` as `watch`, and close it, or use it in a ``with`` statement.
+    """A film of a world, to be passed to `verify` as `watch`; close the film, or use it in a ``with`` statement.
 
     Parameters
     ----------
@@ -71,10 +71,11 @@ class Film:
     steps : sequence of PrimitiveStep
         The primitives, for the plan strip.
     titles : mapping of path to text
-        Captions of steps by their position in the plan's tree. Steps above the primitives without a caption are left out.
+        Captions of steps by their position in the plan's tree. Steps above the primitives are shown only if they have a
+        caption.
     camera : Camera, optional
-        By default a camera that shows the table, with pictures of `width` by `height` pixels (divisible by 16). If something
-        hides the objects and handles of a primitive, a camera farther around the table is used.
+        By default, a camera that shows the table in pictures of `width` by `height` pixels, both divisible by 16. If the
+        objects and handles of a primitive are hidden, a camera on another side of the table is used.
     frames : int
         Frames per second of the film.
     speed : float
@@ -121,7 +122,7 @@ class Film:
         elif self._writer is not None:
             writer, self._writer = self._writer, None
             writer.close()
-            self._file.__exit__(kind, error, trace)  # which removes what was filmed
+            self._file.__exit__(kind, error, trace)  # removes the unfinished film
 
     def __call__(self, world: Engine) -> None:
         """Take a frame if one is due, and count its CPU time as rendering."""
@@ -149,7 +150,7 @@ class Film:
         return self._caption(self._named(picture(world, self.camera), world), world.current)
 
     def _turn_to_action(self, world: Engine) -> None:
-        """Choose the camera that sees most participants of the present primitive; keep the present camera if none sees more."""
+        """Choose the camera that sees most objects of the present primitive; the present camera wins ties."""
         if not self._views:
             size = self.width, self.height, BAR
             self._views = [view_of(world.embodiment, *size, around, down) for around, down in VIEWS]
@@ -175,7 +176,7 @@ class Film:
         self._file.close()
 
     def _keep(self) -> None:
-        """Save the latest frame as the still of the primitive that has ended."""
+        """Save the latest frame as the picture of the primitive that has ended."""
         if self.stills is None or self._latest is None or not 0 <= self._number < len(self.steps):
             return
         step = self.steps[self._number]
@@ -196,7 +197,7 @@ class Film:
         self._writer.append_data(image)
 
     def _named(self, image: Array, world: Engine) -> Array:
-        """Write the names of visible places below them, and the names of visible objects above them, without overlap."""
+        """Write the names of visible places below the places and the names of visible objects above the objects."""
         if self.width < NAMED or self.camera is None:
             return image
         canvas = Image.fromarray(image)
@@ -222,7 +223,7 @@ class Film:
         return np.asarray(canvas)
 
     def _caption(self, image: Array, number: int) -> Array:
-        """Write the present primitive, with its parents, and the strip of all primitives below the picture."""
+        """Write the present primitive and its parent steps below the picture, with the strip of all primitives."""
         height, width = image.shape[:2]
         canvas = Image.fromarray(image)
         draw = ImageDraw.Draw(canvas)
@@ -236,7 +237,7 @@ class Film:
         return np.asarray(canvas)
 
     def _strip(self, draw: ImageDraw.ImageDraw, width: int, height: int, number: int) -> None:
-        """Draw a small bar per primitive, with a gap wherever a step of the top level begins."""
+        """Draw a small bar per primitive, with a gap before each step of the top level."""
         tops = [step.path[0] for step in self.steps]
         gaps = [i for i in range(1, len(tops)) if tops[i] != tops[i - 1]]
         unit = (width - 28 - 10 * len(gaps)) / max(len(self.steps), 1)
@@ -249,10 +250,7 @@ class Film:
 
 
 def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
-    """Return the points of a place, of the top of an object, or of a link's features, each with the name.
-
-    None for other individuals.
-    """
+    """Return the points that show a place, an object or a link, each with a name; no points for other individuals."""
     if name in world.embodiment.places:
         return [(world.place(name) + np.array([0.0, 0.0, ABOVE]), name)]
     if name in world.bodies:
@@ -268,7 +266,7 @@ def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
 
 
 def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
-    """Return whether only the named thing, or an object at the named place, is between a camera and a point."""
+    """Return whether a camera sees a point: only the named thing, or an object at the named place, may be in between."""
     hit = pybullet.rayTest(camera.eye, point.tolist(), physicsClientId=world.client)[0]
     if hit[0] < 0:
         return True
@@ -280,13 +278,13 @@ def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
 
 
 def _meets(box: tuple[float, float, float, float], others: Sequence[tuple[float, float, float, float]]) -> bool:
-    """Return whether a rectangle overlaps another one."""
+    """Return whether a rectangle overlaps one of `others`."""
     left, top, right, bottom = box
     return any(left < r and right > x and top < b and bottom > y for x, y, r, b in others)
 
 
 def _write_row(draw: ImageDraw.ImageDraw, texts: Sequence[str], width: int, y: float) -> None:
-    """Write texts side by side, the last one dark, in the largest size that fits."""
+    """Write texts side by side in the largest font size that fits, and the last text dark."""
     gap = 26
     for size in SIZES:
         font = ImageFont.load_default(size)

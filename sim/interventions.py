@@ -30,7 +30,7 @@ def move(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> 
 
 
 def put(world: PhysicsWorld, name: str, base: Array, orientation: Sequence[float]) -> None:
-    """Put an object with its contents at a position and an orientation (a quaternion); a hand that holds it opens."""
+    """Put an object with its contents at a position and an orientation (a quaternion); a hand that holds the object opens."""
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
@@ -45,14 +45,14 @@ def put(world: PhysicsWorld, name: str, base: Array, orientation: Sequence[float
 
 
 def push(world: PhysicsWorld, name: str, by: Sequence[float]) -> None:
-    """Push a standing object with its contents by metres along x and y; a held object isn't moved."""
+    """Shift a standing object with its contents by metres along x and y; a held object is not moved."""
     if name in world.bodies and not any(world.held(hand) == name for hand in world.hands):
         orientation = pybullet.getBasePositionAndOrientation(world.bodies[name].body, physicsClientId=world.client)[1]
         put(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)
 
 
 def knock(world: PhysicsWorld, name: str, numbers: Sequence[float] = ()) -> None:
-    """Knock an object over, with its contents, away from its neighbours."""
+    """Tip an object with its contents over, away from its neighbours."""
     if name not in world.bodies:
         return
     base, radius = world.truth(name)[1], outer_radius(world.bodies[name].shape)
@@ -74,7 +74,7 @@ def put_box(world: PhysicsWorld, name: str, place: str, size: Sequence[float]) -
 
 
 def fill(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Empty a vessel, and fill it with the value unless that is `empty`."""
+    """Empty a vessel, and fill the vessel with `value` unless `value` means empty."""
     for bead in world.inside(symbol.arguments[0]):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
@@ -101,7 +101,7 @@ def push_joint(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: st
 
 
 def take_away(world: PhysicsWorld, name: str, numbers: Sequence[float] = ()) -> None:
-    """Remove an object and its contents from the world, if it is still there."""
+    """Remove an object and its contents from the world; do nothing if the world has no such object."""
     if name not in world.bodies:
         return
     for bead in world.inside(name):
@@ -133,4 +133,4 @@ DISTURBERS: Mapping[str, Callable[[PhysicsWorld, PerceiverUse, Symbol, str], Non
     "perceive_content": fill,
     "perceive_joint": push_joint,
 }
-"""The function that makes a value of a perceiver's situation types true, by perceiver."""
+"""The function that makes a fact of a situation type true, by the type's perceiver."""

@@ -1,12 +1,12 @@
-"""Inverse kinematics: the posture for a pose of the hand, in closed form if the arm has one, otherwise numerically.
+"""Inverse kinematics: postures for poses of the hand, in closed form if the arm has a closed form, otherwise numerically.
 
 An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A pose of the hand
-leaves it one degree of freedom, the *swivel*. There are two kinds. If all three axes of the wrist meet (KUKA's iiwa), the
-swivel is the elbow's angle about the line from shoulder to wrist. At 0 the elbow hangs down, or is up if the arm rises from its
-shoulder at the zero posture, as on a table. If the last axis misses the intersection of the two axes before it (Franka's
-Panda), the swivel is the angle of the last joint from the middle of its limits, minus the hand's roll, which that joint makes.
-For a given swivel the other six joints have a closed form. `confab.sim.numeric` solves all other arms. With seven joints the
-swivel is the angle of the third; with six it is always 0.
+leaves the arm one degree of freedom, the *swivel*. If all three axes of the wrist meet (KUKA's iiwa), the swivel is the elbow's
+angle about the line from shoulder to wrist. At swivel 0 the elbow hangs down, or points up if the upper arm points up at the
+zero posture. If the last axis misses the intersection of the two axes before it (Franka's Panda), the swivel is the angle of
+the last joint from the middle of its limits, minus the roll of the hand. For a given swivel, the other six joints have a closed
+form. `confab.sim.numeric` solves all other arms. Their swivel is the angle of the third joint from the middle of its limits if
+the arm has seven joints, and always 0 if the arm has six joints.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
 shoulder, elbow, wrist.
@@ -21,11 +21,11 @@ from confab.sim.numeric import REDUNDANT, solved
 from confab.sim.urdf import Array
 
 STRETCHED = 0.9999
-"""Maximum cosine of a joint's angle, from the point where its two solutions meet, at which the solutions still differ."""
+"""Maximum cosine of a joint's angle at which the joint's two solutions still differ; the solutions meet at cosine 1."""
 
 
 def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Flags]:
-    """Return postures (n, k) with the hand at rotations `r` and points `p` and the arm at `swivel`, and which of them are valid.
+    """Return postures (n, k) with the hand at rotations `r` and points `p` and the arm at `swivel`, and validity flags.
 
     Parameters
     ----------
@@ -34,18 +34,18 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     margin : float
         Distance in radians that every joint keeps from its limits.
     fold : float
-        Distance in radians that a joint keeps from the point where its two solutions meet; beyond that point the hand is out of
+        Distance in radians that a joint keeps from the angle where its two solutions meet, which is the limit of the arm's
         reach.
 
     Returns
     -------
     q : array (n, k), radians
-        Meaningless where not valid.
+        Undefined where `valid` is false.
     valid : array (n,) of bool
-        The point is in reach and every joint within its limits. Only one of the two postures of a spherical joint is
-        considered, so that neighbouring poses have neighbouring postures. It is the posture with the middle joint within ±90°;
-        with parallel axes, the posture farther from the limits; without a closed form, the posture that the arm reaches when it
-        is led from rest.
+        Whether the point is in reach and every joint is within its limits. Only one of the two postures of a spherical joint is
+        considered, so that neighbouring poses have neighbouring postures. The middle joint of the considered posture is within
+        ±90°. If the outer axes are parallel, the posture farther from the limits is considered. Without a closed form, the
+        posture that is found from the rest posture is considered.
     """
     if not arm.closed:
         return solved(arm, r, p, swivel, margin, fold)
@@ -55,7 +55,7 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
 
 
 def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the elbow at `swivel` about the line from shoulder to wrist, and which of them are in reach."""
+    """Return postures with the elbow at `swivel` about the line from shoulder to wrist, and flags of the reachable ones."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
     a, b, zero, bent, side = arm.limbs
@@ -82,7 +82,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return the angles (n, 3) of the spherical joint from joint `first` on; with parallel axes, those farther from the limits."""
+    """Return angles (n, 3) of the spherical joint that begins at joint `first`; with parallel axes, those far from the limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:
@@ -93,11 +93,11 @@ def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
 
 
 def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the last joint at `swivel` plus the hand's roll from its middle, and which of them are in reach.
+    """Return postures with the last joint at its middle plus `swivel` and the hand's roll, and flags of the reachable ones.
 
-    The last angle determines the wrist (w) and the direction of the sixth axis (e). The wrist's distance from the shoulder
-    determines the elbow's angle, the angle between w and e that of the fifth joint, and both directions together the shoulder's
-    rotation.
+    The last angle determines the wrist (w) and the direction of the sixth axis (e). The distance from shoulder to wrist
+    determines the elbow's angle. The angle between w and e determines the angle of the fifth joint. The directions w and e
+    determine the shoulder's rotation.
     """
     shoulder, fourth, fifth, sixth = arm.shoulder, arm.axes[3], arm.axes[4], arm.axes[5]
     hand = r @ arm.tip_rotation.T
@@ -111,7 +111,7 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
     )
     elbow = elbow[:, 1 if _wrapped(arm.middle[3] - _phase(fourth, upper, lower)) > 0 else 0]
     bent = turn(fourth, elbow)
-    v = np.swapaxes(bent, -1, -2) @ upper + lower  # from shoulder to wrist in the forearm's frame
+    v = np.swapaxes(bent, -1, -2) @ upper + lower  # vector from shoulder to wrist in the forearm's frame
     both, met = _angles_of(fifth, v, sixth, np.einsum("ni,ni->n", w, e), most)
     found = []
     for angle in both.T:
@@ -129,7 +129,7 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
 
 
 def _flipped(three: Array, axes: Array) -> Array:
-    """Return the other angles (n, 3) of the same rotation."""
+    """Return the second solution (n, 3) of three angles about `axes`, which gives the same rotation."""
     x, y, z = three.T
     return np.stack([x + np.pi, (0.0 if abs(axes[0] @ axes[2]) > 0.5 else np.pi) - y, z + np.pi], -1)
 
@@ -141,14 +141,14 @@ def _rolled(arm: Arm, r: Array) -> Array:
 
 
 def _phase(axis: Array, a: Array, b: Array) -> float:
-    """Return the angle about an axis by which `b` must turn to come nearest to `a`."""
+    """Return the angle in radians about an axis that turns `b` nearest to `a`."""
     return float(np.arctan2(a @ cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
-    """Return both angles (n, 2) about an axis at which `b` (3,) has a given product with `a` (n, 3), and which of them exist.
+    """Return both angles (n, 2) about an axis at which `b` (3,) has a given dot product with `a` (n, 3), and flags.
 
-    An angle exists if the cosine that determines it is below `most`.
+    The flag of two angles is true if the absolute cosine that determines them is below `most`.
     """
     cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ cross(axis, b)
     reach = np.maximum(np.hypot(cosine, sine), 1e-9)
@@ -167,7 +167,7 @@ def _frame(a: Array, b: Array) -> Array:
 
 
 def _length(vectors: Array) -> Array:
-    """Return the lengths (n,) of vectors (n, 3); `numpy.linalg.norm` takes twice as long over a few of them."""
+    """Return the lengths (n,) of vectors (n, 3); `numpy.linalg.norm` takes twice as long for a few vectors."""
     return np.asarray(np.sqrt(np.add.reduce(vectors * vectors, axis=-1)))
 
 
@@ -176,14 +176,15 @@ def _arccos(cosine: Array) -> Array:
 
 
 def _wrapped(angle: Array) -> Array:
-    """Return angles within ±180°."""
+    """Return equivalent angles within ±180°, in radians."""
     return np.asarray((np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi)
 
 
 def three_angles(r: Array, axes: Array) -> Array:
-    """Return the angles (n, 3) of ``turn(a1, x) @ turn(a2, y) @ turn(a3, z) = r`` (n, 3, 3); |y| <= 90° or 0 <= y <= 180°.
+    """Return the angles x, y, z (n, 3) that solve ``turn(a1, x) @ turn(a2, y) @ turn(a3, z) = r`` (Davenport's angles).
 
-    Neighbouring axes are at right angles (Davenport's angles): the third is parallel to the first or completes the frame.
+    Neighbouring axes are at right angles. The third axis is parallel to the first (then 0 <= y <= 180°), or the three axes
+    form a frame (then |y| <= 90°).
     """
     a1, a2, a3 = axes
     c = cross(a1, a2)
@@ -201,7 +202,7 @@ def three_angles(r: Array, axes: Array) -> Array:
 
 
 def swivel_of(arm: Arm, q: Array) -> Array:
-    """Return the swivel (n,) of postures."""
+    """Return the swivels (n,) of postures (n, k)."""
     if not arm.closed:
         return q[:, REDUNDANT] - arm.middle[REDUNDANT] if arm.swivels else np.zeros(len(q))
     if not arm.spherical:

@@ -1,6 +1,7 @@
 """Geometry of mechanisms: the positions of links, features and solids for given joint values.
 
-A mechanism is a URDF, either a given file or written from its parts. Lengths in metres, angles in radians.
+A mechanism is described by a URDF file, or by a URDF text that is generated from its parts. Lengths are in metres, angles in
+radians.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from confab.sim.collision import Solid
 from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 
 WIDER = 0.25
-"""Share of the range from `opened` to the upper limit by which a joint is opened beyond `opened`."""
+"""Share of the range between `opened` and the upper limit by which a joint is opened farther than `opened`."""
 
 HERE = np.zeros(3)
 
@@ -33,7 +34,7 @@ def urdf_name(mechanism: Mechanism, link: str) -> str:
 
 
 def moved(mechanism: Mechanism, model: UrdfModel, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
-    """Return a link's rotation and shift relative to the zero posture, with the joints at `values` (by link, default 0)."""
+    """Return a link's rotation and shift relative to the zero posture, with joints at `values` (by link, 0 by default)."""
     turned, shift = np.eye(3), np.zeros(3)
     by_urdf = {urdf_name(mechanism, link.name): values.get(link.name, 0.0) for link in mechanism.links}
     for joint in model.chain(urdf_name(mechanism, name)):
@@ -59,12 +60,12 @@ def solids(mechanism: Mechanism, model: UrdfModel, values: Mapping[str, float], 
 
 
 def open_values(mechanism: Mechanism) -> dict[str, float]:
-    """Return the joint values of the mechanism with every link open."""
+    """Return the joint values, by link, of a mechanism with all links open."""
     return {link.name: wide(link) for link in mechanism.links}
 
 
 def wide(link: Link) -> float:
-    """Return the value to which a joint is opened, somewhat beyond the value at which it counts as open.
+    """Return the value to which a joint is opened, somewhat above the value at which the joint counts as open.
 
     >>> wide(Link("lid", "revolute", opened=1.2, upper=1.6))
     1.3
@@ -73,9 +74,9 @@ def wide(link: Link) -> float:
 
 
 def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list[Solid]]:
-    """Return the places in the world's frame and the mechanisms' solids, both with every joint open.
+    """Return places in the world's frame and the solids of mechanisms, both with all joints open.
 
-    Places on movable bodies have no fixed position and are left out.
+    Places on movable bodies are left out, since they have no fixed position.
     """
     places = {name: place for name, place in embodiment.places.items() if not place.carrier}
     around: list[Solid] = []
@@ -93,7 +94,7 @@ def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list
 
 
 def feature_frame(frame: tuple[Array, Array], feature: Feature) -> tuple[Array, Array]:
-    """Return the frame of a feature in the world, given its link's frame."""
+    """Return the frame of a feature in the world, given the frame of the feature's link."""
     turned, origin = frame
     return turned @ rotation(*feature.turned), origin + turned @ np.array(feature.position)
 
@@ -105,7 +106,7 @@ def read_mechanism(mechanism: Mechanism) -> UrdfModel:
 
 
 def written(mechanism: Mechanism) -> str:
-    """Return a mechanism as URDF text, in short lines as PyBullet's parser requires."""
+    """Return a mechanism as URDF text with the short lines that PyBullet's parser requires."""
     lines = [f'<robot name="{mechanism.name}">', *_link(BASE, mechanism.parts, 0.0)]
     for link in mechanism.links:
         lines += _link(link.name, link.parts, link.mass)
@@ -130,7 +131,7 @@ def _link(name: str, parts: Sequence[Part], mass: float) -> list[str]:
         high = np.max([np.array(p.position) + np.array(p.size) / 2 for p in parts], axis=0)
         center, extent = (low + high) / 2, high - low
     if not mass:
-        center = np.zeros(3)  # the base is fixed; PyBullet then takes its frame for its centre of mass
+        center = np.zeros(3)  # PyBullet takes the frame of a fixed base for its centre of mass
     squares = extent**2
     ixx, iyy, izz = (max(mass, 1e-3) / 12 * (squares.sum() - square) for square in squares)
     lines = [

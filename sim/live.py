@@ -1,9 +1,9 @@
 """A physical world with interventions, in which the executive acts (`confab.planner.acting.executive`).
 
-Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents. Rule 2: an intervention that
-changes an object of the running primitive stops the primitive. Rule 3: before facts are observed, a hand whose position no fact
-can state, or an empty tilted hand, is brought upright and lifted. Rule 4: an object that stands at no place of the scene gets a
-spot (`confab.sim.lookout`).
+Rule 1: an intervention acts on bodies. A cup that is moved leaves the hand and keeps its contents.
+Rule 2: an intervention on an object of the running primitive stops the primitive.
+Rule 3: before facts are observed, a hand at no perceivable position, or a tilted empty hand, is brought upright and lifted.
+Rule 4: an object that stands at no place of the scene gets a new place, a spot (`confab.sim.lookout`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
 STOPPED = 0.02
-"""Minimum lag in radians of a joint behind its command at which the arm counts as stopped."""
+"""Lag in radians of a joint behind its command above which the arm counts as blocked."""
 
 UPRIGHT = 0.1
 """Maximum tilt in radians of an upright hand."""
@@ -47,11 +47,11 @@ class LiveWorld:
     ----------
     world : PhysicsWorld
     classes : mapping of class to individuals
-        An object that an intervention adds gets the shape of an object of its class.
+        An object that an intervention adds gets the shape of another object of its class.
     problem : Problem, optional
-        The problem against which interventions are checked; without a problem, there are no discoveries.
+        The problem against which interventions are checked. Without a problem, nothing is discovered.
     reaching : str
-        The relation of reach facts, for spots that are discovered.
+        The relation of reach facts, used for discovered spots.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class LiveWorld:
         self.waiting: list[Intervention] = []
         self.stopping = False
         self.concerned: set[str] = set()
-        self.planted = world.disturb  # faults that were planted before
+        self.planted = world.disturb  # a fault that was planted earlier
         world.disturb = self._each_step
 
     @property
@@ -79,7 +79,7 @@ class LiveWorld:
         self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
 
     def observe(self) -> State:
-        """Return the facts perceived now, after bringing hands without a perceivable position upright and up."""
+        """Return the facts perceived now, after hands at no perceivable position and tilted empty hands were brought up."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
@@ -96,7 +96,7 @@ class LiveWorld:
         return news
 
     def free_spots(self) -> Sequence[Discovery]:
-        """Return spots on the furniture at which something can be put down."""
+        """Return spots on the furniture at which an object can be put down."""
         return () if self.lookout is None else self.lookout.free_spots()
 
     def why_unplaced(self, individual: str) -> str:
@@ -123,8 +123,8 @@ class LiveWorld:
     def take_stock(self) -> None:
         """Adopt the present state after a failure.
 
-        A stopped arm is commanded to its present posture, so that it no longer presses. The present grasp of a held object becomes
-        the reference for further slip.
+        The present posture of a blocked arm becomes its command, so that the arm stops pressing. The present grasp of a held
+        object becomes the reference from which slip is measured.
         """
         stopped = [h for h in self.world.hands.values() if float(np.abs(h.measured() - h.posture).max()) > STOPPED]
         for hand in stopped:
@@ -137,7 +137,7 @@ class LiveWorld:
                 hand.grasp = self.world.in_hand(hand, held)
 
     def impossible(self, intervention: Intervention) -> str | None:
-        """Return why an intervention is impossible in this world at any time, or None if it is possible."""
+        """Return why an intervention is never possible in this world, or None if the intervention may be possible."""
         if intervention.change is InterventionKind.ADD and self._model_of(intervention.kind) is None:
             return f"no {intervention.kind} of this scene has a shape for {intervention.individual}"
         handled = (InterventionKind.REMOVE, InterventionKind.KNOCK, InterventionKind.PUSH)
@@ -159,12 +159,12 @@ class LiveWorld:
         return None
 
     def disturb(self, intervention: Intervention) -> None:
-        """Apply an intervention now, and let the bodies come to rest."""
+        """Apply an intervention now, and simulate until the bodies have come to rest."""
         self._interfere(intervention)
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a loaded hand upright and up, or an empty hand home, as far as possible."""
+        """Bring a hand with a load upright and up, or an empty hand to its rest posture, as far as possible."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):
@@ -193,7 +193,7 @@ class LiveWorld:
             intervention = self.waiting.pop(0)
             self._interfere(intervention)
             named = _named(intervention)
-            self.world.moved_by_others = self.world.moved_by_others | named  # the hand didn't disturb these
+            self.world.moved_by_others = self.world.moved_by_others | named  # these objects were not moved by the hand
             happened = happened or not named.isdisjoint(self.concerned)
         if happened:
             raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "an intervention changed an object of it")
@@ -218,7 +218,7 @@ class LiveWorld:
             HANDLED[change](self.world, name, intervention.numbers)
         else:
             for fact in intervention.facts:
-                if fact.symbol.arguments[0] in (*self.world.bodies, *self.world.links):  # else it has been removed
+                if fact.symbol.arguments[0] in (*self.world.bodies, *self.world.links):  # the object may be gone
                     self._make_true(fact)
 
     def _make_true(self, fact: Fact) -> None:
@@ -246,6 +246,6 @@ class LiveWorld:
 
 
 def _named(intervention: Intervention) -> set[str]:
-    """Return the individuals that an intervention names: the changed ones and their new values."""
+    """Return the individuals that an intervention names: the changed individuals and their new values."""
     named = {intervention.individual, *(fact.symbol.arguments[0] for fact in intervention.facts)}
     return named | {fact.value for fact in intervention.facts}

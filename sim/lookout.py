@@ -1,8 +1,8 @@
 """Discoveries of a live world: objects that no fact mentions, and spots that are no places of the scene.
 
-A *spot* is a place that is created on demand: for an object that stands at none of the scene's places, or as free room on the
-furniture to put something down. It belongs to the common classes of all places of the scene, and has the static facts of the
-place beside it; its reach facts are computed.
+A *spot* is a new place for an object that stands at none of the scene's places, or a free place on the furniture at which an
+object can be put down. A spot belongs to the classes that all places of the scene share. Its static facts are those of the
+place beside the spot, and its reach facts are computed.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ BESIDE = 0.3
 """Maximum distance in metres between a spot and the place whose static facts it shares."""
 
 GRID = 0.08
-"""Distance in metres between the points of furniture that are tested for room."""
+"""Distance in metres between the points on furniture that are tested for free room."""
 
 ROOMY = 0.1
-"""Minimum distance in metres between a free spot and every place, object and edge."""
+"""Minimum distance in metres of a free spot from places, objects and edges."""
 
 SPOTS, TRIED = 3, 12
 """Maximum number of free spots that are offered, and of points whose reach is computed."""
 
 HEIGHTS = (0.06, 0.12, 0.18)
-"""Heights in metres above a free spot that must be empty."""
+"""Heights in metres above a free spot at which no obstacle may be."""
 
 
 @dataclass
 class Lookout:
-    """Discovers things and spots in a world, and adds them to `problem`. `reaching` is the relation of reach facts, or empty."""
+    """Discovers objects and spots in a world, and adds them to `problem`; `reaching` is the relation of reach facts or empty."""
 
     world: PhysicsWorld
     problem: Problem
@@ -55,7 +55,7 @@ class Lookout:
     news: list[Discovery] = field(default_factory=list)
 
     def look(self) -> bool:
-        """Discover new objects and spots; return whether there are any."""
+        """Discover new objects and spots; return whether any were found."""
         before = len(self.news)
         spoken_of = {symbol.arguments[0] for symbol in self.world.symbols}
         for name in [name for name in self.world.bodies if name not in spoken_of and self.world.knows(name)]:
@@ -74,10 +74,10 @@ class Lookout:
         tilt = np.degrees(tilt_of(rotation))
         state = "stands" if tilt < 10 else f"leans by {tilt:.0f}°" if tilt < 60 else "lies"
         place, away = self.world.nearest_place(base)
-        return f"{state} {away * 100:.0f} cm from {place}, where no behaviour takes it from"
+        return f"{state} {away * 100:.0f} cm from {place}, from where no behaviour can take it"
 
     def free_spots(self) -> Sequence[Discovery]:
-        """Return new spots on the furniture with room around, the roomiest first."""
+        """Return new spots on the furniture with free room around them, the spot with most room first."""
         found: list[Discovery] = []
         for point in list(self._roomy())[:TRIED]:
             spot = self._spot(point, "", None)
@@ -90,9 +90,9 @@ class Lookout:
     # ------------------------------------------------------------------------------------------------- things
 
     def _meet(self, name: str) -> None:
-        """Discover a thing.
+        """Discover an object.
 
-        It belongs to the class of objects that have places, and is fixed if no hand can open wide enough for it.
+        The object belongs to the class of objects that have places. An object too wide for every hand is fixed.
         """
         world, problem = self.world, self.problem
         uses = world.embodiment.perceivers
@@ -125,7 +125,7 @@ class Lookout:
     # ------------------------------------------------------------------------------------------------- spots
 
     def _astray(self, symbol: Symbol, use: PerceiverUse) -> bool:
-        """Return whether an object stands at rest, in no hand and at no place."""
+        """Return whether an object stands at rest in no hand and at no place."""
         world, name = self.world, symbol.arguments[0]
         if not world.knows(name) or name not in world.bodies:
             return False
@@ -140,12 +140,12 @@ class Lookout:
         return not any(abs(gap[2]) < height and np.hypot(*gap[:2]) < near for gap in gaps)
 
     def _is_at(self, name: str, place: str) -> bool:
-        """Return whether a thing stands at a place."""
+        """Return whether an object stands at a place."""
         gap = self.world.sense(name)[1] - self.world.place(place)
         return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
 
     def _covered(self, name: str, own: str) -> tuple[str, ...]:
-        """Return the places, except `own`, at which objects have no room beside a thing, by the margins of motion planning."""
+        """Return the places, except `own`, at which a thing leaves other objects no room by the margins of motion planning."""
         world = self.world
         base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
         least = (
@@ -186,7 +186,7 @@ class Lookout:
         return next((one for one in carriers if one in world.links or one in world.bodies), "")
 
     def _spot(self, point: Array, carrier: str, height: float | None) -> Discovery:
-        """Put a place into the world at a point, in the frame of its carrier, and return it as a discovery."""
+        """Add a place to the world at a point, in the frame of its carrier, and return the place as a discovery."""
         world, embodiment, problem = self.world, self.world.embodiment, self.problem
         number = 1 + sum(name.startswith("spot") for name in embodiment.places)
         while f"spot{number}" in problem.individuals or f"spot{number}" in embodiment.places:
@@ -212,7 +212,7 @@ class Lookout:
         return Discovery(name, shared_kinds(problem, fixed), (*shared, *reached))
 
     def _beside(self, point: Array, carrier: str, places: Sequence[str]) -> str:
-        """Return the place beside a point: near it, at its height, and on the same carrier; an empty string if there is none."""
+        """Return the nearest place beside a point, at the same height and on the same carrier; an empty string if there is none."""
         world = self.world
         gaps = {
             name: float(np.hypot(*(world.place(name) - point)[:2]))
@@ -228,11 +228,11 @@ class Lookout:
         place = Place("here", (x, y, z), "", stand, height)
         try:
             return sorted(hand for hand, _ in reach(replace(self.world.embodiment, places={"here": place})).pairs)
-        except ValueError:  # the scene has no skill that reaches
+        except ValueError:  # the scene has no skill with a reach
             return []
 
     def _roomy(self) -> Iterator[Array]:
-        """Yield points of the furniture that bears places, with no object near them, those with the most room first."""
+        """Yield points, far from all objects, on the furniture that bears places; points with most room come first."""
         world = self.world
         places = [world.place(name) for name in world.embodiment.places]
         bodies = [

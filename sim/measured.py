@@ -1,4 +1,4 @@
-"""The perceiver of measured situation types: poses, contacts and joint values within the bounds that the ontology states."""
+"""The perceiver of situation types that the ontology defines by bounds on poses, contacts and joint values."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from confab.sim.engine import Engine
 from confab.sim.urdf import Array
 
 Measure = Callable[[Engine, str, str], "float | None"]
-"""Function of a world and two individuals that returns a quantity, or None if it can't be measured."""
+"""Function of a world and two individuals that returns a quantity, or None if the quantity can't be measured."""
 
 
 def _pose(world: Engine, name: str) -> tuple[Array, Array] | None:
-    """Return the perceived rotation and base of a body, place or link; None if it isn't known."""
+    """Return the perceived rotation and base of a body, place or link; None if the pose is unknown."""
     if name in world.embodiment.places:
         return np.eye(3), world.place(name)
     if name in world.links:
@@ -27,7 +27,7 @@ def _pose(world: Engine, name: str) -> tuple[Array, Array] | None:
 
 
 def _between(measure: Callable[[Engine, str, tuple[Array, Array], tuple[Array, Array]], float]) -> Measure:
-    """Return a measure of two individuals by a function of the world, the name of the second one, and both poses."""
+    """Return the measure of two individuals that calls `measure` with the world, the second individual's name and both poses."""
 
     def measured(world: Engine, one: str, other: str) -> float | None:
         poses = _pose(world, one), _pose(world, other)
@@ -37,7 +37,7 @@ def _between(measure: Callable[[Engine, str, tuple[Array, Array], tuple[Array, A
 
 
 def _inside(world: Engine, other: str, inner: tuple[Array, Array], outer: tuple[Array, Array]) -> float:
-    """Return 1 if a base is within the wall of a vessel and below its rim, else 0."""
+    """Return 1 if the base of an object is inside the vessel `other`, otherwise 0."""
     shape = world.bodies[other].shape if other in world.bodies else None
     if shape is None or shape.kind != "vessel":
         return 0.0
@@ -85,9 +85,10 @@ MEASURES: Mapping[str, Measure] = {
 
 
 def observe_measured(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether the bounds hold for the arguments. For a type with values, return the first value for which they hold.
+    """Return whether the bounds hold for the arguments; for a type with values, the first value for which the bounds hold.
 
-    If no value fits, the special value `nothing` if there is one. Return None if something can't be measured.
+    If no value fits, return the special value `nothing` of the situation type. Return None if there is no such value, or if a
+    quantity can't be measured.
     """
     if use.asked:
         holds = _hold(world, use, arguments[0], arguments[-1])
@@ -113,6 +114,6 @@ def _hold(world: Engine, use: PerceiverUse, one: str, other: str) -> bool | None
 
 
 def measure(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> Mapping[str, float]:
-    """Return the quantities of the bounds for the arguments of a failed comparison."""
+    """Return the measured quantities of all bounds by name, for a situation type without values."""
     found = {g.quantity: MEASURES[g.quantity](world, arguments[0], arguments[-1]) for g in use.holds if use.asked}
     return {name: value for name, value in found.items() if value is not None}

@@ -1,4 +1,4 @@
-"""Quantities that skills measure. Guards on them end a motion, or must hold after it."""
+"""Quantities that skills measure. A guard is a bound on a quantity that ends a motion, or that must hold after a motion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from confab.sim.whereabouts import floor_below
 
 
 def finger_force(run: Run, name: str) -> float:
-    """Return the force in newtons of the finger that presses a body or link less."""
+    """Return the smaller of the two forces, in newtons, with which the fingers press a body or link."""
     return min(finger_forces(run, name))
 
 
@@ -48,7 +48,7 @@ def _height(run: Run) -> float:
 
 
 def _bearing(run: Run) -> float:
-    """Return the force in newtons with which bodies other than the hand carry the load or the object just released."""
+    """Return the force in newtons with which bodies other than the hand carry the held or just released object."""
     world, load = run.world, _load(run)
     others = (c for c in world.contacts(world.bodies[load].body) if c[2] != run.attempt.hand.body)
     return float(sum(contact[9] * max(contact[7][2], 0.0) for contact in others))
@@ -77,7 +77,7 @@ def _stand_offset(run: Run) -> float:
 
 @dataclass(frozen=True)
 class MeasuredQuantity:
-    """A quantity: the function that measures it, its name in a verdict, and the failure code if it is out of bounds."""
+    """A measured quantity: the measuring function, the name in a verdict, and the failure code for a value out of bounds."""
 
     measure: Callable[[Run], float | None]
     name: str
@@ -101,7 +101,7 @@ QUANTITIES: Mapping[str, MeasuredQuantity] = {
 
 
 def _holds(run: Run, guard: Guard) -> tuple[bool, float | None, float]:
-    """Return whether a guard holds, the measured value, and its bound."""
+    """Return whether a guard holds, the measured value, and the bound."""
     value = QUANTITIES[guard.quantity].measure(run)
     link = run.roles.get("object", "") if guard.quantity == "joint" else ""
     bound = run.number(guard.bound, link)

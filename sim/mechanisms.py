@@ -1,7 +1,7 @@
 """Mechanisms, which are furniture with moving links, in a physics world.
 
-Joints resist by friction and damping; springs push back and latches hold. Links collide with each other and with their base,
-except for links that are stated to touch, or that touch before anything has moved.
+Joints have friction and damping, and may have springs and latches. Links collide with each other and with the base of the
+mechanism. Exceptions are links that are stated to touch, and links that touch at joint values 0.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, w
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the range from `opened` to the upper limit: at the first a latching joint trips, at the second it is then held."""
+"""Shares of the range from `opened` to the upper limit: a latching joint trips at the first, and is held at the second."""
 
 
 SLIGHT = 0.0002
-"""Minimum overlap in metres of two links at rest whose friction would jam the joint."""
+"""Minimum overlap in metres of two links at which their friction would jam the joint."""
 
 
 @dataclass
 class Mechanic:
-    """A mechanism in a physics world: its PyBullet body, its model at the zero posture, and the number of each link's joint."""
+    """A mechanism in a physics world: PyBullet body, model at the zero posture, and number of each link's joint."""
 
     client: int
     body: int
@@ -41,7 +41,7 @@ class Mechanic:
 
     @property
     def latching(self) -> bool:
-        """Whether one of the joints latches."""
+        """Whether a joint of the mechanism has a latch."""
         return any(link.latches for link in self.mechanism.links)
 
     def link(self, name: str) -> Link:
@@ -49,14 +49,14 @@ class Mechanic:
         return next(link for link in self.mechanism.links if link.name == name)
 
     def values(self) -> dict[str, float]:
-        """Return the joint values by link."""
+        """Return the present joint values by link."""
         return {
             name: pybullet.getJointState(self.body, joint, physicsClientId=self.client)[0]
             for name, joint in self.joints.items()
         }
 
     def moved(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
-        """Return a link's rotation and shift relative to the zero posture, with the joints as they are or at `values`."""
+        """Return a link's rotation and shift relative to the zero posture, with joints at their present values or at `values`."""
         return moved(self.mechanism, self.model, name, self.values() if values is None else values)
 
     def frame(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
@@ -70,7 +70,7 @@ class Mechanic:
         return solids(self.mechanism, self.model, self.values() if values is None else values, aside)
 
     def set(self, name: str, opened: bool) -> None:
-        """Set a link's joint open or shut; used for the initial state and for interventions only."""
+        """Set a link's joint open or shut, for the initial state and for interventions."""
         link = self.link(name)
         value = wide(link) if opened else 0.0
         pybullet.resetJointState(self.body, self.joints[name], value, physicsClientId=self.client)
@@ -79,7 +79,7 @@ class Mechanic:
             _resist(self.client, self.body, self.joints[name], link, opened)
 
     def drive(self) -> None:
-        """Update the latching joints: a joint pushed far enough trips, and its spring then pushes to the other rest value."""
+        """Update the joints with latches: a joint that is pushed far enough changes between its held and its released state."""
         for name, joint in self.joints.items():
             link = self.link(name)
             if not link.latches:
@@ -94,7 +94,7 @@ class Mechanic:
 
 
 def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
-    """Load a mechanism into a physics world, with every joint at 0."""
+    """Load a mechanism into a physics world, with all joints at 0."""
     position, orientation = mechanism.position, pybullet.getQuaternionFromEuler([0, 0, mechanism.yaw])
     if mechanism.urdf:
         body = pybullet.loadURDF(mechanism.urdf, position, orientation, useFixedBase=True, physicsClientId=client)
@@ -117,12 +117,12 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
 
 
 def _let_touch(mechanic: Mechanic) -> None:
-    """Let links pass each other or their base if that is stated, or if they touch before anything has moved.
+    """Disable collisions of links with each other or their base if they are stated to touch, or if they touch at joint values 0.
 
     Raises
     ------
     ValueError
-        Two of them are deeper in each other than a touch; the message names both and the millimetres.
+        Two links overlap by more than a touch. The message names both links and the overlap in millimetres.
     """
     owners: dict[str, tuple[int, Mechanism | Link]] = {mechanic.mechanism.name: (-1, mechanic.mechanism)}
     owners |= {link.name: (mechanic.joints[link.name], link) for link in mechanic.mechanism.links}
@@ -150,9 +150,9 @@ def overlap_of(client: int, one: tuple[int, int], other: tuple[int, int]) -> flo
 
 
 def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:
-    """Set a joint's friction, or the spring that pushes it to its rest value or the value at which it is held.
+    """Set a joint's friction, or the spring that pushes the joint to 0 or, if `held`, to the value at which the latch holds it.
 
-    Coulomb friction is modelled as a motor with target velocity 0, since PyBullet does not read it from the URDF.
+    A motor with target velocity 0 models Coulomb friction, since PyBullet does not read friction from the URDF.
     """
     if link.spring:
         rest = link.opened + STAY * (link.upper - link.opened) if held else 0.0

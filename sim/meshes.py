@@ -1,6 +1,6 @@
 """Spheres that cover the surface of a mesh, for collision checks.
 
-PyBullet replaces the mesh of a moving link by its convex hull; the spheres cover the surface of the mesh itself.
+PyBullet replaces the mesh of a moving link by its convex hull. The spheres cover the surface of the mesh itself.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 SPACING = 0.008
 """Maximum distance in metres between neighbouring points of a surface."""
 SLACK, LEAST, MOST = 0.2, 0.004, 0.02
-"""Maximum protrusion of spheres: share of the mesh's thickness, and its bounds in metres. Larger values need fewer spheres."""
+"""Maximum protrusion of spheres: a share of the mesh's thickness, and lower and upper bound in metres."""
 MOST_POINTS, CANDIDATES, SHARES = 1_500, 150, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Maximum number of points to cover and of candidate centres per shell; the shells, as shares of the way to the surface."""
+"""Maximum numbers of points to cover and of candidate centres per shell, and the shells as shares of the mesh's size."""
 MOST_PIECES, FARTHEST = 400_000, 1_000.0
 """Maximum number of surface points of a mesh, and maximum distance in metres of its points from the link's origin."""
 DIRECTIONS = np.array(
@@ -27,12 +27,12 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
 def triangles(file: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Array:
-    """Return the triangles (n, 3, 3) of a mesh in an OBJ or STL file, multiplied by `scale`, which converts to metres.
+    """Return the triangles (n, 3, 3), in metres, of a mesh in an OBJ or STL file; `scale` converts the file's unit to metres.
 
     Raises
     ------
     ValueError
-        The file is missing or of another format, or the mesh has no triangles or lies too far away.
+        The file is missing or has another format, or the mesh has no triangles or lies too far from its origin.
     """
     try:
         data = file.read_bytes()
@@ -81,7 +81,7 @@ def _stl(data: bytes) -> Array:
 
 
 def surface(corners: Array) -> Array:
-    """Return points (n, 3) on triangles (m, 3, 3), at most about `SPACING` apart."""
+    """Return points (n, 3) on triangles (m, 3, 3); neighbouring points are at most about `SPACING` metres apart."""
     found = [corners.reshape(-1, 3)]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(1)
     parts = np.ceil(edges / SPACING)
@@ -98,12 +98,12 @@ def surface(corners: Array) -> Array:
 
 @lru_cache(maxsize=256)
 def covered_mesh(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return the spheres of `cover` for a mesh file; cached for the process."""
+    """Return the spheres of `cover` for a mesh file; results are cached."""
     return cover(triangles(file, scale))
 
 
 def bounds(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return the lower and upper corner of the axis-aligned box around a mesh."""
+    """Return the lower and the upper corner of the axis-aligned box around a mesh."""
     corners = triangles(file, scale).reshape(-1, 3)
     return corners.min(0), corners.max(0)
 
@@ -111,9 +111,9 @@ def bounds(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]
 def cover(corners: Array) -> tuple[Array, Array]:
     """Return centres (n, 3) and radii (n,) of spheres that cover triangles (m, 3, 3) and protrude little.
 
-    The radius of a candidate is its distance from the surface, or from the convex hull if that is nearer, plus the allowed
-    protrusion: `SLACK` of the mesh's thickness, between `LEAST` and `MOST` metres. The candidate that covers most uncovered points
-    is chosen, until all points are covered.
+    The radius of a candidate sphere is its distance from the surface, or from the convex hull if the hull is nearer, plus the
+    allowed protrusion. The allowed protrusion is the share `SLACK` of the mesh's thickness, between `LEAST` and `MOST` metres.
+    The algorithm chooses the candidate that covers most uncovered points, until all points are covered.
     """
     points = _thinned(surface(corners), MOST_POINTS)
     low, high = points.min(0), points.max(0)
@@ -130,7 +130,7 @@ def cover(corners: Array) -> tuple[Array, Array]:
     while missing.any():
         counts = covers[:, missing].sum(1)
         best = int(np.argmax(counts))
-        if not counts[best]:  # the points between the surface's candidates are left
+        if not counts[best]:  # only points between the candidates on the surface are left
             left = points[missing][:1]
             candidates, radii = np.concatenate([candidates, left]), np.append(radii, slack)
             covers = np.concatenate([covers, np.linalg.norm(left - points, axis=-1)[None] <= slack])

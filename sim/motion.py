@@ -1,9 +1,9 @@
 """Collision-free motion of a hand, planned in the hand's coordinates and timed within the joints' limits.
 
-A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres; in radians the heading of its level pointing direction,
-the roll about it (0 is upright; pouring changes it), and the elbow's swivel. `confab.sim.kinematics` maps a pose to a posture.
-A path with roll 0 keeps a cup upright. The path is a straight line if that is free, otherwise the result of a short RRT-Connect
-in the same six coordinates.
+A *pose* is (x, y, z, yaw, roll, swivel). The point x, y, z of the hand is in metres. In radians, yaw is the heading of the
+hand's horizontal pointing direction, roll is the rotation about this direction, and swivel is the elbow's.
+`confab.sim.kinematics` maps a pose to a posture. A path with roll 0 keeps a cup upright. The path is a straight line if the
+line is free of collisions, otherwise the result of a short RRT-Connect in the same six coordinates.
 
 ``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
 """
@@ -26,20 +26,20 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 """Maximum distance between checked poses of a path (metres, radians)."""
 
 COARSE = 6
-"""Every sample with a number divisible by `COARSE` is checked before all others, which rejects most blocked paths early."""
+"""Interval of the samples of a path that are checked before all other samples, which rejects most blocked paths early."""
 
 JUMP = 0.35
-"""Maximum motion in radians of a joint between neighbouring poses of a path; more indicates a singularity."""
+"""Maximum motion in radians of a joint between neighbouring poses of a path; a larger motion indicates a singularity."""
 
 APPROACH_TOLERANCE = 0.001
-"""Maximum distance in metres by which a hand may still approach an obstacle within the margin while it leaves it."""
+"""Maximum distance in metres by which a hand that leaves an obstacle's margin may approach the obstacle."""
 
 FEWEST = 5
-"""Minimum number of samples of a timed path, which is at rest at both ends and accelerates and brakes in between."""
+"""Minimum number of samples of a timed path, which has to accelerate and brake between two ends at rest."""
 
 YAWS = np.linspace(-np.pi, np.pi, 48, endpoint=False)
 SWIVELS = np.linspace(-1.6, 1.6, 17)
-"""Headings of a hand, and swivels of an elbow, that are tried at a point."""
+"""Headings of a hand and swivels of an elbow that are tried at a point, in radians."""
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
@@ -54,33 +54,34 @@ class Blocked:
 
 
 class Traveller(Protocol):
-    """An arm with its hand, or a mobile base, that moves along poses."""
+    """A robot part that moves along poses: an arm with its hand, or a mobile base."""
 
     @property
     def spread(self) -> Array:
         """Size of the search region beyond start and goal (6,)."""
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the joint values at poses, and which poses are within reach."""
+        """Return the joint values at poses, and for each pose whether it is within reach."""
 
     def free(self, q: Array) -> Flags:
-        """Return the joint values at which the robot touches nothing."""
+        """Return for each row of joint values whether the robot is free of collisions."""
 
     def follow(self, poses: Array) -> Array | None:
-        """Return the joint values along poses, or None if these can't be followed."""
+        """Return the joint values along poses, or None if the robot can't follow the poses."""
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first path, among paths of sampled poses, that can be followed; None if there is none."""
+        """Return the index of the first path of sampled poses that the robot can follow, or None."""
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield via poses (n, 6) to try before a search."""
+        """Yield rows of intermediate poses (n, 6) between start and goal, to be tried before a search."""
 
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among its obstacles, from which it keeps `margin` metres: decides which paths are possible.
+    """An arm among obstacles, which decides which paths are possible.
 
-    Every joint keeps `joint_margin` radians from its limits, and `fold` radians from the stretched arm.
+    The arm keeps `margin` metres from the obstacles. Every joint keeps `joint_margin` radians from its limits, and the elbow
+    keeps `fold` radians from the stretched arm.
     """
 
     mover: Mover
@@ -100,43 +101,40 @@ class Reacher:
         return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the postures at poses, and which poses are within reach and limits."""
+        """Return the postures at poses, and for each pose whether it is within reach and joint limits."""
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
     def free(self, q: Array) -> Flags:
-        """Return the postures in which the arm touches nothing."""
+        """Return for each posture whether the arm keeps the margin to all obstacles."""
         return free(self.mover.at(q), self.mover.spheres.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
-        """Return the postures along sampled poses, or None if one is out of reach, in collision or past a singularity."""
+        """Return the postures along sampled poses, or None if a pose is out of reach, in collision or past a singularity."""
         q, valid = self.solve(poses)
         return q if self._feasible(q, valid) else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first path that can be followed; None if there is none.
-
-        All paths are solved at once, which is faster.
-        """
+        """Return the index of the first path that the arm can follow, or None; all paths are solved at once."""
         q, valid = self.solve(np.concatenate(ways))
         ends = np.cumsum([len(way) for way in ways])[:-1]
         pairs = zip(np.split(q, ends), np.split(valid, ends), strict=True)
         return next((i for i, pair in enumerate(pairs) if self._feasible(*pair)), None)
 
     def _feasible(self, q: Array, valid: Flags) -> bool:
-        """Return whether postures are within reach, continuous and free."""
+        """Return whether postures are within reach, continuous and free of collisions."""
         if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP):
             return False
         return bool(self.free(q[COARSE // 2 :: COARSE]).all() and self.free(q).all())
 
     def begin(self, poses: Array) -> Array | None:
-        """Return the postures of the longest beginning of sampled poses that `follow` accepts, or None if it refuses the first."""
+        """Return the postures of the longest beginning of sampled poses that the arm can follow, or None if there is none."""
         q, valid = self.solve(poses)
         smooth = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(1) <= JUMP
         end = _first(np.all([valid, self.free(q), smooth], axis=0))
         return q[:end] if end else None
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield via poses above the obstacles and closer to the body."""
+        """Yield intermediate poses that are higher, or closer to the robot's body, than the middle of start and goal."""
         for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
             middle = (start + goal) / 2
             heading = np.array([np.cos(middle[3]), np.sin(middle[3])])
@@ -145,7 +143,7 @@ class Reacher:
             yield middle[None]
 
     def blame(self, poses: Array) -> Blocked:
-        """Return why `follow` refuses the poses."""
+        """Return why `follow` rejects the poses."""
         q, valid = self.solve(poses)
         if not valid.all():
             return Blocked("unreachable")
@@ -175,14 +173,14 @@ def turned_near(start: Array, goal: Array) -> Array:
 
 
 def beyond(arm: Arm, poses: Array) -> float:
-    """Return the metres by which the nearest of some poses exceeds the arm's length; 0 if only joint limits forbid it."""
+    """Return the metres by which the nearest pose exceeds the arm's length; 0 if the pose is near enough."""
     wrists = poses[:, :3] + (rotations(poses) @ arm.tip_rotation.T) @ (arm.wrist - arm.tip)
     distance = float(np.linalg.norm(wrists - arm.shoulder, axis=-1).min())
     return max(distance - arm.length, 0.0)
 
 
 def pose_of(arm: Arm, q: Array) -> Array:
-    """Return the pose (6,) of one posture (k,) whose hand points level."""
+    """Return the pose (6,) of a posture (k,) whose hand points horizontally."""
     r, p = hand_frames(arm, q[None])
     yaw = np.arctan2(r[0, 1, 0], r[0, 0, 0])
     roll = np.arctan2(r[0, 2, 1], r[0, 2, 2])
@@ -214,11 +212,11 @@ def connect(
     Parameters
     ----------
     goals : sequence of array (6,)
-        In order of preference; a search grows from all of them at once.
+        The goal poses in order of preference. A search grows from all goals at once.
     attempts : int
         Maximum number of samples.
     """
-    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # the search must not end at the others
+    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # others can't end the search
     if within and reacher.follow(line(start, goals[within[0]])) is not None:
         return within[0], np.stack([start, goals[within[0]]])
     for i in within:
@@ -235,10 +233,7 @@ def connect(
 
 
 def leave(reacher: Reacher, start: Array) -> Array | None:
-    """Return a free pose at the end of a line from `start` that comes no nearer to any obstacle than `start`.
-
-    None if there is none.
-    """
+    """Return a collision-free pose at the end of a line from `start` on which the hand approaches no obstacle, or None."""
     ahead = np.array([np.cos(start[3]), np.sin(start[3]), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
     for metres in (0.03, 0.06, 0.1, 0.15):
@@ -277,7 +272,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree towards `target` by the free part of the line, limited unless `greedy`; return the new pose or None."""
+    """Extend a tree by the free part of the line to `target`; return the new pose or None. Without `greedy`, it is limited."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:
@@ -300,7 +295,7 @@ def _first(good: Flags) -> int:
 
 
 def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
-    """Return the poses from a tree's root to its last node `met`, where both trees meet."""
+    """Return the poses from a tree's root to its last node `met`, at which both trees meet."""
     way, i = [met], back[-1]
     while i >= 0:
         way.append(nodes[i])
@@ -309,7 +304,7 @@ def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
 
 
 def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
-    """Replace the part between two random points of the path by a straight line if that is free; repeat this `attempts` times."""
+    """Replace the part of a path between two random points by a straight line if it is free; try `attempts` times."""
     for _ in range(attempts):
         if len(corners) < 3:
             break
@@ -335,7 +330,7 @@ def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, atte
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Limits of a motion: joint speeds (k,) and acceleration in radians, the hand's speed and acceleration in metres."""
+    """Limits of speed and acceleration: of the joints in radians, and of the hand in metres."""
 
     velocity: Array
     acceleration: float
@@ -344,7 +339,7 @@ class MotionLimits:
 
 
 def smooth(q: Array, window: int = 3) -> Array:
-    """Return postures with corners rounded by a moving average that keeps both ends."""
+    """Return postures whose corners are rounded by a moving average; both ends are kept."""
     out = q.copy()
     for i in range(1, len(q) - 1):
         half = min(window, i, len(q) - 1 - i)
@@ -355,8 +350,8 @@ def smooth(q: Array, window: int = 3) -> Array:
 def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array, Array]:
     """Return positions and velocities (m, k) at `rate` hertz along postures (n, k), as fast as the limits allow.
 
-    The timing is optimal along the path except for one simplification: half of a joint's acceleration is reserved for the path's
-    curvature and half for the change of speed, so that each can be bounded by itself.
+    The timing along the path is optimal except for one simplification: half of a joint's acceleration is reserved for the
+    path's curvature and half for the change of speed, so that both can be bounded separately.
     """
     if len(q) < 2 or np.abs(q - q[0]).max() < 1e-9:
         return q[-1:], np.zeros((1, q.shape[1]))
@@ -370,7 +365,7 @@ def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array,
 
 
 def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities at `rate` hertz along samples `q`; `rows` keep to speeds `top` and accelerations `most`."""
+    """Return positions and velocities at `rate` hertz along samples `q`; `rows` obey the speeds `top` and accelerations `most`."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
     push = most / 2
@@ -388,7 +383,7 @@ def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tu
 
 
 def _sampled(q: Array, speed: Array, clock: Array, rate: float) -> tuple[Array, Array]:
-    """Resample a path by time; the path parameter has constant acceleration between its samples."""
+    """Resample a path at `rate` hertz; the path parameter has constant acceleration between its samples."""
     times = np.arange(1, int(np.ceil(clock[-1] * rate)) + 1) / rate
     times = np.minimum(times, clock[-1])
     i = np.minimum(np.searchsorted(clock, times, side="right") - 1, len(q) - 2)
@@ -402,7 +397,7 @@ def _sampled(q: Array, speed: Array, clock: Array, rate: float) -> tuple[Array, 
 
 
 def comfort(arm: Arm, q: Array) -> Array:
-    """Return the discomfort (n,) of postures (n, k): distance from the middle of the joints' ranges, steep near the limits."""
+    """Return the costs (n,) of postures (n, k), which grow steeply as joints approach their limits."""
     middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
     cost: Array = np.sum(((q - middle) / half) ** 8, -1)
     return cost

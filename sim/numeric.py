@@ -1,8 +1,8 @@
 """Inverse kinematics of arms without a closed form: damped least squares within the joints' limits.
 
-The arm at rest is turned about its first axis until it points to the goal, and the hand is led straight to the goal in several
-stretches. So equal poses have equal postures, and neighbouring poses have neighbouring postures unless the arm has to
-reconfigure. If that fails, further searches start from postures drawn with a fixed seed.
+The search starts from the rest posture, turned about the arm's first axis until the arm points to the goal. The hand is then
+led straight to the goal in several stretches. So equal poses have equal postures, and neighbouring poses have neighbouring
+postures unless the arm has to reconfigure. If this search fails, further searches start from random postures with a fixed seed.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ from confab.sim.arms import Arm, Flags, cross, hand_frames, link_transforms, tur
 from confab.sim.urdf import Array
 
 REDUNDANT = 2
-"""Index of the joint of a seven-joint arm whose angle, from the middle of its limits, is the swivel."""
+"""Index of the joint of a seven-joint arm whose angle from the middle of its limits is the swivel."""
 
 STRETCHES, EACH = 6, 3
-"""Number of stretches in which the hand is led from its pose at rest, and number of search steps for each."""
+"""Number of stretches in which the hand is led to its goal, and number of search steps for each stretch."""
 
 STARTS, AROUND = 6, 1.5
-"""Number of random start postures, and maximum deviation in radians of their joints from the posture at rest."""
+"""Number of random start postures, and maximum deviation in radians of their joints from the rest posture."""
 
 STEPS, STRIDE = 30, 0.6
 """Maximum number of steps of a search, and maximum motion in radians of a joint in one step."""
 
 EXACT, CLOSE = 1e-10, 1e-7
-"""Errors in metres and radians at which a search ends early, and up to which its result is valid."""
+"""Error in metres and radians at which a search ends early, and maximum error of a valid result."""
 
 DAMPING = 1e-6
-"""Damping of the normal equations in addition to the error. More damping is slower; less is unstable near singularities."""
+"""Damping of the normal equations in addition to the error. More damping is slower, and less damping is unstable."""
 
 SINGULAR = 0.45
-"""Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between them."""
+"""Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between the limbs."""
 
 
 def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: float) -> tuple[Array, Flags]:
-    """Return postures (n, k) with the hand at rotations `r` and points `p`, and which are valid; see `kinematics.inverse`."""
+    """Return postures (n, k) with the hand at rotations `r` and points `p`, and validity flags; see `kinematics.inverse`."""
     low, high = arm.lower + margin, arm.upper - margin
     found, valid = np.tile(np.clip(arm.home, low, high), (len(p), 1)), np.zeros(len(p), dtype=bool)
     if arm.swivels:
@@ -71,7 +71,7 @@ def _free(arm: Arm) -> list[int]:
 
 
 def _led_postures(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> Array:
-    """Return the postures (n, k) near the goal poses that the arm reaches when the hand is led there from postures `q`."""
+    """Return the postures (n, k) near the goal poses to which the hand is led in stretches from postures `q`."""
     axis, foot = arm.axes[0], arm.origins[0]
     ahead, wanted = hand_frames(arm, q)[1] - foot, p - foot
     round_it = np.arctan2(cross(ahead, wanted) @ axis, (ahead * wanted).sum(-1) - (ahead @ axis) * (wanted @ axis))
@@ -86,7 +86,7 @@ def _led_postures(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: A
 
 
 def _search(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array, steps: int) -> tuple[Array, Flags]:
-    """Return the postures (n, k) at which searches from `q` end, and which of them reach the goal.
+    """Return the postures (n, k) at which searches from `q` end, and flags of the searches that reach the goal.
 
     The goal is the rotation `last` of the last link relative to the zero posture, and the hand's point `p`.
     """
@@ -110,7 +110,7 @@ def _search(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array, 
 
 
 def _error(arm: Arm, q: Array, last: Array, p: Array) -> tuple[Array, Array]:
-    """Return the hand's error (n, 6), metres and radians, and the Jacobian (n, 6, k)."""
+    """Return the hand's error (n, 6) in metres and radians, and the Jacobian (n, 6, k)."""
     rotations, shifts = link_transforms(arm, q)
     tip = np.einsum("nij,j->ni", rotations[:, -1], arm.tip) + shifts[:, -1]
     axes = np.einsum("nkij,kj->nki", rotations, arm.axes)

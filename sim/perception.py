@@ -1,8 +1,9 @@
-"""Perceivers: each one reads the values of a kind of situation type from the world, and can set them up in a new world.
+"""Perceivers: functions that read the values of situation types from a world, and that set values up in a new world.
 
-`BUILT_IN` lists them. `observe` returns the value that holds for the arguments, or None; `arrange` makes a value true in the draft
-of a new world; `code` is the failure code of a primitive whose expected value is not observed. The ontology states the perceiver of
-each situation type, its thresholds (metres, newtons, radians, numbers) and the individuals that stand for its special values.
+Each situation type of the ontology has a perceiver, thresholds (in metres, newtons and radians) and individuals that stand for
+special values. `BUILT_IN` lists the perceivers of this package. The function `observe` returns the value that holds for the
+arguments, or None. The function `arrange` makes a value true in the draft of a new world. `code` is the failure code of a
+primitive whose expected value is not observed.
 Perceivers of other packages register as entry points of the group `confab.perceivers`.
 """
 
@@ -39,9 +40,9 @@ class Draft:
 
 @dataclass(frozen=True)
 class Perceiver:
-    """The functions that read a kind of situation type from the world and set it up, and its failure code.
+    """The functions that read and set up values of situation types, and a failure code.
 
-    `spatial` says that the values are positions. `measure` returns the numbers that determine the value, and their thresholds.
+    `spatial` is true if the values are positions. `measure` returns the measured numbers that determine the value.
     """
 
     observe: Callable[[Engine, PerceiverUse, tuple[str, ...]], str | None]
@@ -52,7 +53,7 @@ class Perceiver:
 
 
 def tilt_of(rotation: Array) -> float:
-    """Return the angle in radians between a frame's z axis and up."""
+    """Return the angle in radians between a frame's z axis and the vertical."""
     return float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
 
 
@@ -74,7 +75,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def measure_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> Mapping[str, float]:
-    """Return the distances of an object from the nearest place, sideways and upwards, and its tilt."""
+    """Return the horizontal and vertical distance of an object from the nearest place, and the object's tilt."""
     if not world.knows(arguments[0]) or not world.embodiment.places:
         return {}
     rotation, position = world.sense(arguments[0])
@@ -89,7 +90,7 @@ def measure_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Put the object at a place; a world can't begin with an object in a hand."""
+    """Put the object at a place; raise `ValueError` for an object in a hand, since hands are empty in a new world."""
     if value == use.values["in_hand"]:
         raise ValueError(f"a world cannot begin with {arguments[0]} in a hand: let it stand at a place")
     draft.places[arguments[0]] = value
@@ -99,7 +100,7 @@ def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def observe_content(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the filling of which the vessel contains most, or `empty` if it contains less than `least` servings."""
+    """Return the main filling of the vessel, or `empty` if the vessel contains less than `least` servings of each filling."""
     if not world.knows(arguments[0]):
         return None
     amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings if name in use.choices}
@@ -135,9 +136,9 @@ def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the position to which a hand's own motions have brought it: `raised`, an object, or a place.
+    """Return the position to which a hand has moved: `raised`, an object, or a place.
 
-    Return None if the hand was stopped on its way, or if the object at its position has left and the hand doesn't hold it.
+    Return None if the hand was stopped on its way, or if the object at its position has moved away without the hand.
     """
     hand = arguments[0]
     at = world.hands[hand].at
@@ -155,7 +156,7 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
 
 
 def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a hand is `upright` or `tilted`, or None in between."""
+    """Return `upright` or `tilted` for a hand, or None for a tilt between the two thresholds."""
     angle = tilt_of(world.hands[arguments[0]].frame()[0])
     if angle <= use.numbers["upright_angle"]:
         return use.values["upright"]
@@ -166,7 +167,7 @@ def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a link's joint is `opened` or `shut`, or None in between."""
+    """Return `opened` or `shut` for a link, or None for a joint value between the two thresholds."""
     name = arguments[0]
     if name not in world.links:
         return None
@@ -194,7 +195,7 @@ def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a known object is hidden by anything but a robot."""
+    """Return whether a known object is hidden, except by a robot."""
     name = arguments[0]
     if not world.knows(name):
         return None
@@ -203,14 +204,14 @@ def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]
 
 
 def arrange_nothing(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Do nothing: the value follows from the positions of objects."""
+    """Do nothing, since the value follows from the positions of objects."""
 
 
 # ------------------------------------------------------------------------------------------ stands of robots
 
 
 def observe_stand(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the stand whose position and heading the robot's base has, or None."""
+    """Return the stand at whose position and heading the robot's base is, or None."""
     if arguments[0] not in world.bases:
         return None
     for name, stand in world.embodiment.stands.items():
@@ -229,10 +230,10 @@ def arrange_stand(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]:
-    """Return an `arrange` function for hands. They are at rest in a new world, so only the value `special` can be set up."""
+    """Return an `arrange` function that accepts only the value `special`, since hands are at rest in a new world."""
 
     def arrange(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-        """Accept the rest value; raise `ValueError` for any other."""
+        """Accept the rest value; raise `ValueError` for any other value."""
         if value != use.values[special]:
             raise ValueError(
                 f"a world cannot begin with {use.situation} of {arguments[0]} {value}: only {use.values[special]}"
@@ -256,7 +257,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
 
 
 def perceiver(name: str) -> Perceiver:
-    """Return the perceiver of that name, built in or an entry point; raise `KeyError` with the built-in names if there is none."""
+    """Return the built-in perceiver or the entry point of the given name; raise `KeyError` if there is none."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     for point in entry_points(group="confab.perceivers", name=name):

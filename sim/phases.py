@@ -1,8 +1,8 @@
-"""The interpreter of skills: executes the phases that the ontology describes, one after another.
+"""The interpreter of skills, which executes the phases that the ontology describes one after another.
 
-A phase moves the fingers, then the hand relative to a feature of a thing; then its checks must hold. A `free` motion chooses a pose
-at its feature that allows every phase up to the next free one, including phases that are only foreseen: to open a door, the grasp
-of the handle is chosen such that it is still possible when the door is open.
+A phase first moves the fingers, and then the hand relative to a feature of a thing. Afterwards the checks of the phase must
+hold. A `free` motion chooses a pose at its feature from which all phases before the next free motion are possible. For
+example, the grasp of a door handle is chosen so that the hand can hold the handle until the door is open.
 
 ============ ======================================================================================================
 motion       path of the hand
@@ -14,7 +14,7 @@ joint        along the joint's path, with corrections by touch
 rise         straight up to `above` the support that the load has left, with the elbow free to turn
 home         to the posture at rest
 drive        the whole robot to a stand, with the arms at rest
-over         with a vessel to a pose above another one, from which it can be tilted (`confab.sim.pouring`)
+over         with a vessel to a pose above another vessel, from which it can be tilted (`confab.sim.pouring`)
 ============ ======================================================================================================
 """
 
@@ -45,27 +45,27 @@ from confab.sim.verdict import REFUTED, SkillError
 from confab.sim.whereabouts import arrived, floor_below, stopping
 
 LOOKS = 3
-"""Number of attempts at a motion with noisy perception before its failure counts; there is a new look before each attempt."""
+"""Maximum number of attempts at a motion with noisy perception. The robot looks again before each attempt."""
 
 ANCHORS = 8
-"""Number of stretches of a joint's path, each planned from the present positions of hand and joint."""
+"""Number of stretches of a joint's path. Each stretch is planned from the present positions of hand and joint."""
 
 ASIDE = sorted(
     product((0.0, -0.08), (0.0, -0.1, 0.1, -0.2, 0.2), (0.0, 0.1, 0.2)), key=lambda shift: sum(map(abs, shift))
 )
-"""Shifts in metres of the home pose, tried in turn from the smallest on."""
+"""Shifts in metres of the home pose, which are tried in turn, the smallest first."""
 
 SLACK = 0.1
-"""Margin in radians to the limits of the arm's joints in planning a joint's path, left for corrections on the way."""
+"""Margin in radians to the limits of the arm's joints in the plan of a joint's path, which leaves room for corrections."""
 
 TURNED = 0.02
 """Margin in radians to the limits of the arm's joints if noise or a narrow grasp may require corrections."""
 
 NARROW = 0.02
-"""Opening in metres of each finger at a handle with little room beside it."""
+"""Opening in metres of each finger at a handle with little room beside the handle."""
 
 FAR = 1e3
-"""Coordinate in metres that marks a pose as impossible, since it is out of reach."""
+"""Coordinate in metres, beyond reach, that marks a pose as impossible."""
 
 
 def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping[str, float]:
@@ -89,7 +89,7 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
 
 
 def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
-    """Return the bodies that the skill may have moved: its object if fingers moved, and the loads of a driving robot."""
+    """Return the bodies that a skill may have moved: the object if fingers moved, and all held bodies if the robot drove."""
     carried = [run.world.held(hand) for hand in run.world.hands] if "robot" in run.roles else []
     taken = [run.roles["object"] for phase in phases if phase.fingers and "object" in run.roles]
     return tuple(name for name in (*taken, *carried) if name)
@@ -109,7 +109,7 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
 
 
 def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> None:
-    """Do a motion; if it lifts and is blocked, try it with the next lower height to lift to."""
+    """Execute a motion; if a lifting motion is blocked, try lower heights in turn."""
     if "least_raised" not in run.numbers or not any("raised" in phase.above for phase in phases):
         motion()
         return
@@ -129,7 +129,7 @@ def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> Non
 
 
 def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
-    """Do a motion; with noisy perception, look again and repeat it if it was blocked or stopped by a known body."""
+    """Execute a motion; with noisy perception, look again and repeat a motion that a known body blocked or stopped."""
     world, hand = run.world, run.attempt.hand
     for looks in range(1, LOOKS + 1):
         try:
@@ -150,7 +150,7 @@ def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
 
 
 def _offset(run: Run, phase: Phase, turned: Array) -> Array:
-    """Return the shifts (n, 3) by a phase's offset of hands with rotations `turned` (n, 3, 3)."""
+    """Return the shifts (n, 3) that a phase's offset states for hands with rotations `turned` (n, 3, 3)."""
     local = np.array([run.number(part) for part in phase.offset])
     if phase.bring == "base":
         attempt = run.attempt
@@ -182,9 +182,9 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
 
 
 def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
-    """Return the poses (n, 6) of hands that hold a feature while its joint moves from the first value to each of the values.
+    """Return, for each joint value, the poses (n, 6) of hands that hold a feature while its joint moves from the first value.
 
-    The hand keeps its pose in the feature's frame except for its turn about z: towards `way.last`, or as needed to stay level.
+    The hand keeps its pose in the feature's frame except for a turn about z, towards `way.last` or to stay level.
     """
     mechanic, link = run.joint(phase.to)
     frames = [run.at(phase.to, {**mechanic.values(), link: value}) for value in values]
@@ -203,7 +203,7 @@ def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[floa
         poses = hand.copy()
         poses[:, :3] = frame.point + np.einsum("nij,nj->ni", frame.rotation @ about, points)
         poses[:, 3], poses[:, 4] = np.arctan2(r[:, 1, 0], r[:, 0, 0]), np.arctan2(r[:, 2, 1], r[:, 2, 2])
-        poses[np.abs(r[:, 2, 0]) > 0.05, 0] = FAR  # a hand points level
+        poses[np.abs(r[:, 2, 0]) > 0.05, 0] = FAR  # a hand points horizontally
         found.append(poses)
     return found
 
@@ -212,7 +212,7 @@ def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[floa
 
 
 def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways, list[int]]:
-    """Return the candidate goal poses of a free motion, their grasps, and the numbers of those that allow all later phases."""
+    """Return candidate goal poses of a free motion, their grasps, and the indices of candidates that allow all later phases."""
     chain = [phase]
     for one in later:
         if one.motion not in ("", "line", "yielding", "joint"):
@@ -240,7 +240,7 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
 
 
 def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
-    """Return the candidates that allow all stages: with room for corrections if possible, otherwise with narrower fingers."""
+    """Return the candidates that allow all stages, with room for corrections if possible, or with narrower fingers if needed."""
     narrow = any(one.motion == "yielding" and room(run, run.feature_of(one.to)[0]) < ROOM for one in chain)
     if narrow or run.world.blur:
         with suppress(SkillError):  # corrections on the way are impossible with a stretched arm
@@ -256,7 +256,7 @@ def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[
 
 
 def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:
-    """Return the stages of a joint's path, each with the link at its value; raise `SkillError` if a body blocks the link."""
+    """Return one stage for each of several values on a joint's path; raise `SkillError` if a body blocks the link."""
     mechanic, link = run.joint(phase.to)
     values = np.linspace(mechanic.values()[link], run.number(phase.value, link), SAMPLES)
     held, name = run.attempt.held, run.attempt.hand.hand.name
@@ -271,7 +271,7 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
 
 def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     """Move to one of the poses that allow all later phases."""
-    goals, way, chosen = _choose(run, phase, later)  # fails, if at all, before the fingers move
+    goals, way, chosen = _choose(run, phase, later)  # a failure happens before the fingers move
     FINGERS[phase.fingers](run, phase)
     opening = run.spread if phase.fingers == "open" else None
     best = chosen[
@@ -286,7 +286,7 @@ def _line(run: Run, phase: Phase) -> None:
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
     stop = until(run, phase)
     speed = run.number(phase.speed)
-    if stop is not None:  # the guard ends the motion, and with noise the object may be farther away
+    if stop is not None:  # with noise the object may be farther away
         ahead = goal[:3] - hand.pose[:3]
         goal[:3] += 2 * run.world.noise * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, stop=stop)
@@ -300,7 +300,7 @@ def _yielding(run: Run, phase: Phase) -> None:
 
 
 def _joint(run: Run, phase: Phase) -> None:
-    """Move a joint along its path in stretches, each planned from the present positions of hand and joint."""
+    """Move a joint along its path in stretches; each stretch is planned from the present positions of hand and joint."""
     mechanic, link = run.joint(phase.to)
     goal, stop, attempt = run.number(phase.value, link), until(run, phase), run.attempt
     way = run.way
@@ -364,7 +364,7 @@ MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "over": _over,
     "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
-"""The functions that execute motions; `_free` executes ``free``."""
+"""The functions that execute motions, except that `_free` executes ``free``."""
 
 
 WITHDRAWING = ("free", "home")
@@ -377,4 +377,4 @@ CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
     "place": lambda run: run.roles.get("target", "") in run.world.embodiment.places,
     "thing": lambda run: run.roles.get("target", "") not in run.world.embodiment.places,
 }
-"""Conditions under which a phase is executed: on the load at the beginning of the skill, and on its target."""
+"""Conditions for the execution of a phase, on the load at the beginning of the skill and on the skill's target."""

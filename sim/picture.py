@@ -1,8 +1,8 @@
-"""Pictures of the world without a screen or graphics card: opaque bodies by PyBullet's renderer, vessels and drops by ray casting.
+"""Pictures of the world without a screen or graphics card.
 
-PyBullet's software renderer has no translucency, and is slow with hundreds of small spheres. So it draws only the robot,
-furniture and solid objects. Drops (spheres) and vessels (surfaces of revolution) are then cast pixel by pixel against its depth
-image. The result looks better and takes a fifth of the time. Metres; images are (height, width, 3) of uint8.
+PyBullet's software renderer draws the robot, furniture and solid objects. It has no translucency, and is slow with hundreds of
+small spheres. Therefore ray casting against PyBullet's depth image draws drops (spheres) and vessels (surfaces of revolution),
+in a fifth of the time. Lengths are in metres. Images are arrays (height, width, 3) of uint8.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ MARGIN = 22
 """Width in pixels of the picture's empty border."""
 
 TALL, LEGS = 0.30, 0.12
-"""Metres above and below a place that a picture shows."""
+"""Distances in metres above and below a place that a picture shows."""
 
 EDGE = 14.0
-"""Minimum difference in brightness, of 255, between neighbouring pixels on an edge."""
+"""Minimum difference in brightness, on a scale up to 255, between neighbouring pixels on an edge."""
 
 SKY, GROUND = np.array([236.0, 241.0, 247.0]), np.array([196.0, 205.0, 216.0])
 """Colours of the backdrop at the top and at the bottom."""
@@ -71,12 +71,12 @@ class Camera:
 
     @cached_property
     def focal(self) -> float:
-        """Pixels per unit of tangent."""
+        """Focal length in pixels."""
         return self.height / 2 / float(np.tan(np.radians(self.field) / 2))
 
     @cached_property
     def rays(self) -> Array:
-        """Directions (height, width, 3) of the pixels, of length 1 along the forward axis."""
+        """Directions (height, width, 3) of the pixels' rays, with length 1 along the forward axis."""
         x = (np.arange(self.width) + 0.5 - self.width / 2) / self.focal
         y = (self.height / 2 - np.arange(self.height) - 0.5) / self.focal
         right, up, forward = self.axes
@@ -115,7 +115,7 @@ def view_of(
     around: float = 0.0,
     down: float = DOWN,
 ) -> Camera:
-    """Return the nearest camera, on the side opposite the robots, that shows robots and tables completely.
+    """Return the nearest camera, on the side opposite the robots, that shows robots and furniture completely.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def view_of(
     below : int
         Pixels at the bottom that are reserved for a caption.
     around : float
-        Radians by which the camera stands farther around the tables, counterclockwise from above.
+        Angle in radians, counterclockwise from above, by which the camera is turned about the tables.
     down : float
         Tangent of the angle by which the camera looks down.
     """
@@ -143,7 +143,7 @@ def view_of(
     x, y, z = look.axes @ _seen(embodiment).T
     wide = (width / 2 - MARGIN) / look.focal
     up, low = (height / 2 - MARGIN) / look.focal, (height / 2 - MARGIN - below) / look.focal
-    # A point is in the picture if |x - eye| <= wide (z - eye) and so on: the nearest eye for which all are.
+    # A point is in the picture if |x - eye| <= wide (z - eye), and likewise for y. Find the nearest eye that sees all points.
     depth = min(
         float((x + wide * z).min() - (x - wide * z).max()) / (2 * wide),
         float((y + low * z).min() - (y - up * z).max()) / (up + low),
@@ -155,7 +155,7 @@ def view_of(
 
 
 def _seen(embodiment: Embodiment) -> Array:
-    """Return points (n, 3) that a picture has to show: corners of furniture, room above places, robots at rest."""
+    """Return points (n, 3) that a picture has to show: corners of furniture, points above places, and robots at rest."""
     places, around = with_open_mechanisms(embodiment)
     points: list[Array] = []
     for solid in around:
@@ -188,7 +188,7 @@ def _three(point: Array) -> tuple[float, float, float]:
 
 
 def hide_vessels(world: Engine) -> None:
-    """Hide vessels from PyBullet's renderer, since `picture` draws them."""
+    """Hide vessels from PyBullet's renderer, since `picture` draws the vessels."""
     for thing in world.bodies.values():
         if thing.shape.kind == "vessel":
             pybullet.changeVisualShape(thing.body, -1, rgbaColor=[1, 1, 1, 0], physicsClientId=world.client)
@@ -213,7 +213,7 @@ def picture(world: Engine, camera: Camera) -> Array:
 
 
 def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> None:
-    """Darken table tops in the shadows of hands and bodies; the higher they are, the softer is the shadow."""
+    """Darken table tops in the shadows of arms and bodies; a higher body casts a softer shadow."""
     casters = list(_casters(world))
     for fixture in world.embodiment.fixtures:
         top = fixture.position[2] + fixture.size[2] / 2
@@ -238,7 +238,7 @@ def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> 
 
 @lru_cache(maxsize=8)
 def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
-    """Return for each pixel the distance at which its ray meets the horizontal plane at `height`, and x and y of that point."""
+    """Return for each pixel the distance to the horizontal plane at `height` along its ray, and x and y of the point there."""
     with np.errstate(divide="ignore"):
         distance = (height - camera.eye[2]) / camera.rays[..., 2]
     distance = np.where(np.isfinite(distance) & (distance > 0), distance, 1e6)
@@ -259,7 +259,7 @@ def _casters(world: Engine) -> Iterator[tuple[Array, float]]:
 
 
 def _opaque(world: Engine, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return PyBullet's picture on a backdrop, and the depth of each pixel along the forward axis."""
+    """Return PyBullet's picture in front of a backdrop, and the depth of each pixel along the forward axis."""
     _, _, colors, buffer, _ = pybullet.getCameraImage(
         camera.width,
         camera.height,
@@ -286,7 +286,7 @@ def _opaque(world: Engine, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _soften(image: NDArray[Any]) -> None:
-    """Blend pixels on edges with their neighbours: PyBullet's renderer draws edges as stairs."""
+    """Blend pixels on edges with their neighbours, since PyBullet's renderer draws edges as stairs."""
     height, width = image.shape[:2]
     green = image[..., 1]
     across, down = np.abs(np.diff(green, axis=1)) > EDGE, np.abs(np.diff(green, axis=0)) > EDGE
@@ -315,7 +315,7 @@ def _drops(world: Engine) -> Iterator[tuple[Array, float, Array]]:
 
 
 def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radius: float, color: Array) -> None:
-    """Draw a shaded sphere unless a nearer object covers it."""
+    """Draw the pixels of a shaded sphere that no nearer object covers."""
     window = camera.window(center, radius)
     if window is None:
         return
@@ -335,9 +335,9 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
 def _look(
     camera: Camera, rotation: Array, base: Array, shape: Shape
 ) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
-    """Return the window of a vessel in the picture, the rays and the eye in the vessel's frame, and its outer heights and radii.
+    """Return a vessel's window in the picture, its rays and the eye in the vessel's frame, and its outer heights and radii.
 
-    None if the vessel lies outside the picture.
+    Return None if the vessel lies outside the picture.
     """
     heights, radii = np.array(shape.profile).T
     radii = radii + wall(shape)
@@ -349,7 +349,7 @@ def _look(
 
 
 def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Draw an opaque vessel unless a nearer object covers it: the wall that a ray meets first, or the bottom inside."""
+    """Draw the pixels of an opaque vessel's wall and inner bottom that no nearer object covers."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return
@@ -372,7 +372,7 @@ def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, ba
 
 
 def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Blend the far and the near wall of a vessel over the picture; a wall is more transparent where the view is perpendicular."""
+    """Blend the far and the near wall of a translucent vessel over the picture; perpendicular views are more transparent."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return
@@ -394,7 +394,7 @@ def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, bas
 
 
 def _walls(origin: Array, rays: Array, heights: Array, radii: Array) -> tuple[Array, Array]:
-    """Return the distances at which rays first enter and last leave a surface of revolution; infinite where they miss."""
+    """Return the distances at which rays first enter and last leave a surface of revolution, infinite for rays that miss it."""
     near, far = np.full(rays.shape[:2], np.inf), np.full(rays.shape[:2], -np.inf)
     for (h0, r0), (h1, r1) in pairwise(zip(heights, radii, strict=True)):
         slope = (r1 - r0) / (h1 - h0)
@@ -413,7 +413,7 @@ def _walls(origin: Array, rays: Array, heights: Array, radii: Array) -> tuple[Ar
 
 
 def _normals(point: Array, heights: Array, radii: Array) -> Array:
-    """Return unit normals of a surface of revolution at points on it."""
+    """Return unit normals of a surface of revolution at points on the surface."""
     segment = np.clip(np.searchsorted(heights, point[..., 2]) - 1, 0, len(heights) - 2)
     slope = (np.diff(radii) / np.diff(heights))[segment]
     out = point[..., :2] / np.maximum(np.linalg.norm(point[..., :2], axis=-1, keepdims=True), 1e-9)

@@ -1,7 +1,7 @@
-"""Pouring: a held vessel is rolled about its lip, which stays over the other vessel, until a serving has left it.
+"""Pouring: a held vessel is rolled about its lip, which stays over the target vessel, until a serving has left the vessel.
 
-The controller watches the flow: it rolls on slowly while nothing flows, waits while the beverage flows, and rolls the vessel
-back when enough has left. The remaining beverage stays behind the vessel's shoulder.
+The controller measures the flow. The vessel rolls on slowly while nothing flows, waits while the beverage flows, and rolls back
+when enough has left.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError, named
 
 SIDES = (1.0, -1.0)
-"""Directions of roll: to the hand's right, to its left."""
+"""Directions of roll: to the right and to the left of the hand."""
 
 FOLD = 0.1
-"""Margin in radians to the stretched arm. It is kept if possible, since the load slips a little on the way."""
+"""Margin in radians to the stretched arm, kept if possible, since the load slips a little on the way."""
 
 SHARES = (1.0, 0.95, 0.9, 0.8)
 """Shares, tried in turn, of the shift that keeps the lip in place while a hand rolls back."""
@@ -49,12 +49,12 @@ SUFFICIENT = 0.9
 SURPLUS = 0.25
 """Fraction of a serving that should stay in the source in addition to whole servings: half of the tolerance of rounding.
 
-Beads that are stuck in a neck come all at once and cannot be put back, whereas a missing amount only takes another tilt.
+Too little can be corrected by another tilt. Too much can't be put back, and beads that are stuck in a neck come all at once.
 """
 
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
-    """Carry the held vessel to a pose from which it can be tilted with its lip over the target's opening."""
+    """Carry the held vessel to a pose from which the vessel can be tilted with its lip over the target's opening."""
     source = attempt.held or ""
     yaw, swivel = (np.tile(part, len(SIDES)) for part in fan())
     side = np.repeat(SIDES, len(yaw) // len(SIDES))
@@ -70,11 +70,11 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
 
 
 def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
-    """Pour a serving: roll about the lip until the serving has left the source, then roll back until the flow ends."""
+    """Pour a serving: roll the source about its lip until the serving has left, then roll back until the flow ends."""
     attempt = Attempt.begin(world, roles["hand"])
     source, target = roles["source"], attempt.body(roles["target"])
     if attempt.held != source:
-        raise SkillError("slip or drop", (source,), "it isn't in the hand")
+        raise SkillError("slip or drop", (source,), f"{source} isn't in the hand")
     filling = _filling(world, source)
     serving = world.embodiment.fillings[filling].serving if filling is not None else 1
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
@@ -95,7 +95,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
         steepest = max(steepest, servo.angle)
         servo.turn(numbers["hold_back"], numbers["fast"])
         world.run(round(numbers["settle"] * world.rate))
-        more = more and poured() < nearly  # less was in flight than estimated
+        more = more and poured() < nearly  # fewer beads were in flight than estimated
     measured = {"steepest_rad": steepest, "tilt_rad": tilt_of(attempt.hand.frame()[0])} | attempt.check_grip(numbers)
     if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
         raise SkillError("tracking error", world.touching(attempt.hand), **measured)
@@ -111,7 +111,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
 
 
 def _check_pour(source: str, target: str, measured: Mapping[str, float], numbers: Numbers) -> None:
-    """Raise `SkillError` if too little arrived or too much was spilled."""
+    """Raise `SkillError` if too little beverage arrived in the target, or if too much was spilled."""
     if measured["spilled"] > numbers["most_spilled"]:
         raise SkillError("spill", (source, target), **measured)
     if measured["poured"] < numbers["least_poured"]:
@@ -147,7 +147,7 @@ def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> 
 
 
 def _filling(world: Engine, vessel: str) -> str | None:
-    """Return the filling of which a vessel contains most, or None if it is empty."""
+    """Return the main filling of a vessel, or None if the vessel is empty."""
     amounts = {name: world.amount(vessel, name) for name in world.embodiment.fillings}
     best = max(amounts, key=amounts.__getitem__, default=None)
     return best if best is not None and amounts[best] > 0 else None
@@ -157,7 +157,7 @@ def _filling(world: Engine, vessel: str) -> str | None:
 
 
 def _lip(attempt: Attempt, vessel: str, side: Array) -> tuple[float, Array]:
-    """Return a held vessel's height, and its lip (n, 3) in the hand's frame for each `side` (n,)."""
+    """Return the height of a held vessel, and the vessel's lip (n, 3) in the hand's frame for each `side` (n,)."""
     shape = attempt.world.bodies[vessel].shape
     rotation, base = attempt.world.in_hand(attempt.hand, vessel)
     height, radius = shape.profile[-1] if shape.profile else (height_of(shape), 0.0)
@@ -176,8 +176,8 @@ def _poses(
 ) -> Array:
     """Return hand poses (n, 6) that hold the source tilted by `angle` with its lip over the target.
 
-    The lip is `clearance` above the rim of the target. It is higher while the source is steep, so that the base of the source
-    clears the rim as well.
+    The lip is at least `clearance` above the rim of the target. While the source is nearly upright, the lip is higher, so that
+    the base of the source also clears the rim.
     """
     poses = poses_at(np.zeros(3), yaw, side * angle, swivel)
     height, lip = _lip(attempt, source, side)
@@ -190,7 +190,7 @@ def _poses(
 
 @dataclass(frozen=True)
 class _Way:
-    """Postures (n, k) by tilt angle (n,), ascending."""
+    """Postures (n, k) for ascending tilt angles (n,)."""
 
     angles: Array
     q: Array
@@ -205,7 +205,7 @@ class _Way:
 
 
 def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
-    """Return the path of the roll about the lip from the present pose, to the side on which the lip is over the target."""
+    """Return the path of the roll about the lip from the present pose, to the side with the lip nearest to its goal."""
     now, angles = attempt.hand.pose, np.linspace(0.0, numbers["pour_angle"], 64)
     ways = []
     for side in SIDES:
@@ -214,12 +214,12 @@ def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
         ways.append((float(np.linalg.norm(poses[0, :3] - now[:3])), side, poses))
     poses = min(ways, key=lambda way: way[0])[2]
     left = np.maximum(1 - angles / numbers["hold_back"], 0.0)
-    poses[:, :3] += left[:, None] * (now - poses[0])[:3]  # corrects the present error before anything flows
+    poses[:, :3] += left[:, None] * (now - poses[0])[:3]  # correct the present error before the flow begins
     return _way(attempt, angles, poses, (source, target))
 
 
 def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]) -> _Way:
-    """Return the postures of the arm for the poses at some tilt angles; raise `SkillError` if the arm can't follow them."""
+    """Return the arm's postures for poses at tilt angles; raise `SkillError` if the arm can't follow the poses."""
     with attempt.planning():
         reacher = attempt.reacher(margin=CLOSE)
         q = reacher.follow(poses)
@@ -246,7 +246,7 @@ def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _
 
 
 class _Servo:
-    """Controller that moves a hand along a path by its tilt angle, at bounded rate and acceleration (radians, seconds)."""
+    """Controller that moves a hand along a path of tilt angles with bounded speed and acceleration (radians, seconds)."""
 
     ACCELERATION = 14.0
 
@@ -255,7 +255,7 @@ class _Servo:
         self.tick = 1 / world.rate
 
     def turn(self, goal: float, speed: float) -> None:
-        """Roll to an angle."""
+        """Roll the hand to a tilt angle."""
         for step in range(MOST_STEPS):
             if self.angle == goal:
                 return
@@ -265,10 +265,11 @@ class _Servo:
         raise SkillError("too slow", (self.hand.hand.name,), seconds=MOST_STEPS * self.tick)
 
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
-        """Roll on slowly while there is no flow, and wait while beverage flows; return whether `enough` is `poured`.
+        """Roll on slowly while there is no flow, and wait while beverage flows; return whether the amount `enough` was poured.
 
-        The flow during the `lag` seconds in which the hand rolls back counts as poured. If the flow stops, the amount `nearly`
-        suffices. The result is False if nothing has flowed for a while at the steepest angle.
+        The function `poured` returns the amount so far. The expected flow in the `lag` seconds in which the hand rolls back is
+        added to the amount. If the flow stops, the amount `nearly` suffices. The result is False if nothing flows for a while at
+        the steepest angle.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))
@@ -288,7 +289,7 @@ class _Servo:
         raise SkillError("too slow", (self.hand.hand.name,), seconds=MOST_STEPS * self.tick)
 
     def _approach(self, goal: float, speed: float) -> None:
-        """Advance for one simulation step towards an angle, at most at `speed`."""
+        """Advance for one simulation step towards an angle, with at most `speed`."""
         gap, most = goal - self.angle, self.ACCELERATION * self.tick
         wanted = math.copysign(min(speed, math.sqrt(2 * self.ACCELERATION * abs(gap))), gap)
         self.rate += max(-most, min(most, wanted - self.rate))

@@ -1,8 +1,8 @@
-"""The places within reach of each hand, computed from geometry alone: URDF, furniture and shapes, without a physics engine.
+"""The places within reach of each hand, computed from the geometry of URDF, furniture and shapes, without a physics engine.
 
-A hand reaches a place if, for every height at which bodies of the scene are grasped, there is a grasp pose whose approach, grasp
-and lift are all within the joints' limits and free of contact with furniture and the robot's trunk. Below a solid, a hand lifts
-less.
+Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose for every such height.
+Approach, grasp and lift must be within the joints' limits, and free of contact with furniture and the robot's trunk. Below an
+obstacle, a hand lifts less high.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
 from confab.sim.urdf import Spheres, UrdfModel
 
 VERSION = "2"
-"""Version of the method. It is part of the fingerprint, so that stored results of an older version count as outdated."""
+"""Version of the method, which is part of the fingerprint. A stored result of another version counts as outdated."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""
@@ -34,19 +34,19 @@ STAGES = ("when grasping", "when approaching", "when lifting")
 
 @dataclass(frozen=True)
 class Reach:
-    """Pairs of hand and place within its reach, and a hash of the inputs."""
+    """Pairs of a hand and a place within the hand's reach, and a hash of the inputs."""
 
     pairs: frozenset[tuple[str, str]]
     inputs: str
 
 
 def reach(embodiment: Embodiment) -> Reach:
-    """Return the pairs of hand and place within its reach.
+    """Return the pairs of a hand and a place within the hand's reach.
 
     Raises
     ------
     ValueError
-        No behaviour uses the skill `reach`, which has the settings.
+        No behaviour uses the skill `reach`, which states the settings.
     """
     numbers, heights = _settings(embodiment)
     pairs = set()
@@ -69,7 +69,7 @@ def reach(embodiment: Embodiment) -> Reach:
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
-    """Return the first failing stage of a grasp and its obstacle for each hand that does not reach a place, with every joint open.
+    """Return for each hand that does not reach a place the first impossible stage of a grasp and its obstacle, with links open.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
 
 
 def _why(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers: Numbers) -> str:
-    """Return the reason for which no posture passes a stage of a grasp at a height above a place."""
+    """Return why no posture passes all stages of a grasp at a height above a place."""
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     left = np.ones(1, dtype=bool)
     stages = grip_stages(grip, _lowest(numbers))
@@ -130,7 +130,7 @@ def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
 
 
 def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, UrdfModel]]:
-    """Yield each stand of a mobile robot with the robot's model there; for a fixed robot an empty name and its model."""
+    """Yield each stand of a mobile robot with the robot's model at the stand; for a fixed robot, an empty name and its model."""
     if not robot.driving:
         yield "", read_robot(robot)
         return
@@ -139,7 +139,7 @@ def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, UrdfM
 
 
 def fingerprint(embodiment: Embodiment) -> str:
-    """Return a SHA-256 hash of all inputs of reach: files by content, numbers by value."""
+    """Return a SHA-256 hash of all inputs of reach: contents of files, and numbers."""
     parts = [VERSION]
     for robot in embodiment.robots:
         values = _without(asdict(robot), ("driving", "turning") if not robot.driving else ())
@@ -177,12 +177,12 @@ def _content(file: Path | str) -> str:
 
 
 def _without(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """Return values without some names."""
+    """Return `values` without the given names."""
     return {name: value for name, value in values.items() if name not in names}
 
 
 def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel, solids: Sequence[Solid]) -> Reacher:
-    """Return a hand with open fingers among furniture, mechanisms and the robot's trunk."""
+    """Return an arm with open fingers among furniture, mechanisms and the robot's trunk."""
     arms = [read_arm(model, other.arm, other.tip, other.turned, other.home) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
     around = Surroundings((*map(box, embodiment.fixtures), *solids))
@@ -193,7 +193,7 @@ def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel,
 def _reaches(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers: Numbers) -> bool:
     """Return whether some posture passes all stages of a grasp at a height above the place.
 
-    The hand has to be able to lift to the least raised height; the raised height has to be within the joints' limits.
+    The lift to the setting `least_raised` must be free of collisions. The height `raised` must be within the joints' limits.
     """
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, _lowest(numbers))]
@@ -206,12 +206,12 @@ def _reaches(reacher: Reacher, loaded: Reacher, place: Place, height: float, num
 
 
 def _lowest(numbers: Numbers) -> Numbers:
-    """Return settings in which a hand lifts to the least raised height."""
+    """Return settings in which the hand lifts only to the least raised height."""
     return {**numbers, "raised": rises(numbers)[-1]}
 
 
 def _loaded(reacher: Reacher, embodiment: Embodiment, height: float) -> Reacher:
-    """Return a hand that holds the tallest body of the scene at a height above its base, without the body's lowest third."""
+    """Return an arm whose hand holds the tallest body of the scene at `height`; the body's lowest third is left out."""
     shapes = [body.shape for body in embodiment.bodies.values()]
     own = [shape for shape in shapes if shape.grasp_height == height] or shapes
     if not own:

@@ -19,7 +19,7 @@ from confab.sim.motion import MotionLimits, pose_of
 from confab.sim.urdf import Array, Spheres, UrdfModel
 
 CENTERING = 400.0
-"""Newtons per metre by which the leading finger yields; this simulates the gear of a parallel gripper."""
+"""Stiffness, in newtons per metre, that centres the fingers and simulates the gear of a parallel gripper."""
 
 POSITION_GAIN, VELOCITY_GAIN = 0.4, 1.0
 """Gains of an arm's motors."""
@@ -30,7 +30,7 @@ CLOSING = 0.12
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """The object or place at which a hand is, and its position then; all None if the hand is raised.
+    """The object or place at which a hand is, and the target's position when the hand arrived; `point` is None for a raised hand.
 
     `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped on its way.
     """
@@ -46,9 +46,9 @@ class Manipulator:
     """One hand of a robot in a physics world.
 
     `posture` is the arm's last command. `grasp` is the rotation and position of the held object in the hand at the grasp, the
-    reference for slip. `limit` is the time limit in seconds of the running skill, `deadline` the simulation step at which it
-    expires. `pace` is the share of its speeds that the arm uses. `at` is where its motions have brought the hand. `opened_to` is
-    the last command of the fingers in metres.
+    reference for slip. `limit` is the time limit in seconds of the running skill, and `deadline` is the simulation step at
+    which the limit expires. `pace` is the share of its maximum speeds that the arm uses. `at` is the object or place to which
+    the hand has moved. `opened_to` is the last command of the fingers in metres.
     """
 
     client: int
@@ -73,7 +73,7 @@ class Manipulator:
 
     @property
     def limits(self) -> MotionLimits:
-        """Limits of speed and acceleration of the arm without a load."""
+        """Limits of the arm's speed and acceleration without a load."""
         pace = self.pace
         return MotionLimits(self.arm.velocity * pace, self.robot.acceleration * pace**2, 1.6 * pace, 8.0 * pace**2)
 
@@ -98,12 +98,12 @@ class Manipulator:
         return tuple(state[0] for state in states)
 
     def mover(self, opening: float | None = None) -> Mover:
-        """Return the arm as spheres, with its fingers at their present opening, or open by `opening` metres."""
+        """Return the arm as spheres, with fingers at their present opening or open by `opening` metres."""
         openings = self.openings() if opening is None else [opening] * len(self.fingers)
         return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, openings, strict=True)))
 
     def command(self, q: Array, velocity: Array | None = None) -> None:
-        """Set the motors' target; they keep it until the next command."""
+        """Set the targets of the motors, which hold until the next command."""
         self.posture = q
         pybullet.setJointMotorControlArray(
             self.body,
@@ -123,11 +123,11 @@ class Manipulator:
         self._fingers_to(self.hand.opening if opening is None else opening)
 
     def close(self) -> None:
-        """Begin to close the fingers; `drive` must then run in every step."""
+        """Begin to close the fingers; afterwards `drive` must run in every simulation step."""
         self.closing = True
 
     def drive(self) -> None:
-        """Drive closing fingers for one step with equal force; the leading finger yields."""
+        """Drive closing fingers for one simulation step with equal forces; the leading finger yields."""
         if not self.closing:
             return
         (first, *_), (second, *_) = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
@@ -156,7 +156,7 @@ class Manipulator:
             )
 
     def pressing(self, other: int, part: int = -1) -> tuple[float, ...]:
-        """Return the normal force in newtons with which each finger presses a body, or its link `part`."""
+        """Return the normal force in newtons with which each finger presses a body or the body's link `part`."""
         forces = []
         for link in self.fingers:
             contacts = pybullet.getContactPoints(self.body, other, link, part, physicsClientId=self.client)
@@ -250,7 +250,7 @@ def _look_up(numbers: Mapping[str, int], names: Sequence[str]) -> tuple[int, ...
 
 
 def _go_home(manipulator: Manipulator) -> None:
-    """Set the arm's joints to the home posture; later its motors drive them."""
+    """Set the arm's joints to the home posture before the first simulation step."""
     values = (*manipulator.hand.home, *[manipulator.hand.opening] * len(manipulator.fingers))
     for joint, value in zip((*manipulator.joints, *manipulator.fingers), values, strict=True):
         pybullet.resetJointState(manipulator.body, joint, value, physicsClientId=manipulator.client)

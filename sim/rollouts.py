@@ -1,7 +1,7 @@
 """Many rollouts of a plan: in this process, in several processes, or on a Ray cluster.
 
-The result of a rollout depends only on its trial and seed, not on the place where it runs. If a process
-dies, another process repeats its rollout.
+The result of a rollout depends only on its trial and seed, not on the process. If a process dies, another process repeats its
+rollout.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from confab.sim.verify import Rollout, verify
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 TRIES = 3
-"""Number of processes that may die at a rollout before it is given up."""
+"""Number of dead processes after which a rollout is given up."""
 
 RAY = "ray"
-"""Value of `workers`, or scheme of their address, that selects a Ray cluster."""
+"""Value of `workers`, or scheme of an address in `workers`, that selects a Ray cluster."""
 
 Done = Callable[[Rollout], None]
 
@@ -56,7 +56,7 @@ class Trial:
         progress: Callable[[int, PrimitiveStep], None] | None = None,
         gui: bool = False,
     ) -> Rollout:
-        """Execute the rollout of a seed in this process."""
+        """Execute the rollout with a seed in this process."""
         return verify(
             self.embodiment,
             self.initial,
@@ -74,7 +74,7 @@ class Trial:
 
 
 def wilson(good: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return Wilson's confidence interval of the share `good` of `of`, by default at 95 %.
+    """Return Wilson's confidence interval of a share, `good` out of `of`, by default at 95 %.
 
     >>> low, high = wilson(98, 100)
     >>> print(f"{low:.3f} {high:.3f}")
@@ -92,21 +92,21 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     Parameters
     ----------
     trial : Trial
-        It is pickled if there is more than one worker, so `prepare` must be a function of a module, or a `functools.partial` of
-        such a function.
+        The trial is pickled if there is more than one worker. Its `prepare` must then be a function of a module, or a
+        `functools.partial` of such a function.
     seeds : sequence of int
     workers : int or str
-        Number of processes (1: this process); or ``ray`` for the Ray cluster of this machine, which is started if necessary; or
-        the address of a cluster, ``ray://HOST:PORT``.
+        Number of processes, where 1 means this process. The value ``ray`` selects the Ray cluster of this machine, which is
+        started if necessary. The value ``ray://HOST:PORT`` selects the cluster at an address.
     done : callable, optional
-        Called with each rollout as soon as it is finished, in the order of completion.
+        Function that is called with each finished rollout, in the order of completion.
 
     Raises
     ------
     ValueError
         `workers` is neither a positive number nor a Ray address.
     RuntimeError
-        Three processes died at the same rollout; or Ray is requested and isn't installed.
+        Three processes died at the same rollout, or Ray is requested but isn't installed.
     """
     finished = {}
     for rollout in _stream(trial, seeds, workers):
@@ -132,7 +132,7 @@ def _stream(trial: Trial, seeds: Sequence[int], workers: int | str) -> Iterator[
 
 
 def work(descriptor: int) -> None:
-    """Receive a trial through a connection, then seeds until it closes; send each rollout, or the exception that it raised."""
+    """Receive a trial, then seeds until the connection closes; send each seed's rollout, or the exception that was raised."""
     connection = Connection(descriptor)
     trial: Trial | None = None
     with suppress(EOFError, ConnectionError):
@@ -165,7 +165,7 @@ class _Pool:
         self.waiting = deque(self.seeds)
 
     def stream(self) -> Iterator[Rollout]:
-        """Yield rollouts in the order of completion; end all processes afterwards, also after an exception."""
+        """Yield rollouts in the order of completion; end all processes at the end and after an exception."""
         try:
             for _ in range(min(self.size, len(self.seeds))):
                 self._start()
@@ -187,14 +187,14 @@ class _Pool:
         here, there = Pipe()
         code = "import sys; sys.path[:] = sys.argv[2:]; from confab.sim.rollouts import work; work(int(sys.argv[1]))"
         command = [sys.executable, "-c", code, str(there.fileno()), *sys.path]
-        process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)  # it limits each rollout
+        process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)  # the process limits each rollout
         self.started.append(process)
         there.close()
         here.send(self.trial)
         self._give(here, process)
 
     def _give(self, connection: Connection, process: Popen[bytes]) -> None:
-        """Send a process its next seed, or close its connection if none is left."""
+        """Send the next seed to a process, or close the connection if no seed is left."""
         if not self.waiting:
             connection.close()
             return
@@ -203,7 +203,7 @@ class _Pool:
         connection.send(seed)
 
     def _receive(self, connection: Connection) -> Rollout | None:
-        """Return the rollout of a process, or None if the process died; its seed then goes to a new process."""
+        """Return the rollout of a process; if the process died, start a new process with its seed and return None."""
         process, seed = self.busy.pop(connection)
         try:
             result: Rollout | Exception = connection.recv()
@@ -217,7 +217,7 @@ class _Pool:
         return result
 
     def _replace(self, process: Popen[bytes], seed: int) -> None:
-        """Start a new process for the seed of a dead one, or raise `RuntimeError` after `TRIES` deaths."""
+        """Start a new process for the seed of a dead process, or raise `RuntimeError` after `TRIES` deaths."""
         status = process.wait()
         if status == -signal.SIGXCPU:
             raise LimitError(f"gave up: the rollout of seed {seed} took {CPU_SECONDS:,.0f} s of CPU time")

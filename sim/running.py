@@ -1,4 +1,4 @@
-"""The state of a running skill: participants, measured numbers, perceived features, chosen grasp."""
+"""The state of a running skill: objects by role, measured numbers, perceived features and chosen grasp."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError, named
 
 TOLD = ("object", "source", "target", "place")
-"""The order in which a failure names the participants' roles."""
+"""The order of roles in which a failure names the objects of a skill."""
 
 LEDGE = 0.01
-"""Metres by which a fixture may stand out above a place and still count as its support."""
+"""Maximum height in metres of a fixture above a place that the fixture supports."""
 
 
 @dataclass
 class Run:
-    """A running skill: its participants by role, measured numbers, chosen grasp, gripped link or body, and perceived features."""
+    """A running skill: objects by role, settings, measured numbers, chosen grasp, gripped link or body, and perceived features."""
 
     attempt: Attempt
     roles: Mapping[str, str]
@@ -37,7 +37,7 @@ class Run:
 
     @property
     def world(self) -> Engine:
-        """The world."""
+        """The world in which the skill runs."""
         return self.attempt.world
 
     @property
@@ -46,7 +46,7 @@ class Run:
         return self.numbers.get("spread", self.attempt.hand.hand.opening)
 
     def feature_of(self, target: str) -> tuple[str, str]:
-        """Return the individual and the feature of ``role.feature``."""
+        """Return the individual and the feature that ``role.feature`` denotes."""
         role, _, feature = target.partition(".")
         name = self.roles[role]
         if not (name in self.world.embodiment.places or name in self.world.links):
@@ -54,9 +54,9 @@ class Run:
         return name, feature
 
     def at(self, target: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
-        """Return the perceived frame of ``role.feature``.
+        """Return the perceived frame of the feature that ``role.feature`` denotes.
 
-        The frame of an object is measured once per skill, so that noise doesn't move it.
+        The frame of an object is measured once per skill, so that noise doesn't move the frame.
         """
         name, feature = self.feature_of(target)
         if name in self.world.links:
@@ -67,14 +67,14 @@ class Run:
         return self.seen[name, feature]
 
     def joint(self, target: str) -> tuple[Mechanic, str]:
-        """Return the mechanism and the link of ``role.feature``."""
+        """Return the mechanism and the link that ``role.feature`` denotes."""
         name, _ = self.feature_of(target)
         if name not in self.world.links or name not in self.world.links[name].joints:
             raise SkillError("no grasp", (name,), f"{name} has no joint that could be moved")
         return self.world.links[name], name
 
     def number(self, expression: str, link: str = "") -> float:
-        """Return the value of a sum of settings, numbers and, with `link`, the named values of its joint (opened, shut, …)."""
+        """Return the value of a sum of settings, numbers and, with `link`, named values of the link's joint (opened, shut, …)."""
         known = dict(self.numbers)
         if "clear" in expression:
             known["clear"] = self.clear()
@@ -85,7 +85,7 @@ class Run:
         return evaluate(expression, known)
 
     def clear(self) -> float:
-        """Return the height above the target at which the load is clear of everything around it; `hover` for an empty hand."""
+        """Return the height above the target at which the load is clear of obstacles; for an empty hand, the setting `hover`."""
         hover, attempt = self.numbers["hover"], self.attempt
         if attempt.held is None:
             return hover
@@ -93,18 +93,18 @@ class Run:
         return self.world.clear_height(attempt.hand, attempt.held, point, hover, self.numbers["raised"])
 
     def things(self) -> tuple[str, ...]:
-        """Return the participants and the held body, without the hand."""
+        """Return the objects in the skill's roles and the held body, without the hand."""
         held = self.attempt.held
         ordered = sorted(self.roles.items(), key=lambda pair: TOLD.index(pair[0]) if pair[0] in TOLD else len(TOLD))
         return named(*(name for role, name in ordered if role != "hand"), *([] if held is None else [held]))
 
     def arrived(self, goal: Array) -> None:
-        """Check that the hand is at its goal, if the skill states a tolerance."""
+        """If the skill states a tolerance, raise `SkillError` if the hand is not at its goal."""
         if "tolerance" in self.numbers:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 
     def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the things that a phase may touch: objects, parts of a link at a feature, fixtures below a place, its carrier."""
+        """Return the things that a phase may touch: objects, parts of a link at a feature, and supports of a place."""
         found: list[str] = []
         for word in phase.touches:
             if word == "supports":

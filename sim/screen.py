@@ -1,7 +1,4 @@
-"""The world in PyBullet's window, at the pace of the simulated time.
-
-The window does not change the results of a rollout.
-"""
+"""PyBullet's window, which shows the world in step with real time and does not change the results of a rollout."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ from confab.sim.engine import Engine
 from confab.sim.picture import view_of
 
 PACE_CHECK = 4
-"""Simulation steps between comparisons with the clock."""
+"""Number of simulation steps between comparisons with the clock."""
 
 
 def require_screen() -> None:
@@ -27,7 +24,7 @@ def require_screen() -> None:
     Raises
     ------
     RuntimeError
-        No display is available; the message states the remedy.
+        No display is available. The message states the remedy.
     """
     if sys.platform != "linux":
         return
@@ -48,7 +45,7 @@ def require_screen() -> None:
 
 
 class Screen:
-    """A window's camera, caption and pace: pass it to `confab.sim.verify.verify` as `watch`, with ``gui=True``.
+    """The camera, caption and pace of a window; the argument `watch` of `confab.sim.verify.verify`, with ``gui=True``.
 
     Parameters
     ----------
@@ -64,7 +61,7 @@ class Screen:
         self._current, self._caption = -1, -1
 
     def __call__(self, world: Engine) -> None:
-        """Wait for the clock, and update the caption."""
+        """Update the caption, and wait while the simulation is ahead of the clock."""
         if self._begin is None:
             self._begin = time.monotonic(), world.steps
             self._look(world)
@@ -89,7 +86,7 @@ class Screen:
         pybullet.resetDebugVisualizerCamera(distance, yaw, pitch, camera.target, physicsClientId=client)
 
     def _write(self, world: Engine) -> None:
-        """Write the present primitive's caption above the middle of the places."""
+        """Write the caption of the present primitive above the middle of all places."""
         if not 0 <= self._current < len(self.titles):
             return
         x, y, z = np.mean([place.position for place in world.embodiment.places.values()], axis=0)

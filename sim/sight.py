@@ -1,6 +1,7 @@
-"""Visibility: a body is hidden if the cameras see too small a share of it; its last known position is then believed.
+"""Visibility of bodies from cameras.
 
-Rays are cast from each camera to points on the body's surface. Beads are not checked; furniture, links and robots are always known.
+A body is hidden if each camera sees too small a share of the body. The robot then believes its last known position. Rays are
+cast from each camera to points on the body's surface. Furniture, links and robots are always known, and beads are not checked.
 """
 
 from __future__ import annotations
@@ -19,22 +20,22 @@ SHARE = 0.1
 """Minimum share of a body's points that a camera has to see for the body to count as seen."""
 
 BARED = 0.5
-"""Minimum share of empty points at the believed pose of a body that a camera has to see for the body to count as gone."""
+"""Minimum share of points at the believed pose of a body that a camera must see empty for the body to count as gone."""
 
 BEHIND, ABOVE, ASIDE = 0.1, 0.8, 0.5
-"""Position in metres of a robot's default cameras relative to the middle of its shoulders: back, up and to either side."""
+"""Distances in metres of a robot's default cameras from the middle of its shoulders: back, up and to either side."""
 
 ROUND = 8
-"""Number of points around a body at each height."""
+"""Number of points around a body at each height to which rays are cast."""
 
 HEIGHTS = (0.3, 0.65, 0.95)
-"""Heights of the points, as shares of the body's height."""
+"""Heights of the points to which rays are cast, as shares of the body's height."""
 
 BEYOND = 0.01
-"""Metres by which a ray continues behind a point on the surface."""
+"""Distance in metres by which a ray continues behind a point on the surface."""
 
 WITHIN = 0.8
-"""Share of the radius at which points must be empty for a body to count as gone.
+"""Share of a body's radius at which points are tested for emptiness.
 
 At the full radius, points could be inside a wall beside the body.
 """
@@ -42,7 +43,7 @@ At the full radius, points could be inside a wall beside the body.
 
 @dataclass(frozen=True)
 class Sight:
-    """The seen bodies, the bodies gone from their believed pose, and the number of the body that covers each hidden body most."""
+    """The seen bodies, the bodies gone from their believed pose, and the PyBullet body that covers each hidden body most."""
 
     seen: frozenset[str] = frozenset()
     gone: frozenset[str] = frozenset()
@@ -51,7 +52,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Sought:
-    """A body to look for: its number (-1 if it was removed), its shape, its true pose and its believed pose."""
+    """A body to look for: PyBullet number (-1 for a removed body), shape, true pose and believed pose."""
 
     name: str
     body: int
@@ -70,7 +71,7 @@ def over_the_shoulders(shoulders: Array, yaw: float) -> Array:
 
 
 def look(client: int, cameras: Array, things: Sequence[Sought]) -> Sight:
-    """Return which bodies are seen, gone or covered from cameras (n, 3)."""
+    """Return the bodies that are seen, gone or covered from cameras (n, 3)."""
     seen, gone, covers = set[str](), set[str](), dict[str, int]()
     for thing in things:
         there = thing.pose is not None and _in_view(client, cameras, thing, thing.pose, covers)
@@ -82,7 +83,7 @@ def look(client: int, cameras: Array, things: Sequence[Sought]) -> Sight:
 
 
 def _in_view(client: int, cameras: Array, thing: Sought, pose: tuple[Array, Array], covers: dict[str, int]) -> bool:
-    """Return whether enough of a body is seen; add the body that covers most of it to `covers`."""
+    """Return whether a camera sees enough of a body; add the body that covers most of a hidden body to `covers`."""
     points = pose[1] + _points(thing.shape) @ pose[0].T
     for camera in cameras:
         hits = [hit[0] for hit in _cast(client, camera, points, BEYOND)]
@@ -102,7 +103,7 @@ def _bare(client: int, cameras: Array, thing: Sought, pose: tuple[Array, Array])
 
 
 def _points(shape: Shape, share: float = 1.0) -> Array:
-    """Return points (n, 3) at a share of the radius of a body, in its own frame."""
+    """Return points (n, 3) in the body's frame at a share of the body's radius."""
     heights, radii = outline(shape)
     angle = np.linspace(0.0, 2 * np.pi, ROUND, endpoint=False)
     rings = []
@@ -114,7 +115,7 @@ def _points(shape: Shape, share: float = 1.0) -> Array:
 
 
 def _cast(client: int, camera: Array, points: Array, beyond: float) -> Sequence[tuple[int, ...]]:
-    """Return the first hits of rays from a camera to points."""
+    """Return PyBullet's first hits of rays from a camera to points."""
     ways = points - camera
     ends = points + beyond * ways / np.linalg.norm(ways, axis=1)[:, None]
     starts = np.broadcast_to(camera, ends.shape)

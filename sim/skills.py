@@ -1,10 +1,10 @@
 """The skills that execute primitives: phases described in the ontology, or Python functions.
 
-`confab.sim.phases` interprets skills in phases. A Python skill is a function of (engine, roles, numbers): `roles` maps role
-names (`hand`,
-`target`, `object`, `place`, `source`) to individuals, `numbers` has its settings from the ontology in metres, radians, seconds and
-newtons. It returns its measured numbers, or raises `SkillError`. Two are built in, since phases can express neither the path of a
-lip nor the control of a flow. Skills of other packages register as entry points of the group `confab.skills`.
+`confab.sim.phases` interprets skills in phases. A Python skill is a function of (engine, roles, numbers). The argument `roles`
+maps role names (`hand`, `target`, `object`, `place`, `source`) to individuals. The argument `numbers` has the skill's settings
+from the ontology, in metres, radians, seconds and newtons. A skill returns the numbers that it measured, or raises
+`SkillError`. Two skills are built in, since phases can express neither the path of a lip nor the control of a flow. Skills of
+other packages register as entry points of the group `confab.skills`.
 
 ============== =============================================================== =======================================
 Python skill   motion                                                          checked in the world
@@ -37,7 +37,7 @@ def perform(engine: Engine, use: SkillUse, roles: Roles) -> Mapping[str, float]:
 
 
 def skill(name: str) -> Skill:
-    """Return the Python skill of that name, built in or an entry point; raise `KeyError` with the built-in names if none exists."""
+    """Return the built-in Python skill or the entry point of the given name; raise `KeyError` if there is none."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     for point in entry_points(group="confab.skills", name=name):

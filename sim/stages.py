@@ -1,4 +1,4 @@
-"""The candidate poses of a hand at a point, and the stages of a grasp: geometry alone."""
+"""Geometry of the candidate poses of a hand at a point, and of the stages of a grasp."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from confab.sim.urdf import Array
 Numbers = Mapping[str, float]
 
 RISES = 4
-"""Number of heights to which a hand may lift, from the raised to the least raised height."""
+"""Number of heights to which a hand may lift, from the setting `raised` down to `least_raised`."""
 
 MARGIN = 0.008
 """Margin in metres to all obstacles."""
@@ -22,12 +22,13 @@ MARGIN = 0.008
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of a motion.
+    """One stage of a motion, with one pose for each of n candidates.
 
-    A pose (n, 6) for each candidate, `ignored` obstacles, and the surroundings at that stage if they differ. `closed`: the
-    fingers are closed around something. `near`: the hand holds a handle, so its margin is small. `slack` and `fold`: radians
-    that every joint keeps from its limits in addition, and from the stretched arm. `released`: the hand has released its load.
-    `joint`: the value of the moved joint of furniture.
+    `poses` (n, 6) are the candidates' poses, and `ignored` are the obstacles that the stage may touch. `around` replaces the
+    obstacles of the hand. `closed` is true if the fingers are closed around something, and `released` if the hand has released
+    its load. `near` is true if the hand holds a handle, so that the margin is small. `slack` is an additional margin in radians
+    to the limits of the joints, and `fold` is the margin in radians to the stretched arm. `joint` is the value of the moved joint
+    of furniture.
     """
 
     poses: Array
@@ -53,7 +54,7 @@ def fan() -> tuple[Array, Array]:
 
 
 def grip_stages(grip: Array, numbers: Numbers, ignored: tuple[str, ...] = ()) -> tuple[Stage, Stage, Stage]:
-    """Return the stages of a grasp at point `grip` (3,) for the whole `fan`: grasp, approach before it, lift after it."""
+    """Return the stages of a grasp at point `grip` (3,) for all poses of `fan`: the grasp, its approach and its lift."""
     yaw, swivel = fan()
     heading = np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
     raised = np.array([0.0, 0.0, numbers["raised"]])

@@ -1,4 +1,4 @@
-"""Set up a new world: furniture, robots, and the bodies and beads of a draft."""
+"""Setup of a new world: furniture, robots, and the bodies and beads of a draft."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ SETTLING = 120
 """Number of simulation steps in which bodies and beads come to rest before the first primitive."""
 
 DRAWS = 20
-"""Maximum number of draws of an object's deviation until the object doesn't overlap another one."""
+"""Maximum number of draws of an object's random deviation until the object overlaps no other object."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
-"""An invisibly small triangle, the visual shape of beads: `confab.sim.picture` draws them, since PyBullet would be slow."""
+"""An invisibly small triangle, the visual shape of beads, since `confab.sim.picture` draws beads faster than PyBullet."""
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Ranges of random deviations from the nominal world, drawn uniformly for each body.
+    """Ranges of random deviations from the nominal world; each deviation is drawn uniformly for each body.
 
-    Mechanisms are shifted by `position` and turned by `turn`, and their joints' friction and damping are multiplied by
-    `resistance`. A mobile base misses its goal by at most `stop` metres and radians.
+    Mechanisms are shifted by `position` and turned by `turn`. Friction and damping of their joints are multiplied by `resistance`.
+    A mobile base misses its goal by at most `stop` metres and radians.
     """
 
     position: float = 0.010
@@ -65,7 +65,7 @@ def furnish(engine: Engine, perturb: Perturbation | None) -> None:
 
 
 def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None) -> Mechanism:
-    """Return a mechanism with its random deviations."""
+    """Return a mechanism with random deviations."""
     if perturb is None:
         return mechanism
     (x, y, z), limit = mechanism.position, perturb.position
@@ -80,7 +80,7 @@ def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None)
 
 
 def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: bool) -> None:
-    """Put the bodies of a draft and their contents into an engine, and let them come to rest."""
+    """Put the bodies of a draft and their contents into an engine, and simulate until they have come to rest."""
     for name, opened in draft.opened.items():
         if name not in engine.links:
             raise ValueError(f"'{name}' is open or shut, but is no e:Link of a mechanism")
@@ -112,12 +112,12 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
 
 
 def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) -> None:
-    """Make an object at a place; deviations with which it overlaps another one are drawn again.
+    """Make an object at a place; deviations with which the object overlaps another object are drawn again.
 
     Raises
     ------
     ValueError
-        The object overlaps something that is already there; the message names both and the millimetres.
+        The object overlaps an existing object. The message names both objects and the overlap in millimetres.
     """
     for _ in range(DRAWS if perturb is not None else 1):
         shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)
@@ -135,7 +135,7 @@ def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) ->
 
 
 def _deepest(engine: Engine, body: int) -> tuple[float, str]:
-    """Return the deepest overlap of a body, and the name of the body that it overlaps."""
+    """Return the deepest overlap of a body with another body in metres, and the name of the other body."""
     found = [(0.0, "")]
     for other in engine.names:
         for link in range(-1, pybullet.getNumJoints(other, physicsClientId=engine.client)):
@@ -165,7 +165,7 @@ def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None
 
 
 def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | None = None) -> None:
-    """Fill a vessel with beads, released just above its bottom. PyBullet draws them only in a window."""
+    """Fill a vessel with beads that are released just above its bottom; PyBullet draws the beads only in a window."""
     kind = engine.embodiment.fillings[filling]
     share = 1.0 if perturb is None else float(engine.rng.uniform(*perturb.fill))
     count = round(kind.serving * engine.filled.get(name, engine.embodiment.bodies[name].servings) * share)
@@ -197,14 +197,14 @@ def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | Non
 
 
 def put_to_sleep(engine: Engine) -> None:
-    """Put bodies and beads to sleep until something touches them, so that beads at rest cost no time."""
+    """Let PyBullet deactivate bodies and beads until something touches them, so that beads at rest cost no time."""
     for body in [*[thing.body for thing in engine.bodies.values()], *[bead.body for bead in engine.beads]]:
         for state in (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_SLEEP):
             pybullet.changeDynamics(body, -1, activationState=state, physicsClientId=engine.client)
 
 
 def _make_fixture(client: int, fixture: Fixture) -> int:
-    """Create a fixture, which does not move; return its body."""
+    """Create a fixture as a body that cannot move, and return the body."""
     half = [extent / 2 for extent in fixture.size]
     body = pybullet.createMultiBody(
         0,

@@ -1,7 +1,7 @@
-"""Bodies that block the motion of a link, at their present places and at all other places.
+"""Bodies that block the motion of a link, such as a door, at their present places and at all other places.
 
-A body that the link would touch between `shut` and `opened` blocks the link for every hand and in both directions. So one
-blocked motion refutes all similar motions.
+A body that the link would touch between the joint values `shut` and `opened` blocks the link for every hand and in both
+directions. Therefore one blocked motion refutes all similar motions.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 SAMPLES = 9
-"""Number of values of a joint at which its link is checked."""
+"""Number of joint values at which a link is checked for contact."""
 
 
 def gap(world: Engine, link: str, values: Sequence[float], body: str, pose: tuple[Array, Array]) -> float:
-    """Return the smallest distance in metres between a link and a body at a pose, over some values of the link's joint."""
+    """Return the smallest distance in metres between a link and a body at a pose, over the given values of the link's joint."""
     mechanic, shape = world.links[link], world.bodies[body].shape
     spheres = column(*outline(shape), bottom=height_of(shape) / 10)
     points = pose[1] + spheres.centers @ pose[0].T
@@ -58,7 +58,7 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
 
 
 def refuted(world: Engine, symbols: Iterable[Symbol], link: str) -> tuple[Refutation, ...]:
-    """Return the refutations of moving a link by any hand while a body stands at a place at which it blocks the link."""
+    """Return the refutations of all motions of a link, each while a body stands at a place where the body blocks the link."""
     found = [fact for symbol in symbols for fact in _in_the_way(world, symbol, link)]
     return tuple(
         Refutation(
@@ -75,7 +75,7 @@ def _why(link: str, fact: Fact) -> str:
 
 
 def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
-    """Yield the role of a link in a skill that moves it all the way to shut or opened."""
+    """Yield the role of a link in a skill if the skill moves the link until it is shut or opened."""
     one = world.links[link].link(link)
     known = {"opened": one.opened, "shut": one.shut, "lower": one.lower, "upper": one.upper, "wide": wide(one)}
     for phase in use.phases:
@@ -87,7 +87,7 @@ def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
 
 
 def _in_the_way(world: Engine, symbol: Symbol, link: str) -> Iterator[Fact]:
-    """Yield the facts under which a body blocks the link: its places, and a hand that has lifted it from its present place."""
+    """Yield the facts under which a body blocks the link: places of the body, or a hand that has lifted the body."""
     use, body = world.embodiment.perceivers[symbol.situation], symbol.arguments[0]
     if use.perceiver != "perceive_place" or body not in world.bodies or not world.knows(body):
         return
@@ -102,7 +102,7 @@ def _in_the_way(world: Engine, symbol: Symbol, link: str) -> Iterator[Fact]:
 
 
 def _lifted_into(world: Engine, use: PerceiverUse, link: str, body: str, place: str, values: Sequence[float]) -> bool:
-    """Return whether a body that stands at a place still blocks the link after a hand has lifted it from there."""
+    """Return whether a body at a place still blocks the link after a hand has lifted the body from the place."""
     point = world.place(place)
     rotation, base = world.sense(body)
     if float(np.linalg.norm(base - point)) > use.numbers["nearness"]:

@@ -1,8 +1,8 @@
-"""Several hands at once: skills run concurrently in one world; each skill is written as if it were alone.
+"""Concurrent execution of skills by several hands in one world.
 
-A skill requests simulation steps from the world. Here every skill runs in its own thread and waits for each step; when all
-running skills wait, the world makes one step for all of them. Only one thread runs at any time, and threads run in a fixed
-order, so that equal calls give equal results.
+A skill requests simulation steps from the world. Every skill runs in its own thread and waits for each step. When all running
+skills wait, the world makes one step for all of them. Only one thread runs at any time, and the threads run in a fixed order, so
+that equal calls give equal results.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""
 
 FLOWING = {"tilt", "stand_upright"}
-"""Skills that count spilled beads. They run one at a time, since each would count the beads that another one spills."""
+"""Skills that count spilled beads. Only one runs at a time, since a skill would also count the beads of another skill."""
 
 LOOKING = 6
-"""Simulation steps between checks for contact between the arms."""
+"""Number of simulation steps between checks for contact between the arms."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Performance:
 
     @property
     def ok(self) -> bool:
-        """Whether everything succeeded and the arms never touched."""
+        """Whether all primitives succeeded and the arms never touched each other."""
         return all(verdict.ok for verdict in self.verdicts) and self.touching == 0
 
 
@@ -65,14 +65,14 @@ class _Job:
         self.paused.release()
 
     def advance(self) -> None:
-        """Let the thread run until it requests a step, or ends."""
+        """Let the thread run until it requests a simulation step or ends."""
         self.go.release()
         self.paused.acquire()
         if self.error is not None:
             raise self.error
 
     def wait(self) -> None:
-        """Wait for a step of the world; called in the job's thread."""
+        """Wait for a simulation step of the world; called in the job's thread."""
         self.paused.release()
         self.go.acquire()
 
@@ -80,13 +80,13 @@ class _Job:
 def perform_together(
     world: PhysicsWorld, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
 ) -> Performance:
-    """Execute primitives with all hands at once, each as soon as its predecessors are done and there is room.
+    """Execute primitives with all hands at once; each starts as soon as its predecessors are done and there is room.
 
     Parameters
     ----------
     world : PhysicsWorld
     problem : Problem
-        Its initial state is the world's.
+        The problem, whose initial state is the state of the world.
     primitives : sequence of Step
     room : float
         Minimum distance in metres between the places at which two hands work at the same time.
@@ -161,7 +161,7 @@ def arms_touch(world: PhysicsWorld) -> bool:
 
 
 def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
-    """Return the bodies that a primitive may move: the bodies that it names, and the loads of its hands."""
+    """Return the bodies that a primitive may move: the bodies among its arguments, and the bodies that its hands hold."""
     named = {*step.arguments, *step.bindings.values()}
     held = {world.held(hand) for hand in named & world.hands.keys()}
     return {name for name in named | held if name is not None and name in world.bodies}
@@ -170,7 +170,7 @@ def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
 def _workplace(
     world: PhysicsWorld, step: Step
 ) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
-    """Return a function that returns the present place of work (2,) of a primitive: its last body or place, or its hand."""
+    """Return a function that returns the horizontal position (2,) at which a primitive works: of its last body, place or hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 

@@ -1,4 +1,4 @@
-"""Touch: opening and closing of the fingers, and corrections of the hand by the forces on the fingers."""
+"""Motions of the fingers, and corrections of the hand that respond to forces on the fingers."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 CLOSING = 360
-"""Maximum number of steps of a grasp."""
+"""Maximum number of simulation steps of a grasp."""
 
 GROPING = 120
-"""Number of steps after which a hand grasps again if only one finger touches the handle."""
+"""Number of simulation steps after which a hand grasps again if only one finger touches the handle."""
 
 YIELDS, ASIDE_BY = 6, 0.002
-"""Maximum number of times that a hand yields to contact, and the metres by which it yields each time."""
+"""Maximum number of times that a hand yields to contact, and distance in metres by which the hand yields each time."""
 
 ROOM = 0.01
-"""Distance in metres between an open finger and the object below which the hand slows down in proportion."""
+"""Distance in metres between an open finger and an object; at less distance, the hand slows down in proportion."""
 
 SLOWEST = 0.1
 """Minimum share of its speed to which the hand slows down."""
 
 LOOKING = 6
-"""Steps between checks of the fingers' forces."""
+"""Number of simulation steps between checks of the forces on the fingers."""
 
 CENTRED = 0.001
-"""Maximum difference in metres between the fingers' openings of a centred hand."""
+"""Maximum difference in metres between the openings of the two fingers of a centred hand."""
 
 
 def _open(run: Run, phase: Phase) -> None:
@@ -50,7 +50,7 @@ def _shut(run: Run, phase: Phase) -> None:
 
 
 def _grasp(run: Run, phase: Phase) -> None:
-    """Close until both fingers have pressed for a while; then centre the hand if it holds a link."""
+    """Close the fingers until both have pressed for a while; centre a hand that holds a link."""
     world, hand, name = run.world, run.attempt.hand, run.roles["object"]
     hand.close()
     pressed, waited = 0, 0
@@ -73,7 +73,7 @@ def _grasp(run: Run, phase: Phase) -> None:
 
 
 def _grope(run: Run) -> None:
-    """Grasp again, centred on a handle that only one finger has touched."""
+    """Open the hand, centre it on a handle that only one finger has touched, and begin to grasp again."""
     hand, shift = run.attempt.hand, off_centre(run)
     hand.open(run.spread)
     run.world.run(CLOSING // 6)
@@ -82,7 +82,7 @@ def _grope(run: Run) -> None:
 
 
 def _centre(run: Run) -> None:
-    """Shift the hand until both fingers are closed equally far, since the link that they hold does not yield."""
+    """Shift the hand until both fingers are closed equally far, since a held link does not yield."""
     hand = run.attempt.hand
     for _ in range(3):
         first, second = hand.openings()
@@ -92,7 +92,7 @@ def _centre(run: Run) -> None:
 
 
 def _shift(run: Run, shift: Array) -> bool:
-    """Shift the hand by some metres, if the arm allows it."""
+    """Shift the hand by a vector (3,) in metres if the arm can reach the new pose; return whether it can."""
     hand = run.attempt.hand
     pose = hand.pose
     pose[:3] += shift
@@ -103,7 +103,7 @@ def _shift(run: Run, shift: Array) -> bool:
 
 
 def off_centre(run: Run) -> Array:
-    """Return the shift (3,) that centres the hand between its fingers, from the difference of their openings."""
+    """Return the shift (3,) of the hand that makes the openings of both fingers equal."""
     hand = run.attempt.hand
     first, second = hand.openings()
     shift: Array = hand.frame()[0] @ hand.first_finger * (first - second) / 2
@@ -111,7 +111,7 @@ def off_centre(run: Run) -> Array:
 
 
 def draw_back(run: Run) -> None:
-    """Draw the hand back while its fingers press something ahead of it."""
+    """Draw the hand back while its fingers press against a body in front of the hand."""
     hand = run.attempt.hand
     for _ in range(YIELDS):
         if hand.push() < run.numbers["force"] or not _shift(run, -ASIDE_BY * hand.frame()[0][:, 0]):
@@ -127,11 +127,10 @@ FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
 
 
 def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
-    """Move the open fingers around an object; on contact with one finger, shift the hand to that finger's side and continue.
+    """Move the open fingers around an object; after contact with one finger, shift the hand to the finger's side and continue.
 
-    On contact with the palm, the object is far enough inside the hand, so the hand draws back a little and stops. The hand also
-    stops on contact with a link on its way around a handle: there is room beside a handle, so the contact is ahead, for example
-    with the door.
+    On contact with the palm, the object is far enough inside the hand, so the hand draws back a little and stops. On its way
+    around a handle, the hand also stops on contact with the link, for example with the door behind the handle.
     """
     hand = run.attempt.hand
     still = name in run.world.links
@@ -155,14 +154,14 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
         again = hand.pose + beside - goal
         again[:3] += back
         if (first and second) or not run.attempt.reacher(margin=-np.inf).solve(line(again, beside))[1].all():
-            patience = 0  # both fingers touch: there is no side to shift to
+            patience = 0  # contact with both fingers leaves no side to shift to
         elif _shift(run, (again - hand.pose)[:3]):
             goal = beside
     run.arrived(goal)
 
 
 def room(run: Run, name: str) -> float:
-    """Return the metres between an object and each open finger."""
+    """Return the distance in metres between an object and each open finger; infinite for other things."""
     if name not in run.world.bodies:
         return np.inf
     shape = run.world.bodies[name].shape

@@ -1,8 +1,8 @@
-"""Trajectories of a verified plan as data: joint paths with times, gripper commands and grasp frames, per primitive and hand.
+"""Trajectories of a verified plan as data: joint paths with times, gripper commands and grasp frames.
 
-The data have the shape of ROS messages: a `control_msgs/FollowJointTrajectory` goal per primitive and hand, `control_msgs`
-gripper commands with times, and grasp frames as a position and a quaternion (x, y, z, w). Metres, radians, seconds, newtons.
-`replay` executes the data in a new world with joint servos alone: without skills, planning or touch.
+The data have the form of ROS messages. Each primitive and hand has a `control_msgs/FollowJointTrajectory` goal, and
+`control_msgs` gripper commands with times. Grasp frames are a position and a quaternion (x, y, z, w). Units are metres, radians,
+seconds and newtons. `replay` executes the data in a new world by joint servos, without skills, planning or touch.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ EXACT = 3e-4
 """Maximum deviation in radians of the exported path, which is linear between its points, from the commanded path."""
 
 GOAL_TOLERANCE, TIME_TOLERANCE = 0.01, 0.5
-"""Tolerance of each joint at the end of a path in radians, and of its duration in seconds."""
+"""Tolerance in radians of each joint at the end of a path, and tolerance in seconds of the path's duration."""
 
 LOOKING = 6
 """Simulation steps between two measurements of the tracking error in a replay."""
@@ -41,9 +41,9 @@ AFTER = 1.0
 class Tape:
     """The commands of one hand.
 
-    Postures are indexed by the simulation step after them, gripper commands and grasps by the step before them.
-
-    A grasp has the name of the held object, and its rotation and base in the hand's frame.
+    A posture belongs to the simulation step that ends at its entry of `steps`. A gripper command or grasp has the number of the
+    step at whose beginning it holds. A grasp also has the name of the held object, and the object's rotation and base in the
+    hand's frame.
     """
 
     steps: list[int] = field(default_factory=list)
@@ -54,12 +54,12 @@ class Tape:
 
 @dataclass
 class Recorder:
-    """Records the commands of all hands; pass it as the `watch` of a world."""
+    """Records the commands of all hands; to be passed to a world as `watch`."""
 
     tapes: dict[str, Tape] = field(default_factory=dict)
 
     def __call__(self, world: Engine) -> None:
-        """Record the commands that hold in the simulation step that has ended."""
+        """Record the commands of the simulation step that has just ended."""
         for name, hand in world.hands.items():
             tape = self.tapes.setdefault(name, Tape())
             tape.steps.append(world.steps)
@@ -79,7 +79,7 @@ class Recorder:
 def exported(
     embodiment: Embodiment, recorder: Recorder, slots: Sequence[tuple[PrimitiveStep, float, float]]
 ) -> Iterator[dict[str, Any]]:
-    """Yield each primitive with the trajectories of the hands that it moves; a slot is a primitive, its begin and its end."""
+    """Yield each primitive with the trajectories of its hands; a slot is a primitive with its begin and end in seconds."""
     for step, begin, end in slots:
         roles = {*step.arguments, *step.bindings.values()}
         own = [name for name in recorder.tapes if name in roles]
@@ -98,7 +98,7 @@ def exported(
 
 
 def _hand(embodiment: Embodiment, name: str, tape: Tape, begin: int, end: int) -> dict[str, Any] | None:
-    """Return the commands of a hand between two simulation steps; None if it has none."""
+    """Return the commands of a hand between two simulation steps, or None if there are none."""
     joints = list(embodiment.hand(name)[1].arm)
     offset = tape.steps[0] if tape.steps else 0
     postures = np.array(tape.postures[max(begin + 1 - offset, 0) : end + 1 - offset])
@@ -145,7 +145,7 @@ def _hand(embodiment: Embodiment, name: str, tape: Tape, begin: int, end: int) -
 
 
 def _corners(q: Array) -> list[int]:
-    """Return the corners of a path, including its first and last sample; between corners the path is straight up to `EXACT`."""
+    """Return the indices of the corners of a path, with both ends; between corners the path is straight within `EXACT`."""
     kept, stack = {0, len(q) - 1}, [(0, len(q) - 1)]
     while stack:
         i, j = stack.pop()
@@ -199,7 +199,7 @@ def _quaternion(rotation: Array) -> Array:
 
 @dataclass(frozen=True)
 class Replay:
-    """The result of replayed trajectories: the perceived facts in the end, and the largest error of a hand's position in metres."""
+    """The result of replayed trajectories: perceived facts at the end, and largest error in metres of a hand's position."""
 
     state: State
     tracking: float
@@ -213,7 +213,7 @@ def replay(
     perturb: Perturbation | None = None,
     beads: bool = True,
 ) -> Replay:
-    """Execute exported trajectories in a new world by joint servos alone; parameters are those of `PhysicsWorld`."""
+    """Execute exported trajectories in a new world by joint servos; the other parameters are those of `PhysicsWorld`."""
     with PhysicsWorld(embodiment, initial, seed, perturb, beads) as world:
         paths = {name: _path(primitives, name) for name in world.hands}
         fingers = {name: sorted(_gripper(primitives, name)) for name in world.hands}
@@ -238,7 +238,7 @@ def replay(
 
 
 def _path(primitives: Sequence[Mapping[str, Any]], hand: str) -> tuple[Array, Array]:
-    """Return the times (n,) of a hand over all primitives, and its postures with their velocities (n, 2 k)."""
+    """Return the times (n,) of a hand's samples over all primitives, and its postures with velocities (n, 2 k)."""
     times, path = [], []
     for primitive, own in _of_hand(primitives, hand):
         for point in own["follow_joint_trajectory"]["trajectory"]["points"]:

@@ -1,6 +1,6 @@
 """The parts of a URDF file that kinematics and collision checks need, placed in the world at the zero posture.
 
-Lengths in metres, angles in radians. Visual geometry and inertia are read by PyBullet, which loads the same file.
+Lengths are in metres, angles in radians. PyBullet loads the same file and reads visual geometry and inertia.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from confab.sim.meshes import bounds, covered_mesh
 
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
-"""Maximum depth of a chain of links, and maximum number of spheres that cover one shape; larger models are refused as mistakes."""
+"""Maximum length of a chain of links, and maximum number of spheres that cover one shape; larger models are rejected."""
 FARTHEST = 1e6
-"""Maximum absolute value of a number in metres; squares of far larger numbers overflow."""
+"""Maximum absolute value of a number, since squares of much larger numbers overflow."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint at the zero posture: its parent and child links, a point on its axis and the axis's direction in the world."""
+    """A joint at the zero posture: parent and child link, a point on the axis, and the direction of the axis in the world."""
 
     name: str
     kind: str
@@ -62,10 +62,7 @@ class Primitive:
 
 @dataclass(frozen=True)
 class UrdfModel:
-    """A robot or mechanism at the zero posture: the joints by name.
-
-    And for each link its frame, the spheres that cover it, and its solids.
-    """
+    """A robot or mechanism at the zero posture: joints by name, and the frame, spheres and solids of each link by name."""
 
     joints: Mapping[str, Joint]
     frames: Mapping[str, tuple[Array, Array]]
@@ -105,7 +102,7 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
     Raises
     ------
     ValueError
-        The file isn't a URDF robot; the message names file and reason.
+        The file isn't a URDF robot. The message names the file and the reason.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -119,7 +116,7 @@ def read_model(
 ) -> UrdfModel:
     """Read a robot or mechanism from the text of a URDF file at `path`; errors are those of `read_urdf`.
 
-    With `covered`, its links are covered by spheres, which motion planning needs for an arm.
+    With `covered`, the model has spheres that cover its links, which motion planning needs for an arm.
     """
     try:
         root = ET.fromstring(text)
@@ -131,9 +128,9 @@ def read_model(
     parents: dict[str, Joint] = {}
 
     def place(link: str, below: tuple[str, ...] = ()) -> tuple[Array, Array]:
-        """Return the link's frame, placing its ancestors first."""
+        """Return a link's frame; compute the frames of its ancestors first."""
         if link in below or len(below) > MOST_LINKS:
-            raise ValueError(f"link '{link}' hangs on itself, or on more than {MOST_LINKS} others")
+            raise ValueError(f"link '{link}' hangs on itself, or on more than {MOST_LINKS} other links")
         if link not in frames:
             element = elements.get(link)
             if element is None:
@@ -165,7 +162,7 @@ def _end(joint: ET.Element, which: str) -> str:
 
 def _numbers(text: str | None, default: str = "0 0 0") -> Array:
     numbers = np.array([float(word) for word in (text or default).split()])
-    if len(numbers) != 3 or not (np.abs(numbers) <= FARTHEST).all():  # also refuses nan
+    if len(numbers) != 3 or not (np.abs(numbers) <= FARTHEST).all():  # also rejects nan
         raise ValueError(f"'{text}' where three numbers of at most {FARTHEST:,.0f} belong")
     return numbers
 
@@ -206,7 +203,7 @@ def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Ar
 
 
 def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Spheres:
-    """Cover the link's collision shapes with spheres."""
+    """Return spheres that cover a link's collision shapes."""
     centers, radii = [np.zeros((0, 3))], [np.zeros(0)]
     for collision in link.iter("collision"):
         local, shift = _origin(collision)
@@ -230,7 +227,7 @@ def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Sphere
 def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[Primitive]:
     """Yield the collision shapes of a link as boxes and cylinders.
 
-    A sphere is replaced by the cylinder around it, a mesh by the box around it.
+    The cylinder around a sphere replaces the sphere, and the box around a mesh replaces the mesh.
     """
     for collision in link.iter("collision"):
         local, shift = _origin(collision)
@@ -251,13 +248,13 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
 
 
 def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, float]]:
-    """Return the path of a mesh's file, and its scale."""
+    """Return the path of a mesh's file and the scale of the mesh."""
     x, y, z = _numbers(shape.get("scale"), "1 1 1")
     return mesh_file(shape.get("filename", ""), folder), (float(x), float(y), float(z))
 
 
 def mesh_file(name: str, folder: Path) -> Path:
-    """Return the path of a mesh named by a URDF in `folder`: in that folder, in its parent, or among PyBullet's data."""
+    """Return the path of a mesh that a URDF in `folder` names: in `folder`, its parent, or PyBullet's data."""
     name = name.removeprefix("package://")
     places = [place for place in (folder, folder.parent, pybullet_data()) if place and (place / name).is_file()]
     if not name or not places:
@@ -268,7 +265,7 @@ def mesh_file(name: str, folder: Path) -> Path:
 
 
 def _primitive(shape: ET.Element) -> tuple[Array, float]:
-    """Return sphere centres in the shape's frame and their radius."""
+    """Return the centres, in the shape's frame, and the radius of spheres that cover a shape."""
     if shape.tag == "sphere":
         return np.zeros((1, 3)), _number(shape, "radius", 0.0)
     if shape.tag in ("cylinder", "capsule"):

@@ -1,4 +1,4 @@
-"""The verdict of physics about a step: success, or a failure code with the objects and the measured numbers."""
+"""The verdict on a step in the physical world: success, or a failure code with the objects and the measured numbers."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ _While = TypedDict("_While", {"while": list[str]}, total=False)
 
 
 class VerdictJson(_Verdict, _While):
-    """A verdict; `while` has the facts during which a motion was found to be impossible."""
+    """A verdict as JSON; while the facts in `while` hold, the motion is impossible."""
 
 
 class StepReportJson(VerdictJson):
-    """The verdict on a primitive, with its path and its ID."""
+    """The verdict on a primitive, with the primitive's path in the plan and its ID."""
 
     path: list[int]
     id: int
 
 
 class RolloutJson(TypedDict):
-    """One execution of a plan in physics."""
+    """One execution of a plan in the simulated world, as JSON."""
 
     seed: int
     ok: bool
@@ -69,10 +69,11 @@ class RolloutJson(TypedDict):
 
 @dataclass(frozen=True)
 class Verdict:
-    """The result of a step in the world. `measured` has numbers by name; the name ends with the unit.
+    """The result of a step in the world.
 
-    After failed motion planning, `facts` has the positions of the objects that took part; the step is refuted while they hold. If
-    the cause is a body that blocks the link `swings`, `likewise` has the other steps that it refutes, by any hand.
+    `measured` has the measured numbers by name; a name ends with the unit. After failed motion planning, `facts` has the positions
+    of the step's objects. The step is refuted while these facts hold. If a body blocks the link `swings`, `likewise` has the
+    refutations of other steps, by any hand, that the body blocks.
     """
 
     ok: bool
@@ -85,13 +86,13 @@ class Verdict:
     likewise: tuple[Refutation, ...] = ()
 
     def __str__(self) -> str:
-        """Return one line, e.g. ``tracking error: hidden wall (joint_lag_rad 0.084)``."""
+        """Return the verdict in one line, for example ``tracking error: hidden wall (joint_lag_rad 0.084)``."""
         numbers = ", ".join(f"{name} {value:.3g}" for name, value in self.measured.items())
         head = "done" if self.ok else f"{self.code}: {self._what()}"
         return head + (f" ({numbers})" if numbers else "")
 
     def _what(self) -> str:
-        """Return the objects and the message, without a message that repeats the code, or objects that the message names."""
+        """Return the objects and the message; leave out a message that repeats the code, and objects that the message names."""
         if self.message in CODES.values():
             return ", ".join(self.objects) or self.message
         unnamed = not all(name in self.message for name in self.objects)
@@ -112,7 +113,7 @@ class Verdict:
 
 
 class SkillError(Exception):
-    """Raised by a skill that fails; `World.execute` turns it into a `Verdict`."""
+    """Error of a failed skill, which `PhysicsWorld.execute` turns into a `Verdict`."""
 
     def __init__(self, code: str, objects: tuple[str, ...] = (), message: str = "", /, **measured: float) -> None:
         super().__init__(message or CODES[code])
@@ -120,5 +121,5 @@ class SkillError(Exception):
 
 
 def named(*objects: str) -> tuple[str, ...]:
-    """Return each object once, in order."""
+    """Return the objects without duplicates, in order."""
     return tuple(dict.fromkeys(objects))

@@ -1,4 +1,4 @@
-"""Verification of a plan in the world: execute its primitives one by one, and compare the perceived with the expected facts."""
+"""Verification of a plan: its primitives are executed in a simulated world, and the perceived facts are compared."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
-"""Number of looks with noisy perception before a difference from the expected state counts."""
+"""Maximum number of looks, with noisy perception, until a difference from the expected state counts."""
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """A primitive, its verdict, and the simulated seconds that it took."""
+    """A primitive, its verdict, and its duration in simulated seconds."""
 
     step: PrimitiveStep
     verdict: Verdict
@@ -36,8 +36,8 @@ class StepReport:
 class Rollout:
     """One execution of a plan.
 
-    `poured` has the share of a serving that arrived for each pour. `state` has the last perceived facts, `believed` the facts
-    among them about hidden objects. `cpu_seconds` excludes filming (`clock.rendering`).
+    `poured` has for each pour the share of a serving that arrived. `state` has the last perceived facts. `believed` has the
+    facts of `state` about hidden objects. `cpu_seconds` excludes filming (`clock.rendering`).
     """
 
     seed: int
@@ -52,7 +52,7 @@ class Rollout:
 
     @property
     def failure(self) -> StepReport | None:
-        """The failed step, or None."""
+        """The report of the failed step, or None."""
         return next((report for report in self.steps if not report.verdict.ok), None)
 
     def as_json(self) -> RolloutJson:
@@ -74,7 +74,7 @@ def expectations(problem: Problem, steps: Sequence[PrimitiveStep]) -> list[State
     Raises
     ------
     ValueError
-        A step's preconditions don't hold in the state before it; the message names the step.
+        The preconditions of a step don't hold in the state before the step. The message names the step.
     """
     state = problem.initial
     states: list[State] = []
@@ -113,15 +113,15 @@ def verify(
     steps : sequence of PrimitiveStep
         Primitives in the order of execution.
     expected : sequence of State
-        The state after each of them, as `expectations` computes it; symbols without a perceiver are not compared.
+        The state after each primitive, as `expectations` computes it. Symbols without a perceiver are not compared.
     seed, perturb, beads, noise
         As in `PhysicsWorld`.
     prepare : callable, optional
-        Called with the world before the first step, for example a planted fault (`confab.sim.faults`).
+        Function that is called with the world before the first step, for example a planted fault (`confab.sim.faults`).
     watch : callable, optional
-        Called with the world after every simulation step, for example a `confab.sim.film.Film`.
+        Function that is called with the world after every simulation step, for example a `confab.sim.film.Film`.
     progress : callable, optional
-        Called with the number of finished steps and the next step.
+        Function that is called before each step with the number of finished steps and the step.
     gui : bool
         Show the world in PyBullet's window.
 
@@ -154,9 +154,9 @@ def verify(
 
 
 def compare(world: PhysicsWorld, expected: State, verdict: Verdict) -> Verdict:
-    """Return the verdict if the perceived facts equal the expected ones, otherwise a failure that names the first different fact.
+    """Return `verdict` if the perceived facts equal the expected facts, otherwise a failure that names the first difference.
 
-    With noisy perception, a difference is looked at again, and the mean of all looks counts.
+    With noisy perception, a difference is measured again, and the mean of all measurements counts.
     """
     for looks in range(1, LOOKS + 1):
         found = _compared(world, expected, verdict)

@@ -1,7 +1,7 @@
-"""The positions of hands: their own motions determine them, in three dimensions.
+"""The named positions of hands, which the hands' own motions determine.
 
-A motion ends at a thing or a place, or with the hand raised. The hand stays at this position until its next motion, or until
-the thing has moved away. A hand that was stopped on its way is at no named place.
+A motion ends at an object or a place, or with the hand raised. The hand stays at this position until its next motion, or until
+the object has moved away. A hand that was stopped on its way has no named position.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ RAISED = ("rise", "home")
 """Motions after which a hand is raised."""
 
 LEVEL = 0.01
-"""Metres between the heights of a place and of an object that stands on it."""
+"""Maximum difference in metres between the height of a place and the base of an object that stands at the place."""
 
 MOVED = 0.03
-"""Minimum distance in metres that a stopped hand has moved to count as lost."""
+"""Distance in metres; a hand that is stopped after a longer motion counts as lost."""
 
 
 def point_of(world: Engine, name: str) -> Array:
-    """Return the perceived point of a place, or of the base of a body."""
+    """Return the perceived position (3,) of a place, or of the base of a body."""
     point: Array = world.place(name) if name in world.embodiment.places else world.sense(name)[1]
     return point
 
 
 def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]:
-    """Return the nearest of the places that are as high as a point, within `height` metres, and its distance sideways."""
+    """Return the nearest place whose height differs from a point's by less than `height` metres, and the horizontal distance."""
     points = {name: world.place(name) for name in world.embodiment.places}
     gaps = {name: float(np.hypot(*(point - at)[:2])) for name, at in points.items() if abs(point[2] - at[2]) < height}
     best = min(gaps, key=gaps.__getitem__, default="")
@@ -42,7 +42,7 @@ def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]
 
 
 def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
-    """Store the position to which a motion has brought a hand; motions of links, and at the hand itself, don't change it."""
+    """Store the named position of a hand after a motion; motions of links and relative to the hand don't change the position."""
     if motion in RAISED:
         world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
     elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):
@@ -54,7 +54,7 @@ def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
 
 @contextmanager
 def stopping(world: Engine, hand: str) -> Iterator[None]:
-    """Store that a hand is lost if it fails in the block after it has moved."""
+    """Mark a hand as lost if the block raises `SkillError` after the hand has moved."""
     begin = world.hands[hand].frame()[1]
     try:
         yield
@@ -65,7 +65,7 @@ def stopping(world: Engine, hand: str) -> Iterator[None]:
 
 
 def floor_below(world: Engine, hand: str, point: Array) -> float:
-    """Return the height of the support that the load of a hand has left; if unknown, the height of the place below a point."""
+    """Return the height of the support that a hand's load has left; if unknown, the height of the place below `point`."""
     at = world.hands[hand].at
     if at.floor is not None and not at.lost:
         return at.floor

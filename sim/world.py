@@ -1,4 +1,4 @@
-"""The physical world in which a plan is executed: set up from facts, `observe`, `execute`."""
+"""The physical world in which plans are executed: a scene is set up from facts, observed and changed by primitives."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PrimitiveStep(Protocol):
 
     @property
     def id(self) -> int:
-        """Number of the quantified behaviour."""
+        """Number of the grounded behaviour."""
 
     @property
     def behavior(self) -> str:
@@ -38,34 +38,35 @@ class PrimitiveStep(Protocol):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Individuals of the parameters, in order."""
+        """Individuals for the behaviour's parameters, in order."""
 
     @property
     def bindings(self) -> Mapping[str, str]:
-        """Individuals of the determined variables."""
+        """Individuals for the variables that the parameters determine."""
 
 
 class PhysicsWorld(Engine):
-    """A physics world with the objects of a scene. Close it after use, or use it in a ``with`` statement.
+    """A physics world with the objects of a scene; close the world after use, or use a ``with`` statement.
 
     Parameters
     ----------
     embodiment : Embodiment
         Robots, furniture, places, shapes, skills and perceivers.
     initial : State
-        Initial facts; those of situation types without a perceiver are ignored.
+        Initial facts. Facts of situation types without a perceiver are ignored.
     seed : int
-        Seed of all random numbers: perturbation, sampling in motion planning, sensor noise.
+        Seed of all random numbers, for perturbation, sampling in motion planning and sensor noise.
     perturb : Perturbation, optional
-        Vary poses, friction, masses and fill.
+        Random deviations of poses, friction, masses and contents.
     beads : bool
-        Whether the beverage is simulated; without it the world is faster, and contents are counted from `initial`.
+        Whether beverages are simulated as beads. Without beads the simulation is faster, and contents are counted from
+        `initial`.
     noise : float
         Standard deviation in metres of perceived positions.
     watch : callable, optional
-        Called with the world after every simulation step, for example a `confab.sim.film.Film`.
+        Function that is called with the world after every simulation step, for example a `confab.sim.film.Film`.
     gui : bool
-        Open PyBullet's window. Call `confab.sim.screen.require_screen` first: without a screen PyBullet ends the process.
+        Open PyBullet's window. Call `confab.sim.screen.require_screen` first, since PyBullet ends the process without a screen.
     """
 
     def __init__(
@@ -84,12 +85,14 @@ class PhysicsWorld(Engine):
         joints = [Symbol(use.situation, (link,)) for use in embodiment.perceivers.values() for link in use.links]
         measured = [Symbol(use.situation, one) for use in embodiment.perceivers.values() for one in use.asked]
         self.symbols += [symbol for symbol in joints if symbol not in initial]  # joints without a fact are shut
-        self.symbols += [symbol for symbol in measured if symbol not in self.symbols]  # and what is measured is false
+        self.symbols += [
+            symbol for symbol in measured if symbol not in self.symbols
+        ]  # measured types without a fact are false
         self.perturb = perturb
         furnish(self, perturb)
         draft = self._draft(initial)
         stage(self, draft, perturb, beads)
-        for name, place in draft.places.items():  # hidden bodies are believed to be where the scene states
+        for name, place in draft.places.items():  # hidden bodies are believed to be at the places that the scene states
             self.remember(name, np.eye(3), self.place(place))
         self.watch = watch
 
@@ -102,7 +105,7 @@ class PhysicsWorld(Engine):
         self.close()
 
     def _draft(self, initial: State) -> Draft:
-        """Return the layout of the new world, collected from the facts."""
+        """Return the layout of the new world that the initial facts state."""
         draft = Draft()
         for symbol in self.symbols:
             use = self.embodiment.perceivers[symbol.situation]
@@ -111,7 +114,7 @@ class PhysicsWorld(Engine):
         return draft
 
     def observe(self) -> State:
-        """Return the facts perceived now, without the symbols whose value cannot be perceived."""
+        """Return the facts perceived now, without symbols whose value cannot be perceived."""
         state: dict[Symbol, str] = {}
         for symbol in self.symbols:
             use = self.embodiment.perceivers[symbol.situation]
@@ -121,7 +124,7 @@ class PhysicsWorld(Engine):
         return state
 
     def believed(self, state: State) -> tuple[Fact, ...]:
-        """Return the facts of a perceived state that are believed and not perceived, because their object is hidden."""
+        """Return the facts of a perceived state about hidden objects, which are believed and not perceived."""
         hidden = {name for name in self.known if not self.perceives(name)}
         return tuple(Fact(symbol, value) for symbol, value in state.items() if symbol.arguments[0] in hidden)
 
@@ -131,7 +134,7 @@ class PhysicsWorld(Engine):
         Raises
         ------
         KeyError
-            No skill executes the behaviour; the message names it.
+            No skill executes the behaviour. The message names the behaviour.
         """
         if step.behavior not in self.embodiment.skills:
             raise KeyError(
@@ -156,7 +159,7 @@ class PhysicsWorld(Engine):
         return Verdict(True, measured=measured)
 
     def _with_facts(self, verdict: Verdict, step: PrimitiveStep) -> Verdict:
-        """Return a verdict of failed motion planning with the facts under which it holds: the positions of the objects it names."""
+        """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of its objects."""
         if verdict.code not in REFUTED:
             return verdict
         spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}

@@ -1,1 +1,1 @@
-"""External robots: their interfaces are data, and one adapter makes each interface a world (docs/connecting.md)."""
+"""External robots: an interface is data, and one adapter turns every interface into a world (docs/connecting.md)."""

@@ -1,9 +1,9 @@
-"""The world of an external robot: an interface describes the calls and readings, a transport performs them.
+"""The world of an external robot: an interface describes calls and readings, and a transport performs them.
 
-Rule 1: only facts shown by the world model are believed. Facts that the scene doesn't know are ignored. Rule 2: an action that
-exceeds its time limit, or is stopped, is cancelled; its late result is ignored. Rule 3: a robot that doesn't confirm a
-cancellation is busy and gets no further calls until the action has ended. Rule 4: if an exception such as Ctrl-C ends the wait
-for an action, `stop` itself cancels the action.
+Rule 1: only facts that the robot's world model shows are believed. Facts that the scene doesn't know are ignored.
+Rule 2: an action that exceeds its time limit, or that is stopped, is cancelled. The result of a cancelled action is ignored.
+Rule 3: a robot that doesn't confirm a cancellation is busy, and gets no further calls until the action has ended.
+Rule 4: if an exception such as Ctrl-C ends the wait for an action, `stop` itself cancels the action.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
 from confab.sim.robots.transport import Model, RobotError, Transport
 
 GRACE = 5.0
-"""Maximum time in seconds in which a robot has to end a cancelled action."""
+"""Maximum time in seconds until a robot has to end a cancelled action."""
 
 SENT = 2.0
-"""Maximum time in seconds for sending a cancellation after an exception."""
+"""Maximum time in seconds to send a cancellation after an exception."""
 
 NOT_STOPPED = "not stopped"
-"""The code of a primitive whose action continues although it was stopped."""
+"""The code of a primitive whose action was stopped but continues."""
 
 LOOKS = 3
 """Number of requests for the world model before the robot counts as out of reach."""
@@ -39,14 +39,14 @@ T = TypeVar("T")
 
 
 class InterfaceWorld:
-    """A `World` (`confab.planner.acting.world`) of an interface and a transport.
+    """A `World` (`confab.planner.acting.world`) made of an interface and a transport.
 
     Parameters
     ----------
     interface : Interface
     transport : Transport
     problem : Problem
-        The symbols that are perceived, and the known individuals.
+        The problem with the perceived symbols and the known individuals.
     """
 
     def __init__(self, interface: Interface, transport: Transport, problem: Problem) -> None:
@@ -72,7 +72,7 @@ class InterfaceWorld:
         Raises
         ------
         RobotError
-            The world model isn't available, or is invalid.
+            The world model isn't available or is invalid.
         """
         model = self._model()
         return {symbol: value for reading in self.interface.readings for symbol, value in self._read(reading, model)}
@@ -90,7 +90,7 @@ class InterfaceWorld:
         return model
 
     def _read(self, reading: Reading, model: Model) -> Iterator[tuple[Symbol, str]]:
-        """Yield the symbols of a situation type with their values."""
+        """Yield the symbols of a situation type with the values that the world model shows."""
         kind = self.problem.domain.situations.get(reading.situation)
         if kind is None:
             return
@@ -122,7 +122,7 @@ class InterfaceWorld:
     # --------------------------------------------------------------------------------------------------- action
 
     def execute(self, step: Step) -> Report:
-        """Execute a primitive: call its action, and wait for the answer, for the time limit, or for `stop`."""
+        """Execute a primitive: call its action, and wait until the answer, the time limit, or `stop`."""
         call = self.interface.calls.get(step.behavior)
         if call is None:
             return Report(False, "no action", (), f"{self.interface.name} has no action for {step.behavior}")
@@ -143,10 +143,7 @@ class InterfaceWorld:
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
-        """Stop the running action. The call that waits for the action cancels it.
-
-        If an exception has ended that wait, this call does.
-        """
+        """Stop the running action, which `execute` then cancels; if `execute` no longer waits, cancel the action here."""
         with self.changed:
             self.stopping = self.running is not None
             abandoned = self.stopping and not self.waiting
@@ -174,7 +171,7 @@ class InterfaceWorld:
         Thread(target=run, daemon=True, name=f"action of {self.interface.name}").start()
 
     def _wait(self, over: Callable[[], bool], seconds: float) -> bool:
-        """Wait until something is over, time has passed, or the world is stopped; return whether it is over."""
+        """Wait until `over` returns true, `seconds` have passed, or the world is stopped; return the result of `over`."""
         with self.changed:
             self.waiting = True
             try:
@@ -184,12 +181,12 @@ class InterfaceWorld:
             return over()
 
     def _idle(self) -> bool:
-        """Return whether the running action has ended within the time that a robot has for that."""
+        """Wait for the running action to end, at most `GRACE` seconds; return whether it has ended."""
         with self.changed:
             return self.changed.wait_for(lambda: self.running is None, GRACE)
 
     def _cancelled(self, step: Step, call: InterfaceCall) -> Report:
-        """Cancel the running action and return why."""
+        """Cancel the running action, and return a report with the reason."""
         stopped = self.stopping
         self._begin_cancelling()
         said = (
@@ -203,7 +200,7 @@ class InterfaceWorld:
         return Report(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
 
     def _begin_cancelling(self) -> Thread:
-        """Request the robot to end its action, in a separate thread; return the thread. An error of the request is ignored."""
+        """Request the robot to end its action in a separate thread that ignores errors; return the thread."""
 
         def run() -> None:
             with suppress(Exception):

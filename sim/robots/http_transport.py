@@ -23,13 +23,13 @@ from urllib.request import Request, urlopen
 from confab.sim.robots.transport import Model, RobotError
 
 ANSWERS_WITHIN = 5.0
-"""Seconds within which a server has to answer a question about its world, or a cancellation."""
+"""Maximum time in seconds until a server answers a request for its world model or a cancellation."""
 
 ACTION_WITHIN = 3600.0
-"""Seconds after which the connection of an action is closed; the action's own time limit ends it long before."""
+"""Seconds after which the connection of an action is closed. The time limit of the action usually ends it long before."""
 
 MOST_BYTES = 20_000_000
-"""Maximum size of an answer."""
+"""Maximum size in bytes of an answer."""
 
 
 class HttpRobot:
@@ -43,7 +43,7 @@ class HttpRobot:
     Raises
     ------
     RobotError
-        The text is no such URL.
+        `where` is no URL of this form.
     """
 
     def __init__(self, where: str) -> None:

@@ -1,4 +1,4 @@
-"""pyrobosim as a robot: its actions, and its world as a model of entities and fields (the extra `pyrobosim` installs it)."""
+"""pyrobosim as a robot: its actions, and its world as a model of entities and fields (extra `pyrobosim`)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import numpy as np
 from confab.sim.robots.transport import Model, RobotError
 
 AS_FAST_AS_POSSIBLE = -1.0
-"""Factor of pyrobosim between simulated and real time."""
+"""pyrobosim's real-time factor for a simulation without waiting."""
 
 DETOUR = 1.5
-"""Ratio of the longest path that a sampling planner finds to the shortest path along the axes."""
+"""Assumed maximum ratio of a path that a sampling planner finds to the shortest path along the axes."""
 
 USES = ("navigate", "pick", "place", "open", "close", "detect")
-"""The kinds of battery usage that a world file states."""
+"""The actions whose battery usage a world file states."""
 
 
 class Pyrobosim:
@@ -30,9 +30,9 @@ class Pyrobosim:
     Parameters
     ----------
     where : str
-        World file (YAML).
+        Path of a YAML file with a world.
     seed : int
-        Seed of all failures, paths and samples.
+        Seed of all random numbers.
 
     Raises
     ------
@@ -49,9 +49,7 @@ class Pyrobosim:
         np.random.seed(seed % 2**32)
         before = logging.root.manager.disable
         try:
-            logging.disable(
-                logging.INFO
-            )  # worlds and robots log during construction, before their loggers can be configured
+            logging.disable(logging.INFO)  # worlds and robots write to the log before their loggers can be configured
             self.world: Any = WorldYamlLoader().from_file(Path(where))
         except Exception as error:
             raise RobotError(f"{where}: pyrobosim can't read this world ({type(error).__name__}: {error})") from error
@@ -89,7 +87,7 @@ class Pyrobosim:
         return result.status.name, result.message or ""
 
     def _note_search(self, robot: Any) -> None:
-        """Record that the robot has searched its location, if it knows all objects there."""
+        """Record that the robot has searched its location if the robot knows all objects at the location."""
         there = {thing.name for thing in getattr(robot.location, "children", ())}
         if there <= {thing.name for thing in robot.get_known_objects()}:
             self.searched.add(robot.location.name)
@@ -150,7 +148,7 @@ class Pyrobosim:
         return found
 
     def _room_of(self, robot: Any) -> str | None:
-        """Return the room of a robot; in a hallway, the room at the nearer end."""
+        """Return the room of a robot; for a robot in a hallway, the room at the nearer end."""
         here = robot.location
         if hasattr(here, "room_start"):
             place = robot.get_pose()
@@ -161,16 +159,13 @@ class Pyrobosim:
         return None if here is None else str(here.name)
 
     def scene_model(self) -> Model:
-        """Return the model with shapes, and with the distance in metres between any two rooms.
-
-        The longest path between their places.
-        """
+        """Return the world model with shapes, and with the longest path in metres between places of any two rooms."""
         shapes = self._shapes()
         shaped = {name: {**fields, "shape": shapes.get(name, [])} for name, fields in self.model().items()}
         return {**shaped, **dict(self._ways())}
 
     def _shapes(self) -> dict[str, list[str]]:
-        """Return the polygon of each room, and a point in each room, hallway and spot, as well-known text."""
+        """Return the polygon of each room, and a point of each room, hallway and spot, as well-known text (WKT)."""
         world = self.world
         spots = (spot for location in world.locations for spot in location.children)
         solid = [(each.name, each.polygon) for each in chain(world.rooms, world.hallways, spots)]
@@ -209,5 +204,5 @@ def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
 
 
 def _text(form: str, points: Iterable[tuple[float, float]]) -> str:
-    """Return points as well-known text, with centimetres."""
+    """Return points as well-known text (WKT), rounded to centimetres."""
     return form.format(", ".join(f"{round(x, 2) + 0.0:g} {round(y, 2) + 0.0:g}" for x, y in points))

@@ -10,17 +10,17 @@ Model: TypeAlias = "Mapping[str, Mapping[str, Any]]"
 
 
 class RobotError(Exception):
-    """A robot can't be reached, or its response is invalid; the message says which."""
+    """A robot can't be reached, or its response is invalid; the message states the reason."""
 
 
 class Transport(Protocol):
-    """The connection to a robot. `call` and `cancel` may run in different threads; all other functions run in one thread."""
+    """The connection to a robot; `call` and `cancel` may run in different threads, and all other functions in one thread."""
 
     def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
-        """Execute an action and return its status and a message when it has ended; raise `RobotError` if there is no answer."""
+        """Execute an action, and return its status and a message after its end; raise `RobotError` if there is no answer."""
 
     def cancel(self) -> None:
         """End the running action, so that `call` returns; raise `RobotError` if that is impossible."""
 
     def model(self) -> Model:
-        """Return the present world model; raise `RobotError` if there is none."""
+        """Return the present world model; raise `RobotError` if the world model is unavailable."""

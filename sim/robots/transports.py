@@ -1,4 +1,4 @@
-"""The table of transports: how the actions and the world model of a robot are reached."""
+"""The table of transports, which connect to the actions and the world model of a robot."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from confab.sim.robots.transport import Transport
 
 
 def pyrobosim(where: str, seed: int) -> Transport:
-    """Return pyrobosim with the world of a YAML file."""
+    """Return a connection to pyrobosim with the world of a YAML file."""
     from confab.sim.robots.pyrobosim_transport import Pyrobosim
 
     return Pyrobosim(where, seed)
 
 
 def http(where: str, seed: int) -> Transport:
-    """Return the robot whose server has the URL `where`."""
+    """Return a connection to the robot whose server has the URL `where`."""
     from confab.sim.robots.http_transport import HttpRobot
 
     return HttpRobot(where)
 
 
 TRANSPORTS: Mapping[str, Callable[[str, int], Transport]] = {"http": http, "pyrobosim": pyrobosim}
-"""The transports by the name in `e:transport`: each is a function of an address and a seed that returns a connection."""
+"""The transports by their name in `e:transport`: functions of an address and a seed that return a connection."""
