@@ -1,1 +1,1 @@
-"""Worlds for tests and benchmarks: problems as values, exhaustive searches of them, and independent programs for comparison."""
+"""Worlds for tests and benchmarks: problems as values, exhaustive searches of the problems, and independent programs."""

@@ -1,6 +1,6 @@
-"""Agreement of planners on a world, with each other and with an exhaustive search.
+"""Comparison of planners on a world with each other and with an exhaustive search.
 
-The search visits all states of the lowest level, by a given reading of behaviours.
+The search visits all states of the lowest level. A function gives the successors of a state.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from worlds.writing import quantified
 
 State = Mapping[Symbol, str]
 Successors = Callable[[Problem], Callable[[State], Iterable[tuple[float, State]]]]
-"""Returns for a problem the function from a state to its successors with their costs."""
+"""Function of a problem that returns the function from a state to its successors with their costs."""
 
 
 def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
-    """Return the function from a state to its successors on the lowest level, as the checker reads behaviours."""
+    """Return the function from a state to its successors on the lowest level, computed by the plan checker's interpreter."""
     rules = BehaviorReader(problem)
     steps = list(quantified(problem, problem.domain.levels[-1]))
 
@@ -42,8 +42,8 @@ def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, 
 def cheapest(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> float | None:
     """Return the least cost of steps of the lowest level that reach the goal with all changed symbols at rest.
 
-    Infinity if there are none, None if there are more states than allowed. The checker derives defined situations and compares
-    amounts.
+    The result is infinity if no steps reach the goal, and None if there are more than `most` states. The plan checker derives
+    defined situations and compares amounts.
     """
     after = successors(problem)
     rests = {
@@ -51,7 +51,7 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
     }
 
     def restless(before: State, state: State, old: frozenset[Symbol]) -> frozenset[Symbol]:
-        """Return the changed symbols that aren't at rest."""
+        """Return the changed symbols that do not have their rest value."""
         return frozenset(s for s, r in rests.items() if state[s] != r and (s in old or state[s] != before[s]))
 
     def reached(state: State) -> bool:
@@ -81,14 +81,14 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
 def solvable(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> bool | None:
     """Return whether steps of the lowest level reach the goal with all changed symbols at rest.
 
-    None above the allowed number of states.
+    The result is None if there are more than `most` states.
     """
     least = cheapest(problem, successors, most)
     return None if least is None else least < math.inf
 
 
 def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool | None) -> list[str]:
-    """Return the faults of an outcome, given that of the paper's mode and, if known, whether there is a plan."""
+    """Return the faults of an outcome, given the outcome of the paper's mode and, if known, whether a plan exists."""
     found = []
     if outcome.plan is not None:
         found += [f"invalid: {fault.text}" for fault in validate(problem, outcome.plan)]
@@ -103,7 +103,7 @@ def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool |
 
 
 def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
-    """Whether a plan has lower-level steps because they shorten it, without violating a condition of a level above."""
+    """Return whether a plan is shorter than the other plan and violates no condition of a level above its steps."""
     if outcome.plan is None or other.plan is None or outcome.given_up:
         return False
     whole = any(left.broken for left in levels_left(problem, outcome.plan))
@@ -111,5 +111,5 @@ def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
 
 
 def on_top(problem: Problem, outcome: Outcome) -> bool:
-    """Whether all top steps of a plan are of the most abstract level."""
+    """Return whether all top steps of a plan belong to the most abstract level."""
     return outcome.plan is not None and all(step.level == problem.domain.levels[0] for step in outcome.plan.steps)

@@ -1,8 +1,9 @@
-"""Random PDDL with axioms: derived predicates in strata that need themselves, each other, and that lower ones don't hold.
+"""Random PDDL tasks with axioms.
 
-Everything but the types is random: formulas of any kind over constants, equality and predicates of no, one and two arguments, in
-axioms, preconditions, conditions of effects and goals. Text only, so that every planner reads it with its own reader. `Plain`
-reads it, too, line by line as PDDL says: it leads to goals that can be reached, and is a judge of its own.
+Derived predicates are arranged in strata. An axiom may use predicates of its own stratum, and the truth or negation of lower
+predicates. Axioms, preconditions, conditions of effects and goals contain random formulas over constants, equality and
+predicates with up to two arguments. A task is text, so that every planner parses it with its own parser. `Plain` evaluates the
+tasks directly by the semantics of PDDL. It selects reachable goals, and serves as an independent reference.
 """
 
 from __future__ import annotations
@@ -31,27 +32,28 @@ class Formulas:
     ----------
     rng : Random
     known : mapping of predicate to the types of its arguments
-        Facts of which conditions may require both the truth and the negation.
-    own : mapping likewise
-        Of which only their holding may help, and that of some one, not of all: Fast Downward takes "all" for "none doesn't".
+        Predicates whose truth or negation a condition may require.
+    own : mapping of predicate to the types of its arguments
+        Predicates of the same stratum, which occur only positively and not under a universal quantifier. Fast Downward reads a
+        universal quantifier as a negated existential quantifier.
     """
 
     def __init__(self, rng: Random, known: Mapping[str, tuple[str, ...]], own: Mapping[str, tuple[str, ...]]) -> None:
         self.rng, self.known, self.own, self.names = rng, known, own, 0
 
     def variable(self, bound: dict[str, str]) -> str:
-        """Return a new variable, added to the bound ones."""
+        """Return a new variable, which is added to `bound`."""
         self.names += 1
         bound[name := f"?x{self.names}"] = self.rng.choice(sorted(MEMBERS))
         return name
 
     def term(self, bound: Mapping[str, str], kind: str) -> str:
-        """Return a variable of a type, or a constant."""
+        """Return a bound variable or a constant of a type."""
         free = [name for name, its in bound.items() if its == kind]
         return self.rng.choice(free) if free and self.rng.random() < 0.93 else self.rng.choice(CONSTANTS[kind])
 
     def formula(self, bound: Mapping[str, str], depth: int = 2, helps: bool = True) -> str:
-        """Return a formula over some variables; `helps` says whether the formula should preferably be true."""
+        """Return a formula over bound variables; `helps` is true if the formula occurs positively."""
         rng, deeper = self.rng, depth - 1
         match rng.choice((*("atom",) * 8, "same", "and", "or", "not", "imply", "exists", "forall")):
             case "same":
@@ -78,7 +80,7 @@ class Formulas:
         return f"(not {said})" if negated else said
 
     def body(self, bound: Mapping[str, str]) -> str:
-        """Return a conjunction over some variables and possibly further quantified ones, or any formula."""
+        """Return a conjunction of formulas over bound variables and up to two existentially quantified variables."""
         inner, rng = dict(bound), self.rng
         new = [self.variable(inner) for _ in range(rng.choice((0, 0, 1, 1, 2)))]
         parts = [self.formula(inner, rng.choice((0, 0, 0, 1, 2))) for _ in range(rng.choice((1, 2, 2, 3)))]
@@ -86,13 +88,13 @@ class Formulas:
         return f"(exists ({' '.join(f'{name} - {inner[name]}' for name in new)}) {said})" if new else said
 
     def atom(self, name: str, bound: Mapping[str, str]) -> str:
-        """Return an atom over some terms."""
+        """Return an atom of a predicate over random terms."""
         kinds = {**CHANGED, **self.known, **self.own}[name]
         return f"({' '.join([name, *(self.term(bound, kind) for kind in kinds)])})"
 
 
 def axioms(rng: Random) -> tuple[str, str]:
-    """Return a random domain with axioms and a problem of it, as PDDL."""
+    """Return a random PDDL domain with axioms, and a PDDL problem of the domain."""
     strata = _strata(rng)
     derived = {name: kinds for stratum in strata for name, kinds in stratum.items()}
     everything = {**CHANGED, **STATIC, **derived}
@@ -115,7 +117,7 @@ def axioms(rng: Random) -> tuple[str, str]:
 
 
 def _wanted(rng: Random, plain: Plain, state: State, rows: Sequence[Fact]) -> list[str]:
-    """Return two to four literals as a goal, mostly true at the end of a random walk."""
+    """Return two to four goal literals, most of which hold at the end of a random walk."""
     first = now = plain.derived(state)
     for _ in range(rng.choice((4, 8, 16))):
         after = sorted(set(plain.successors(state)), key=sorted)
@@ -141,7 +143,7 @@ def _declared(name: str, kinds: Sequence[str]) -> str:
 
 
 def _action(rng: Random, name: str, known: Mapping[str, tuple[str, ...]]) -> str:
-    """Return an action with preconditions and one to three effects, some conditional, some on all objects of a type."""
+    """Return an action with preconditions and up to three effects; effects may be conditional or universal."""
     formulas = Formulas(rng, known, {})
     bound = {f"?v{place}": rng.choice(sorted(MEMBERS)) for place in range(rng.choice((0, 1, 2, 2, 3)))}
     head = " ".join(f"{name} - {kind}" for name, kind in bound.items())
@@ -167,7 +169,7 @@ def _said(row: Fact) -> str:
 
 
 class Plain:
-    """A plain evaluator of these domains: it tries all individuals and derives all axioms in every state."""
+    """A plain evaluator of these domains, which tries all individuals and evaluates all axioms in every state."""
 
     def __init__(self, domain: str) -> None:
         parts = parsed(domain)[2:]
@@ -178,7 +180,7 @@ class Plain:
                 self.strata.setdefault(part[1][0][:2], []).append(part[1:])
 
     def derived(self, state: State) -> State:
-        """Return a state with all derived atoms, stratum by stratum."""
+        """Return a state with all derived atoms, computed stratum by stratum."""
         found = set(state)
         for _, axioms_ in sorted(self.strata.items()):
             size = -1
@@ -191,7 +193,7 @@ class Plain:
         return frozenset(found)
 
     def successors(self, state: State) -> Iterator[State]:
-        """Yield the states that one action leads to."""
+        """Yield the successors of a state."""
         now = self.derived(state)
         for _, _, _, declared, _, asked, _, effect in self.actions:
             for terms in _bindings(declared):
@@ -201,7 +203,7 @@ class Plain:
                     yield (state - ended) | {row for row, becomes in made if becomes}
 
     def shortest(self, problem: str) -> int | None:
-        """Return the length of a shortest plan; None if there is none."""
+        """Return the length of a shortest plan, or None if there is no plan."""
         *_, init, goal = parsed(problem)
         layer, seen, length = {frozenset(map(tuple, init[1:]))}, set[State](), 0
         while layer:
@@ -231,7 +233,7 @@ def parsed(text: str) -> Any:
 
 
 def holds(formula: Any, terms: Mapping[str, str], state: Iterable[Fact]) -> bool:
-    """Return whether a formula holds of some individuals."""
+    """Return whether a formula holds in a state for a binding of its variables."""
     word, *parts = formula
     match word:
         case "and":
@@ -256,7 +258,7 @@ def _bindings(declared: Sequence[str]) -> Iterator[dict[str, str]]:
 
 
 def _changes(effect: Any, terms: Mapping[str, str], state: State) -> Iterator[tuple[Fact, bool]]:
-    """Yield the changes of each fact that an effect makes."""
+    """Yield each fact that an effect changes, with its new truth value."""
     word, *parts = effect
     match word:
         case "and":

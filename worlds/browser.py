@@ -1,4 +1,4 @@
-"""A browser that tests and pictures drive: Chromium over its DevTools pipe, without a driver program."""
+"""A browser for tests and pictures: Chromium, controlled over its DevTools pipe without a driver program."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Browser:
         theirs, self.ours = os.pipe()
         self.answers, back = os.pipe()
 
-        def wire() -> None:  # Chromium reads from 3 and writes to 4
+        def wire() -> None:  # Chromium reads from descriptor 3 and writes to 4
             one, other = os.dup(theirs), os.dup(back)
             os.dup2(one, 3)
             os.dup2(other, 4)
@@ -69,7 +69,7 @@ class Browser:
         self.profile.cleanup()
 
     def call(self, method: str, **parameters: object) -> Any:
-        """Return the browser's response to a command; faults of the page are kept in `faults`."""
+        """Return the browser's response to a command; errors of the page are added to `faults`."""
         self.number += 1
         message = {"id": self.number, "method": method, "params": parameters}
         if self.session:
@@ -91,7 +91,7 @@ class Browser:
             self.rest += os.read(self.answers, 1 << 20)
 
     def open(self, address: str, width: int = 1280, height: int = 900, dark: bool = False) -> None:
-        """Open an address in a window of a size, and wait until it is loaded."""
+        """Open an address in a window of the given size, and wait until the page is loaded."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
@@ -99,13 +99,13 @@ class Browser:
         self.wait("document.readyState === 'complete' && location.href !== 'about:blank'")
 
     def run(self, script: str) -> Any:
-        """Return the value of an expression in the page; a promise is awaited."""
+        """Return the value of a JavaScript expression in the page, or the result of a promise."""
         found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
     def wait(self, script: str) -> Any:
-        """Return the value of an expression as soon as it is true."""
+        """Wait until a JavaScript expression is true, and return its value."""
         end = monotonic() + SECONDS
         while not (value := self.run(script)):
             assert monotonic() < end, f"never true: {script}"
@@ -113,7 +113,7 @@ class Browser:
         return value
 
     def click(self, selector: str) -> None:
-        """Click with the mouse in the middle of an element."""
+        """Click the middle of an element with the mouse."""
         x, y = self.run(
             f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{ block: 'center' }});"
             " const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
@@ -122,19 +122,19 @@ class Browser:
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def choose(self, label: str, value: str) -> None:
-        """Choose a value in the list of a name."""
+        """Choose a value in the selection list with a label."""
         self.run(
             f"(() => {{ const e = document.querySelector('select[aria-label={json.dumps(label)}]'); e.focus();"
             f" e.value = {json.dumps(value)}; e.dispatchEvent(new Event('change')); }})()"
         )
 
     def type(self, selector: str, text: str) -> None:
-        """Click an element and type a text into it."""
+        """Click an element, and type text into the element."""
         self.click(selector)
         self.call("Input.insertText", text=text)
 
     def shot(self, path: str | Path, height: int | None = None) -> None:
-        """Save a picture of the page, whole or of a height from the top."""
+        """Save a picture of the whole page, or of its top `height` pixels."""
         if height is None:
             height = int(self.run("document.documentElement.scrollHeight"))
         width = int(self.run("innerWidth"))

@@ -1,4 +1,4 @@
-"""Probably invalid plans: a valid plan with an omission, exchange or addition; or random steps."""
+"""Mostly invalid plans: valid plans with one random change, and random steps."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def random_steps(meant: Interpreter, rng: Random) -> Plan:
 
 
 def numbered(plan: Plan, problem: Problem) -> Plan:
-    """Return a plan with the IDs that a problem gives to its steps."""
+    """Return a plan whose steps have the IDs that the problem gives them."""
 
     def those(steps: tuple[Step, ...]) -> Iterator[Step]:
         for step in steps:

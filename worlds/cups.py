@@ -1,4 +1,4 @@
-"""Cups in two rooms as a scene, whose situations are defined or kept up to date by each behaviour."""
+"""A scene with cups in two rooms; its situation types are either defined by axioms or updated by every behaviour."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ BY_HAND = """
 
 
 def scene(cups: int, defined: bool) -> str:
-    """Return a scene: half of the cups in each room, every second cup dirty, as many free places as cups."""
+    """Return a scene in Turtle with half of the cups in each room, and as many free places as cups."""
     lines = [HEAD, DEFINED if defined else BY_HAND]
     wanted = [f":task.goal{i}" for i in range(max(cups // 10, 1))]
     for i in range(2 * cups):

@@ -1,4 +1,4 @@
-"""What planning derives in a world of definitions, beside what HermiT entails and what a plain reading gives."""
+"""Comparison of the facts that planning derives from definitions with HermiT's entailments and with plain Python."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Derived = set[tuple[str, ...]]
 
 
 def first_problem() -> Problem:
-    """Return the world of `LOGIC` as planning reads it from a file, in some state."""
+    """Return the planning problem of `LOGIC`, loaded from a file, with the random state of seed 0."""
     with tempfile.TemporaryDirectory() as folder:
         said = [
             f":{one} :{prop} {other if prop == 'weight' else ':' + other} ."
@@ -41,7 +41,7 @@ def first_problem() -> Problem:
 
 
 def in_state(problem: Problem, facts: list[tuple[str, str, str]]) -> Problem:
-    """Return the problem in another state."""
+    """Return the problem with another initial state."""
     relations: dict[str, frozenset[tuple[str, ...]]] = {
         name: frozenset((one, other) for one, prop, other in facts if prop == name) for name in ("partOf", "near")
     }
@@ -56,7 +56,7 @@ def in_state(problem: Problem, facts: list[tuple[str, str, str]]) -> Problem:
 
 
 def derived(problem: Problem) -> Iterator[tuple[str, Derived]]:
-    """Yield the facts that each evaluator derives in the initial state, with its name."""
+    """Yield for each evaluator its name and the facts that it derives in the initial state."""
     situations = problem.domain.situations
     defined = [
         Symbol(name, arguments)
@@ -75,7 +75,7 @@ def _row(symbol: Symbol) -> tuple[str, ...]:
 
 
 def compared(problem: Problem, seeds: range) -> tuple[Counter[str], Mapping[str, list[str]]]:
-    """Return how often each definition was true in some states, and for each evaluator where it differs from HermiT."""
+    """Return how often each definition was true in random states, and each evaluator's differences from HermiT."""
     states = [random_state(Random(seed)) for seed in seeds]
     truths = entailed([asserted(facts) for facts in states])
     true: Counter[str] = Counter()

@@ -1,9 +1,9 @@
-"""What HermiT entails in states that are asserted as ontologies: the truth that definitions are held against.
+"""Entailments of the reasoner HermiT, which are the reference for definitions.
 
-`python -m worlds.entailed` reads JSON from stdin, ``logic`` in Turtle, ``states`` in Turtle, the ``classes`` and ``properties`` to
-ask for, and prints for each state what is entailed: ``[class, individual]`` and ``[property, one, other]``. It runs in a process of
-its own, since a JVM can't be stopped. `random_state` makes states of `LOGIC`, which `asserted` closes: OWL takes what isn't said
-for possible, planning for false.
+`python -m worlds.entailed` reads JSON from stdin: ``logic`` and ``states`` in Turtle, and the requested ``classes`` and
+``properties``. For each state the command prints the entailments ``[class, individual]`` and ``[property, one, other]``. The
+command runs in a separate process, since a JVM can't be stopped. `random_state` returns random states of `LOGIC`. In OWL an
+unstated fact may be true, in planning it is false, so `asserted` adds axioms that exclude further facts.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ PREFIXES = f"""@prefix : <{SPACE}> .
 
 
 def some(prop: str, said: str) -> str:
-    """Return a restriction in Turtle."""
+    """Return an OWL restriction on a property in Turtle."""
     return f"[ a owl:Restriction ; owl:onProperty {prop} ; {said} ]"
 
 
 def every(*parts: str) -> str:
-    """Return an intersection in Turtle."""
+    """Return the OWL intersection of classes in Turtle."""
     return f"[ a owl:Class ; owl:intersectionOf ( {' '.join(parts)} ) ]"
 
 
 def atoms(*said: str) -> str:
-    """Return a list of SWRL atoms, written like ``:liesIn ?x ?y`` and ``:Box ?x``, as the OWL API writes it."""
+    """Return a list of SWRL atoms in the OWL API's form, from texts such as ``:liesIn ?x ?y`` and ``:Box ?x``."""
     text = "rdf:nil"
     for atom in reversed(said):
         predicate, *terms = [f"<urn:swrl:var#{w[1:]}>" if w.startswith("?") else w for w in atom.split()]
@@ -55,14 +55,14 @@ def atoms(*said: str) -> str:
 
 
 def implies(head: str, *body: str) -> str:
-    """Return a SWRL rule with the declarations of its variables."""
+    """Return a SWRL rule and the declarations of its variables."""
     variables = sorted({w[1:] for atom in (head, *body) for w in atom.split() if w.startswith("?")})
     declared = "".join(f"<urn:swrl:var#{v}> a swrl:Variable .\n" for v in variables)
     return f"{declared}[ a swrl:Imp ; swrl:body {atoms(*body)} ; swrl:head {atoms(head)} ] .\n"
 
 
 def two(filler: str, many: str) -> str:
-    """Return a cardinality restriction; ``many`` is like ``min 2``."""
+    """Return a qualified cardinality restriction; ``many`` is a text such as ``min 2``."""
     name, number = many.split()
     capital = "qualifiedCardinality" if name == "exactly" else f"{name}QualifiedCardinality"
     return f'owl:{capital} "{number}"^^xsd:nonNegativeInteger ; owl:onClass {filler}'
@@ -83,9 +83,9 @@ DEFINED = {
     "DEEP": (":Deep", every(":Thing", some(":isInside", f"owl:someValuesFrom {every(':Box', ':Heavy')}"))),
     "FOUND": (":Found", every(":Place", some("[ owl:inverseOf :leadsTo ]", "owl:someValuesFrom :Hand"))),
 }  # fmt: skip
-"""Situation types with `holdsOf`, and the definitions of their classes."""
+"""Situation types that hold of the members of a class (`holdsOf`), with the definition of the class."""
 CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched", "SOUGHT": ":Sought"}
-"""Situation types with `holdsOf` whose classes SWRL rules conclude."""
+"""Situation types that hold of the members of a class whose members SWRL rules conclude."""
 PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked", "leadsTo", "endsOn")
 LOGIC = f"""
 :Place a owl:Class . :Thing a owl:Class . :Floor a owl:Class . :Hand a owl:Class . :Cleanliness a owl:Class .
@@ -118,10 +118,10 @@ LOGIC = f"""
 {implies(":leadsTo ?x ?y", ":liesIn ?x ?y", ":cleanliness ?x :clean")}
 {implies(":Sought ?x", ":Deep ?x", ":liesIn ?x ?y", ":Found ?y")}
 """
-"""Definitions of every kind that planning knows: expressions, chains, transitive and recursive ones, numbers, SWRL.
+"""Definitions of every kind that planning supports: class expressions, chains, transitivity, recursion, numbers and SWRL rules.
 
-SWRL concludes what is transitive, a chain goes on from there, and a rule asks for classes that these define. No rule asks for a
-transitive property itself: HermiT then doesn't find all that follows.
+A SWRL rule concludes a transitive property, a property chain uses the transitive property, and another rule uses the classes
+defined by them. No rule body contains a transitive property, since HermiT's entailments are then incomplete.
 """
 
 THINGS = ("box1", "box2", "box3", "cup1", "cup2", "cup3")
@@ -130,7 +130,7 @@ ALL = (*THINGS, "room1", "room2", "floor1", "floor2", "hand1", "hand2")
 
 
 def domain() -> str:
-    """Return a world whose situation types are defined by `LOGIC`, in Turtle, with all individuals and a first state."""
+    """Return a domain and scene in Turtle whose situation types are defined by `LOGIC`."""
     changed = {"LIES_IN": "liesIn", "CLEANLINESS": "cleanliness", "HOLDS": "holds"}
     parts = [
         f"{PREFIXES}<https://example.org/yard> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .",
@@ -159,7 +159,7 @@ def domain() -> str:
 
 
 def random_state(rng: Random) -> list[tuple[str, str, str]]:
-    """Return the facts of a random state: things in boxes in boxes, also in a circle, and static relations."""
+    """Return the facts of a random state: nested boxes, also in cycles, held things, and static relations."""
     facts = [(thing, "liesIn", rng.choice(PLACES)) for thing in THINGS]
     facts += [(thing, "cleanliness", rng.choice(("clean", "dirty"))) for thing in THINGS]
     facts += [(thing, "weight", rng.choice(("0", "2.5", "5", "6.99", "7"))) for thing in THINGS[:3]]
@@ -172,7 +172,7 @@ def random_state(rng: Random) -> list[tuple[str, str, str]]:
 
 
 def asserted(facts: Sequence[tuple[str, str, str]]) -> str:
-    """Return a state as axioms in Turtle, closed: individuals whose values are counted have no other values."""
+    """Return a state as axioms in Turtle, with axioms that exclude further values of counted properties."""
     said = {(one, prop, f'"{other}"^^xsd:decimal' if prop == "weight" else f":{other}") for one, prop, other in facts}
     lines = [f":{one} :{prop} {other} ." for one, prop, other in sorted(said)]
     lines += [f":{name} a owl:NamedIndividual, :{name[:-1].title()} ." for name in ALL]
@@ -186,7 +186,7 @@ def asserted(facts: Sequence[tuple[str, str, str]]) -> str:
 
 
 def plainly(facts: Sequence[tuple[str, str, str]]) -> set[tuple[str, ...]]:
-    """Return the consequences of `LOGIC` in a state, computed in plain Python without Turtle and rules, as an independent judge."""
+    """Return the consequences of `LOGIC` in a state, computed in plain Python as an independent reference."""
     of: dict[str, set[tuple[str, str]]] = {
         prop: set() for prop in ("liesIn", "holds", "near", "partOf", "cleanliness", "weight")
     }
@@ -226,7 +226,7 @@ def plainly(facts: Sequence[tuple[str, str, str]]) -> set[tuple[str, ...]]:
 
 
 def _closed(pairs: set[tuple[str, str]]) -> set[tuple[str, str]]:
-    """Return the transitive closure of some pairs."""
+    """Return the transitive closure of a relation."""
     found: set[tuple[str, str]] = set()
     while found != (found := found | pairs | {(x, z) for x, y in found for w, z in pairs if w == y}):
         pass
@@ -234,7 +234,7 @@ def _closed(pairs: set[tuple[str, str]]) -> set[tuple[str, str]]:
 
 
 def entailed(states: Sequence[str]) -> list[set[tuple[str, ...]]]:
-    """Return the entailments of HermiT in some states, by local names: classes with an individual, properties with two."""
+    """Return HermiT's entailments in each state by local names: classes with an individual, properties with two individuals."""
     classes = [kind[1:] for kind, _ in DEFINED.values()] + [kind[1:] for kind in CONCLUDED.values()]
     asked = {"logic": LOGIC, "states": [*states], "classes": classes, "properties": PROPERTIES}
     done = subprocess.run(
@@ -244,7 +244,7 @@ def entailed(states: Sequence[str]) -> list[set[tuple[str, ...]]]:
 
 
 def _answers(asked: dict[str, Any]) -> Iterator[list[list[str]]]:
-    """Yield the entailments of HermiT, state by state."""
+    """Yield HermiT's entailments in each state."""
     from org.semanticweb.HermiT import ReasonerFactory
     from org.semanticweb.owlapi.apibinding import OWLManager
     from org.semanticweb.owlapi.io import StringDocumentSource
@@ -276,7 +276,7 @@ def _local(individual: Any) -> str:
 
 
 def main() -> None:
-    """Answer the request on stdin."""
+    """Print the entailments for the request on stdin."""
     import jpype
     import jpype.imports
 

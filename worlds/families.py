@@ -1,4 +1,4 @@
-"""Tabletop problems of any size as values, for tests and benchmarks: the families that `confab generate` writes as scenes."""
+"""Tabletop problems of any size as values, for tests and benchmarks, of the families that `confab generate` writes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAMILIES = ("served", "swap", "rotate", "full", "packed", "handover", "blocked")
 
 @lru_cache(maxsize=1)
 def tabletop() -> Problem:
-    """Return the shipped scene, for its domain and classes."""
+    """Return the problem of the shipped scene, which gives the domain and the classes."""
     return read(load("beverage-serving")).problem
 
 
@@ -32,7 +32,7 @@ def table(
     drinks: dict[str, str] | None = None,
     filled: dict[str, str] | None = None,
 ) -> Problem:
-    """Return a table of places 1 … `places`; objects are bottle1 … and then cup1 …, `at` gives the place of each."""
+    """Return a problem of a table; `at` has the numbers of the bottles' places, and then of the cups' places."""
     base = tabletop()
     bottle_names = tuple(f"bottle{i + 1}" for i in range(bottles))
     cup_names = tuple(f"cup{i + 1}" for i in range(cups))
@@ -71,7 +71,7 @@ def table(
 
 
 def strips(places: int, columns: int, hands: int) -> list[set[int]]:
-    """Return the reach of each hand: overlapping strips of columns, three quarters each if there are two."""
+    """Return the places in reach of each hand: overlapping strips of columns, of three quarters of the columns for two hands."""
     width = (3 * columns + 3) // 4 if hands == 2 else max(2, -(-2 * columns // hands))
     found = []
     for hand in range(hands):
@@ -127,14 +127,14 @@ def family(name: str, n: int, seed: int = 0, hands: int = 2) -> Problem:
         pours = {f"cup{i + 1}": f"beverage{i + 1}" for i in range(cups) if f"cup{i + 1}" in goals}
     elif name == "blocked":
         served = cups // 2
-        goals = {f"cup{i + 1}": at[bottles + served + i] for i in range(served)}  # other cups are there
+        goals = {f"cup{i + 1}": at[bottles + served + i] for i in range(served)}  # places of the other cups
         pours = {f"cup{i + 1}": f"beverage{i + 1}" for i in range(served)}
         goals |= {f"bottle{i + 1}": at[(i + 1) % bottles] for i in range(bottles)}
     return table(places, hands, cups, bottles, at, goals, pours, reach)
 
 
 def random_table(seed: int) -> Problem:
-    """Return a small table with random reach, objects and goals; about a third of them are unsolvable."""
+    """Return a small random problem of a table; about a third of the problems are unsolvable."""
     rng = random.Random(f"random {seed}")
     places = rng.randint(3, 6)
     bottles, cups = rng.randint(0, 2), rng.randint(1, 2)

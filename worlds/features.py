@@ -1,4 +1,4 @@
-"""The features of a random world, and whether each of them decides reachability of the goal or its cost."""
+"""The features of a random world, and whether each feature changes the cost or the reachability of the goal."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from worlds.phrases import ANYONE, EACH
 from worlds.shrinking import without_individual
 
 MOST = 2_000
-"""Maximum number of nodes of a search without a feature."""
+"""Maximum number of nodes of the search of a world without a feature."""
 
 
 def _kept(conditions: tuple[Condition, ...], drop: Callable[[Condition], bool]) -> tuple[Condition, ...]:
-    """Return a conjunction without the conditions that are to be dropped, those inside others included."""
+    """Return a conjunction without the conditions for which `drop` is true, also inside nested conditions."""
 
     def inner(one: Condition) -> Condition:
         if isinstance(one, AnyOf):
@@ -116,7 +116,7 @@ def _restless(world: RandomWorld) -> Problem:
 
 
 def _different(world: RandomWorld) -> Problem:
-    """Return a problem in which no behaviour takes the same individual twice."""
+    """Return the problem with the condition that all parameters of a behaviour have different individuals."""
 
     def changed(one: Behavior) -> Behavior:
         pairs = combinations([p.name for p in one.parameters], 2)
@@ -126,7 +126,7 @@ def _different(world: RandomWorld) -> Problem:
 
 
 def _named_only(world: RandomWorld) -> Problem:
-    """Return a problem without unused individuals."""
+    """Return the problem without unused individuals."""
     for one in (*world.problem.classes["A"], *world.problem.classes["B"]):
         world = without_individual(world, one) or world
     return world.problem
@@ -185,11 +185,11 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
     "equal arguments": _different,
     "individuals that nothing names": _named_only,
 }
-"""For each feature, a world without it."""
+"""The function that removes each feature from a world, by the feature's name."""
 
 
 def features(world: RandomWorld, least: float | None) -> Iterator[tuple[str, bool]]:
-    """Yield the features of a world, and whether the least cost differs without each."""
+    """Yield each feature of a world, and whether the least cost differs without the feature."""
     for name, without in FEATURES.items():
         other = without(world)
         if other == world.problem:

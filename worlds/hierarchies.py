@@ -1,10 +1,10 @@
-"""Random worlds of two or three levels: a robot that carries items between spots, with obstacles.
+"""Random worlds of two or three levels in which a robot carries items between spots.
 
-Each world has some of these, drawn at random: covers over spots that have to be shut again (or needn't, or can't be); one or two
-hands; a robot that drives, on roads some of which are one-way, with fuel or without, that returns to its place or doesn't; spots
-for one item, for two, or for any number; items that fit some spots only, or may be moved only after they were treated; a station
-that has to be covered, or uncovered, for that; a lamp that one move turns off and on; covers that are open at first. The levels
-are those of the paper: actions on items, of hands, of arms. The worlds are small enough to be searched exhaustively.
+Each world has a random choice of features. Covers over spots may have to be shut again at the end. The robot has one or two
+hands. The robot may drive on roads, need fuel, and have to return. A spot has room for one item, two items or any number. Items
+may fit only some spots, and may have to be treated at a station before a move. A lamp may be turned off and on by one move. The
+levels are the levels of the paper: actions on items, actions of hands, and motions of arms. The worlds are small enough for an
+exhaustive search.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SMALL = 4_000
 
 
 def hierarchy(seed: int) -> Problem:
-    """Return a random world; the same for the same seed."""
+    """Return a random world; equal seeds give equal worlds."""
     rng = Random(seed)
     while True:
         problem = _Draft(rng).problem()
@@ -44,7 +44,7 @@ def hierarchy(seed: int) -> Problem:
 
 
 def states(problem: Problem) -> int:
-    """Return the number of states of a problem, reachable or not, if each held thing is counted once."""
+    """Return the number of combinations of values, reachable or not, without a separate count of what a hand holds."""
     held = len(problem.classes["Hand"])
     return prod(
         2 if problem.domain.situations[s.situation].boolean
@@ -55,7 +55,7 @@ def states(problem: Problem) -> int:
 
 
 class _Draft:
-    """One draw of everything."""
+    """A random draw of the features of a world."""
 
     def __init__(self, rng: Random) -> None:
         self.rng = rng
@@ -133,7 +133,7 @@ class _Draft:
     # ------------------------------------------------------------------------------------------------------ conditions
 
     def roomy(self, spot: str) -> list[Condition]:
-        """Return that a spot isn't full."""
+        """Return the condition that a spot isn't full."""
         if self.room == 1:
             return [Witness("?o", "Item", (has("AT", "?o", spot),), negated=True)]
         if self.room == 2:
@@ -146,24 +146,24 @@ class _Draft:
         return Witness("?c", "Cover", inside, negated=True)
 
     def at(self, spot: str) -> list[Condition]:
-        """Return that the robot is at a spot, if it drives."""
+        """Return the condition that the robot is at a spot; no condition if the robot doesn't drive."""
         return [has("ROBOT_AT", "robot", spot)] if self.drives else []
 
     def beside(self, cover: str) -> list[Condition]:
-        """Return the condition that the robot is at a cover."""
+        """Return the condition that the robot is at a cover's spot; no condition if the robot doesn't drive."""
         inside = (RelationCondition("covers", (cover, "?w")), has("ROBOT_AT", "robot", "?w"))
         return [Witness("?w", "Spot", inside)] if self.drives else []
 
     def may(self, item: str, spot: str) -> list[Condition]:
-        """Return the condition that an item fits a spot."""
+        """Return the condition that an item fits a spot, in worlds where items fit only some spots."""
         return [RelationCondition("fits", (item, spot))] if self.fits else []
 
     def unlit(self, a: str, b: str) -> list[ValueEffect]:
-        """Return the effects that a move turns a lamp on where it ends, and off where it begins."""
+        """Return the effects of a move from `a` to `b` on lamps: on at `b` and off at `a`."""
         return [becomes("LIT", b, TRUE), becomes("LIT", a, FALSE)] if self.lamp else []
 
     def burnt(self) -> list[ValueEffect]:
-        """Return the effect that a route takes one unit of fuel."""
+        """Return the effects by which a drive uses one unit of fuel."""
         return [
             becomes("FUEL", "robot", f"fuel{i - 1}", when=(has("FUEL", "robot", f"fuel{i}"),))
             for i in range(1, self.fuel + 1)
@@ -232,7 +232,7 @@ class _Draft:
         return [b for b in found if self.there_is(b.name)]
 
     def there_is(self, name: str) -> bool:
-        """Whether a world of these features has a behaviour."""
+        """Return whether a world of these features has a behaviour of the given name."""
         needs: dict[str, Callable[[], bool]] = {
             "TREAT2": lambda: self.treats, "PRESS": lambda: self.treats, "OPEN": lambda: bool(self.covers),
             "LIFT": lambda: bool(self.covers), "SHUT": lambda: bool(self.covers) and self.shuts,

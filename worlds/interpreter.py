@@ -1,11 +1,10 @@
-"""A plain interpreter of problems: the effect of each quantified behaviour in a state, and the reachable states.
+"""A plain interpreter of problems: the successor of a state by each grounded behaviour, and the reachable states.
 
-It shares no code with a search, a proof or the checker of plans, so that all of these can be held against it. Conditions are
-grounded by trying every binding, and written out as Python expressions over a tuple of values.
+The interpreter shares no code with the searches, the proofs and the plan checker, so that it can serve as their reference.
+Conditions are grounded by trying every binding, and written as Python expressions over a tuple of values.
 
-slot     the position of a symbol's value in a state; static symbols have none
-state    a tuple: a text per symbol, a number per amount; defined situations come last
-node     a state, with the symbols that have been changed and aren't at rest
+slot     the position of a symbol's value in a state; static symbols have no slot state    a tuple: a text per symbol, a number
+per amount; defined situations come last node     a state, with the changed symbols that don't have their rest value
 """
 
 from __future__ import annotations
@@ -47,15 +46,15 @@ Terms = Mapping[str, str]
 State = tuple[Any, ...]
 Node = tuple[State, frozenset[int]]
 NOTHING = math.nan
-"""The missing number: comparisons with it are false, and calculations with it are missing."""
+"""The missing number, for which comparisons are false and calculations give the missing number again."""
 
 
 class TooManyStatesError(Exception):
-    """More states than allowed are reachable."""
+    """Raised when more states than allowed are reachable."""
 
 
 def divided(one: Any, other: Any) -> Any:
-    """Return a quotient; the missing number for a divisor that is zero or missing."""
+    """Return a quotient; the missing number if the divisor is zero or a number is missing."""
     if other == 0 or other != other or one != one:
         return NOTHING
     result = Fraction(one) / Fraction(other)
@@ -63,13 +62,13 @@ def divided(one: Any, other: Any) -> Any:
 
 
 def number(text: str | Fraction) -> Any:
-    """Return a number as an integer where it is one."""
+    """Return a number as an integer if it is whole, otherwise as a fraction."""
     value = Fraction(text)
     return value.numerator if value.denominator == 1 else value
 
 
 def variables(condition: Condition) -> set[str]:
-    """Return the variables that a condition needs bound; those inside `AnyOf` and `Witness` are their own."""
+    """Return the variables that must be bound before a condition is evaluated, without variables inside `AnyOf` and `Witness`."""
     match condition:
         case ValueCondition(_, arguments, value):
             terms = {*arguments, value}
@@ -88,7 +87,7 @@ def variables(condition: Condition) -> set[str]:
 
 @dataclass(frozen=True)
 class Action:
-    """A quantified behaviour: `outcomes` has a function from a state to the next one (or None) per binding of its variables."""
+    """A grounded behaviour; `outcomes` has one function from a state to its successor or None for each binding of variables."""
 
     behavior: Behavior
     arguments: tuple[str, ...]
@@ -97,14 +96,14 @@ class Action:
 
 @dataclass(frozen=True)
 class Truth:
-    """The reachable part of a level: each node with its least cost, and the least cost of a goal node."""
+    """The reachable nodes of a level with their least costs, and the least cost of a goal node."""
 
     costs: Mapping[Node, Any]
     least: Any | None
 
 
 class Interpreter:
-    """One problem, interpreted."""
+    """An interpreter of one problem."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -141,14 +140,14 @@ class Interpreter:
         self.totals = [made for one in in_order(domain.aggregates) for made in self.aggregated(one)]
         self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
         mutual = any(read_by(one) & domain.rules.keys() for one in domain.aggregates.values())
-        self.rounds = 1 + len(domain.aggregates) if mutual else 1  # rules and amounts may read each other
+        self.rounds = 1 + len(domain.aggregates) if mutual else 1  # rules and amounts may depend on each other
         self.initial = self.closed(initial)
         self.rests = self.unsettled()
         self._actions: dict[int, list[Action]] = {}
         self._named: dict[tuple[str, tuple[str, ...]], Action] = {}
 
     def unsettled(self) -> dict[int, str]:
-        """Return the rest values that must hold in the end, unless the goal requires other values."""
+        """Return the rest values that must hold at the end, by slot, for symbols without a goal."""
         return {
             i: rest
             for symbol, i in self.slots.items()
@@ -156,7 +155,7 @@ class Interpreter:
         }
 
     def wanting(self, goal: Mapping[Symbol, str]) -> Interpreter:
-        """Return the interpreter of the same problem with another goal."""
+        """Return an interpreter of the same problem with another goal."""
         other = copy(self)
         other.problem = replace(self.problem, goal=goal)
         other.rests = other.unsettled()
@@ -171,16 +170,16 @@ class Interpreter:
             yield {**terms, **dict(zip(free, values, strict=True))}
 
     def all_of(self, conditions: Iterable[Condition], terms: Terms, kinds: Terms) -> str:
-        """Return a conjunction as an expression."""
+        """Return a conjunction as a Python expression."""
         return _joined([self.condition(one, terms, kinds) for one in conditions], "and", "True", "False")
 
     def some(self, conditions: Sequence[Condition], terms: Terms, kinds: Terms) -> str:
-        """Return that a conjunction holds for some binding of its unbound variables."""
+        """Return the expression that a conjunction holds for some binding of its unbound variables."""
         ways = [self.all_of(conditions, trial, kinds) for trial in self.bindings(conditions, kinds, terms)]
         return _joined(ways, "or", "False", "True")
 
     def condition(self, condition: Condition, terms: Terms, kinds: Terms) -> str:
-        """Return a condition as an expression over the state ``s``."""
+        """Return a condition as a Python expression over the state ``s``."""
 
         def get(name: str) -> str:
             return terms.get(name, name)
@@ -210,7 +209,7 @@ class Interpreter:
                 return _negated(f"({self.worth(left, terms)} {python} {self.worth(right, terms)})", negated)
 
     def worth(self, expression: Expression, terms: Terms) -> str:
-        """Return a calculation as an expression over the state ``s``."""
+        """Return a calculation as a Python expression over the state ``s``."""
         match expression:
             case Amount(situation, arguments):
                 symbol = Symbol(situation, tuple(terms.get(a, a) for a in arguments))
@@ -229,13 +228,13 @@ class Interpreter:
                 return repr(number(expression))
 
     def holds(self, conditions: Sequence[Condition], state: State) -> bool:
-        """Return whether a conjunction without variables holds."""
+        """Return whether a conjunction holds in a state for some binding of its variables."""
         return bool(eval(self.some(conditions, {}, {}), {**NAMES, "s": state}))
 
     # ------------------------------------------------------------------------------------------------------- behaviours
 
     def derivations(self, names: Iterable[str]) -> list[tuple[int, Any]]:
-        """Return the symbols of a group of mutually dependent rules, each with the expression for its truth."""
+        """Return the slot of each symbol of a group of mutually dependent rules, with the function that returns its truth."""
         ways: dict[int, list[str]] = {}
         for rule in (rule for name in names for rule in self.problem.domain.rules[name]):
             kinds = {one.name: one.kind for one in (*rule.parameters, *rule.variables)}
@@ -247,13 +246,13 @@ class Interpreter:
         return [(slot, eval(f"lambda s: {_joined(said, 'or', 'False', 'True')}", NAMES)) for slot, said in ways.items()]
 
     def recursive(self, names: Iterable[str]) -> bool:
-        """Return whether rules of a group may depend on the group's own conclusions."""
+        """Return whether the rules of a group may depend on the group's own conclusions."""
         group = set(names)
         rules = [rule for name in group for rule in self.problem.domain.rules[name]]
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
     def closed(self, values: list[Any]) -> State:
-        """Return a state with all derived values: amounts, then rules, group by group, beginning with none."""
+        """Return a state with all derived values: first amounts, and then rules group by group, from the empty set upwards."""
         for _ in range(self.rounds):
             for slot, total in self.totals:
                 values[slot] = total(values)
@@ -269,7 +268,7 @@ class Interpreter:
         return tuple(values)
 
     def aggregated(self, one: Aggregate) -> Iterator[tuple[int, Any]]:
-        """Yield the symbols of a derived amount, each with a function from a state to its number."""
+        """Yield the slot of each symbol of a derived amount, with the function from a state to the symbol's number."""
         kinds = {term.name: term.kind for term in (*one.parameters, *one.variables)}
         for arguments in product(*(self.problem.classes.get(p.kind, ()) for p in one.parameters)):
             symbol = Symbol(one.situation, arguments)
@@ -286,7 +285,7 @@ class Interpreter:
             yield self.slots[symbol], eval(f"lambda s: {said}", {**NAMES, "aggregated": aggregated})
 
     def actions(self, level: int) -> list[Action]:
-        """Return the quantified behaviours of a level that some state may allow."""
+        """Return the grounded behaviours of a level that may be applicable in some state."""
         if level not in self._actions:
             found = []
             for one in self.problem.domain.at_level(level):
@@ -299,7 +298,7 @@ class Interpreter:
         return self._actions[level]
 
     def action(self, one: Behavior, arguments: tuple[str, ...]) -> Action:
-        """Return a behaviour with these arguments."""
+        """Return a behaviour grounded with the given arguments."""
         kinds = {term.name: term.kind for term in (*one.parameters, *one.variables)}
         terms = dict(zip((p.name for p in one.parameters), arguments, strict=True))
         outcomes = []
@@ -310,7 +309,7 @@ class Interpreter:
         return Action(one, arguments, tuple(outcomes))
 
     def outcome(self, one: Behavior, asked: str, terms: Terms, kinds: Terms) -> Any:
-        """Return a function from a state to the next one with its cost, or None where the behaviour isn't applicable."""
+        """Return a function from a state to the cost and the successor, or to None if the behaviour isn't applicable."""
         lines = ["def outcome(s):", f" if not ({asked}): return None", " t = list(s)"]
         for effect in sorted(one.effects, key=lambda effect: effect.value != FALSE):
             for when, symbol, value in self.instances(effect, terms, kinds):
@@ -336,7 +335,7 @@ class Interpreter:
     def instances(
         self, effect: ValueEffect | AmountEffect, terms: Terms, kinds: Terms
     ) -> Iterator[tuple[str, Symbol, str]]:
-        """Yield for each symbol that an effect changes the condition, as the beginning of a line, and the new value."""
+        """Yield each symbol that an effect changes, with the condition as the beginning of a code line and the new value."""
         each = effect.each or Parameter("?each", "")
         for one in self.problem.classes.get(each.kind, ()) if effect.each else ("",):
             for trial in self.bindings(effect.when, {**kinds, each.name: each.kind}, {**terms, each.name: one}):
@@ -350,7 +349,7 @@ class Interpreter:
                     yield "" if when == "True" else f" if {when}:", symbol, said
 
     def limits(self) -> Iterator[str]:
-        """Yield that each sum and count is within its bounds."""
+        """Yield the expressions that sums and counts are within their bounds."""
         for name, one in self.problem.domain.aggregates.items():
             quantity = self.kinds[name].quantity
             if one.kept and quantity is not None and (quantity.least, quantity.most) != (None, None):
@@ -358,7 +357,7 @@ class Interpreter:
                     yield self.limit(symbol, f"t[{self.slots[symbol]}]")
 
     def prevented(self) -> Iterator[str]:
-        """Yield that each symbol of a constrained situation type is false, or true, unless it wasn't before, either."""
+        """Yield the expressions that no step violates a constraint on a symbol that held before the step."""
         for one in self.problem.domain.constraints.values():
             wanted = TRUE if one.always else FALSE
             for symbol, slot in self.slots.items():
@@ -366,7 +365,7 @@ class Interpreter:
                     yield f"t[{slot}] == {wanted!r} or s[{slot}] != {wanted!r}"
 
     def limit(self, symbol: Symbol, amount: str) -> str:
-        """Return that an amount is within its bounds."""
+        """Return the expression that an amount is within its bounds."""
         quantity = self.kinds[symbol.situation].quantity
         assert quantity is not None
         said = [
@@ -380,7 +379,7 @@ class Interpreter:
         return " and ".join(said)
 
     def done(self, name: str, arguments: tuple[str, ...], state: State) -> Iterator[tuple[Any, State]]:
-        """Yield the results of a behaviour in a state, with their costs."""
+        """Yield the costs and successors of a behaviour in a state."""
         behavior = self.problem.domain.behaviors.get(name)
         if behavior is None:
             return
@@ -409,16 +408,16 @@ class Interpreter:
         return True
 
     def value(self, state: State, symbol: Symbol) -> Any:
-        """Return the value of a symbol in a state; None if there is no such symbol."""
+        """Return the value of a symbol in a state; None if the problem has no such symbol."""
         return state[self.slots[symbol]] if symbol in self.slots else self.constants.get(symbol)
 
     def explored(self, level: int, most: int, rests: bool = True) -> Truth:
-        """Return the states that behaviours of a level can reach; changed symbols have to be at rest in the end, by default.
+        """Return the nodes that behaviours of a level can reach; with `rests`, changed symbols must end with their rest values.
 
         Raises
         ------
         TooManyStatesError
-            More than `most` nodes are reachable, and none of the first satisfies the goal, or there is no goal.
+            More than `most` nodes are reachable, and none of the first `most` nodes satisfies the goal.
         """
         actions = [(outcome, action) for action in self.actions(level) for outcome in action.outcomes]
         watched = dict(self.rests) if rests else {}
@@ -462,7 +461,7 @@ class Interpreter:
 
 
 def _joined(parts: Sequence[str], word: str, empty: str, decisive: str) -> str:
-    """Return expressions joined by `and` or `or`, without redundant ones."""
+    """Return expressions joined by `and` or `or`, without redundant expressions."""
     if decisive in parts:
         return decisive
     left = [part for part in dict.fromkeys(parts) if part != empty]
@@ -478,7 +477,7 @@ def _negated(said: str, negated: bool) -> str:
 
 
 def aggregated(function: str, numbers: Sequence[Any]) -> Any:
-    """Return a sum, a count, a maximum or a minimum of those numbers that are there."""
+    """Return the sum, count, maximum or minimum of numbers, without missing numbers."""
     found = [one for one in numbers if one == one]
     if function == "count":
         return len(found)
@@ -488,4 +487,4 @@ def aggregated(function: str, numbers: Sequence[Any]) -> Any:
 
 
 NAMES: dict[str, Any] = {"nan": NOTHING, "divided": divided, "Fraction": Fraction}
-"""Names in the expressions besides the state."""
+"""Names that expressions may contain besides the state."""

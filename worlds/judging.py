@@ -1,7 +1,7 @@
-"""A small world planned in every mode, and judged by an exhaustive search.
+"""Planning of a small world in every mode, and comparison of the results with an exhaustive search.
 
-`worlds.interpreter` searches the problem as a value; the program receives the scene's file. Each call has its own limit of CPU
-time.
+`worlds.interpreter` searches the problem as a value. The planner reads the same world from a scene file. Each call has its own
+limit of CPU time.
 """
 
 from __future__ import annotations
@@ -37,26 +37,25 @@ from worlds.scenes import scene
 from worlds.walking import cost, faults
 
 SECONDS, CPU = 3.0, 4.0
-"""Time limit of a call, and CPU seconds after which the call counts as endless."""
+"""Time limit of a call in seconds, and CPU seconds after which the call counts as endless."""
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3, 2, 3, 8, 6, 8, 250, 4
-"""One in so many worlds is planned optimally, in the paper's mode, strictly, and with a memory; is exported, and read by
-unified-planning; is executed; and is checked with certificates of tasks that lack a behaviour."""
+"""Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
 LEFT_OUT, CERTIFYING = 3, 100_000
-"""Number of behaviours left out for that, one after the other, and the work to certify each task."""
+"""Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
 MOST_ACTIONS = 1_500
-"""Maximum number of quantified behaviours of an imported export for the exhaustive search."""
+"""Maximum number of grounded behaviours of an imported problem for the exhaustive search."""
 T = TypeVar("T")
 
 
 class EndlessError(BaseException):
-    """A call has used up its CPU time; no part of the program catches this."""
+    """Raised when a call has used up its CPU time; the planner never catches this error."""
 
 
 @dataclass(frozen=True)
 class Complaint:
-    """A fault: its kind, the mode, and the particulars."""
+    """A fault: its kind, the planning mode and a description."""
 
     kind: str
     mode: str
@@ -65,7 +64,7 @@ class Complaint:
 
 @dataclass
 class Judged:
-    """The result of judging a world."""
+    """The faults, remarks and measurements of one world."""
 
     complaints: list[Complaint] = field(default_factory=list)
     remarks: list[Complaint] = field(default_factory=list)
@@ -85,7 +84,7 @@ def limited(seconds: float) -> Iterator[None]:
         raise EndlessError
 
     before = signal.signal(signal.SIGPROF, end)
-    signal.setitimer(signal.ITIMER_PROF, seconds, 0.2)  # again: a callback of a library may swallow the first
+    signal.setitimer(signal.ITIMER_PROF, seconds, 0.2)  # repeated, since a library may swallow the first signal
     try:
         yield
     finally:
@@ -94,7 +93,11 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 class Judge:
-    """Judges one world: by the sample that its seed draws, with everything, or in one mode only."""
+    """Compares the planner with the exhaustive search on one world.
+
+    By default, the world's seed selects the expensive checks. With `every`, all checks run. With `only`, the checks of one mode
+    run.
+    """
 
     def __init__(
         self,
@@ -111,17 +114,17 @@ class Judge:
         self.reached: list[State] = []
 
     def complain(self, kind: str, mode: str, text: object = "") -> None:
-        """Record a fault."""
+        """Record a fault of the planner."""
         self.found.complaints.append(Complaint(kind, mode, str(text)[:400]))
 
     def sampled(self, one_of: int, what: str, *modes: str) -> bool:
-        """Return whether a world belongs to the sample for an expensive check."""
+        """Return whether the world belongs to the sample of one in `one_of` worlds for an expensive check."""
         if self.only:
             return self.only.startswith(modes)
         return self.every or zlib.crc32(f"{what} {self.world.seed}".encode()) % one_of == 0
 
     def judged(self) -> Judged:
-        """Return the result of judging the world."""
+        """Run the checks, and return the faults, remarks and measurements."""
         self.truth()
         file = self.folder / f"w{self.world.seed}.ttl"
         file.write_text(scene(self.world), encoding="utf-8")
@@ -132,7 +135,7 @@ class Judge:
         return self.found
 
     def truth(self) -> None:
-        """Compute the least cost of the goal; `self.surely` is lower where it is open which symbols count as changed."""
+        """Compute the least cost of the goal, and in `self.surely` the least cost without the requirement of rest values."""
         level, found = self.world.problem.domain.levels[-1], self.found
         begin = process_time()
         try:
@@ -151,7 +154,7 @@ class Judge:
         found.seconds["truth"] = process_time() - begin
 
     def call(self, mode: str, made: Callable[[], T]) -> T | None:
-        """Return the result of a call; record it if the call doesn't return or raises an unexpected error."""
+        """Return the result of a call; record a fault if the call doesn't return in time or raises an unexpected error."""
         begin = process_time()
         try:
             with limited(CPU):
@@ -177,7 +180,7 @@ class Judge:
         return None
 
     def modes(self, file: Path) -> None:
-        """Plan in every mode, and do the checks that depend on a plan."""
+        """Plan in every selected mode, and run the checks that depend on a plan."""
         read = self.call("load", lambda: load(file))
         if read is None:
             return
@@ -197,7 +200,7 @@ class Judge:
             self.with_a_lesson(read, guarded.plan)
         refused = {mode for mode, status in self.found.status.items() if status == "refused" and mode in modes}
         answered = {mode for mode in modes if self.found.status.get(mode) in ("solved", "unsolvable")}
-        if refused and answered:  # giving up contradicts neither
+        if refused and answered:  # a search that gave up contradicts no result
             self.complain("refused by some modes only", "/".join(sorted(refused)), self.found.remarks[-1].text)
         if refused:
             return
@@ -213,7 +216,7 @@ class Judge:
             self.execution(read, guarded)
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
-        """Plan, and judge the outcome."""
+        """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""
         result = self.call(name, lambda: plan(read, engine=NO_ENGINE, time_limit=SECONDS, **options))
         if result is None:
             return None
@@ -253,7 +256,7 @@ class Judge:
                 self.found.remarks.append(Complaint("unproved", mode, f"{outcome.bound} … {own}"))
 
     def certificate(self, mode: str, outcome: Outcome) -> None:
-        """Compare a certificate with all reachable states."""
+        """Compare a certificate of unsolvability with all reachable states."""
         certificate = getattr(outcome, "certificate", None)
         if not hasattr(outcome, "certificate"):
             return
@@ -270,12 +273,12 @@ class Judge:
                 return
 
     def checker(self, read: Scene, plans: Sequence[Plan]) -> None:
-        """Compare the checker of plans with the interpreter, on mostly invalid plans."""
+        """Compare the plan checker with the interpreter on mostly invalid plans."""
         problem = read.reading.problem
         drawn = [corrupted(plan, problem, self.rng) for plan in plans for _ in range(2)]
         for steps in [*drawn, random_steps(self.meant, self.rng)]:
             if max((step.level for step in steps.walk()), default=0) != problem.domain.levels[-1]:
-                continue  # the checker takes a plan of upper levels alone, as engines make them
+                continue  # the checker also accepts plans of upper levels only, which other planners return
             said, meant = validate(problem, numbered(steps, problem)), faults(self.meant, steps)
             if bool(said) is not bool(meant):
                 what = "the checker takes it for a plan" if meant else "the checker doesn't take it for a plan"
@@ -284,9 +287,9 @@ class Judge:
                 return
 
     def false_certificates(self, read: Scene) -> None:
-        """Test the checker of certificates with certificates of tasks that lack a behaviour.
+        """Test the certificate checker with certificates of tasks that lack one behaviour.
 
-        If there is a plan, none is valid.
+        If the complete task has a plan, the checker must reject these certificates.
         """
         from confab.planner.certificate_checks import refusal
         from confab.planner.certifying import certify
@@ -299,13 +302,13 @@ class Judge:
             others = {other: behavior for other, behavior in problem.domain.behaviors.items() if other != name}
             domain = replace(problem.domain, behaviors=others)
             if problem.domain.levels[-1] not in domain.levels:
-                continue  # another level is the lowest then
+                continue  # another level would be the lowest
             found = certify(replace(problem, domain=domain), CERTIFYING)
             if found is not None and refusal(problem, found) is None:
                 self.complain("a false certificate is accepted", "certificates", f"without {name}: {found}")
 
     def with_a_lesson(self, read: Scene, first: Plan) -> None:
-        """Plan with a memory that has learned one plan."""
+        """Plan again with a memory that has learned one plan."""
         from confab.memory import Memory
 
         def remembered() -> Memory:
@@ -320,7 +323,7 @@ class Judge:
     # ------------------------------------------------------------------------------------------------------------- PDDL
 
     def export(self, read: Scene, level: int) -> None:
-        """Export a level and import it; as a problem of its own it has to be solvable if the level is."""
+        """Export a level as PDDL and import the result, which must be solvable exactly if the level is solvable."""
         from confab.reasoner.pddl.exporting import to_pddl
         from confab.reasoner.pddl.importing import imported
         from confab.reasoner.pddl.syntax import parse
@@ -341,7 +344,7 @@ class Judge:
         problem = self.call(mode, back)
         if problem is None:
             return
-        if ":derived " not in exported.domain and self.sampled(READERS, "reader", "export"):  # which it doesn't read
+        if ":derived " not in exported.domain and self.sampled(READERS, "reader", "export"):  # it doesn't read axioms
             self.read_by_unified_planning(mode, exported.domain, exported.problem)
         actions = (
             prod(len(problem.members(p.kind)) for p in (*b.parameters, *b.variables))
@@ -369,12 +372,12 @@ class Judge:
             self.complain("export means something else", mode, f"least {wanted}, exported {got}")
 
     def read_by_unified_planning(self, mode: str, domain: str, problem: str) -> None:
-        """Record a fault if unified-planning can't read the export."""
+        """Record a fault if unified-planning can't read the exported PDDL."""
         from unified_planning.io import PDDLReader
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # its own use of deprecated functions of pyparsing
+                warnings.simplefilter("ignore")  # unified-planning uses deprecated functions of pyparsing
                 PDDLReader().parse_problem_string(domain, problem)
         except Exception as error:
             self.complain("unified-planning can't read the export", mode, f"{type(error).__name__}: {error}")
@@ -382,7 +385,7 @@ class Judge:
     # -------------------------------------------------------------------------------------------------------- execution
 
     def execution(self, read: Scene, first: Outcome | None) -> None:
-        """Execute the task, sometimes with a fact that changes on the way."""
+        """Execute the task, sometimes with a fact that changes during execution."""
         texts: list[str] = []
         if first is not None and first.plan is not None and self.rng.random() < 0.7:
             steps = [step for step in first.plan.primitives if len(step.path) > 1]
@@ -426,9 +429,9 @@ class Judge:
             self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
 
     def alone(self, situation: str) -> bool:
-        """Return whether a situation type shares no values with others.
+        """Return whether a situation type shares no values with other situation types.
 
-        Otherwise a change takes objects away from where they were.
+        A changed fact of a type with shared values could move an object that another fact places elsewhere.
         """
         members = self.world.problem.members
         others = [kind for name, kind in self.meant.kinds.items() if name != situation and not kind.boolean]
@@ -436,7 +439,7 @@ class Judge:
         return self.meant.kinds[situation].boolean or not any(own & members(kind.range) for kind in others)
 
     def fact(self) -> str:
-        """Return a fact that may become true; None if there is none."""
+        """Return the text of a random fact that may become true; an empty text if there is no such fact."""
         symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and self.alone(s.situation)]
         if not symbols:
             return ""

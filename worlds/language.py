@@ -1,7 +1,7 @@
-"""Random behaviours and rules over a few individuals: every kind of condition and effect, nested in one another, over odd symbols.
+"""Random behaviours and rules over a few individuals, with every kind of condition and effect, nested in one another.
 
-Among them are effects on one and the same fact, parameters that get the same individual, symbols that don't exist (a place of
-something that has none), special values (`nowhere`), and variables that only a part of a condition determines.
+Some behaviours have several effects on the same fact, two parameters with the same individual, symbols that don't exist,
+special values (`nowhere`), or variables that only a part of a condition determines.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ DEFINED = {
     "ABOVE": SituationType("ABOVE", ("Thing", "Thing"), "Truth", boolean=True),
     "LOST": SituationType("LOST", ("Cup",), "Truth", boolean=True),
 }
-"""Situation types with random rules; the first two are mutually dependent, the last one may depend on their negations."""
+"""Situation types with random rules; the first two may depend on each other, and the last on the negations of both."""
 RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 
@@ -72,11 +72,11 @@ class BehaviorWriter:
         self.rng = rng
         self.kinds: dict[str, str] = {}
         self.asked = {**SITUATIONS, **{name: DEFINED[name] for name in defined}}
-        self.positive = positive  # required only where their truth helps
+        self.positive = positive  # situation types that occur only positively
         self.flipped = False
 
     def behavior(self, name: str, level: int = 1) -> Behavior:
-        """Return a behaviour in which something determines every variable."""
+        """Return a random behaviour whose conditions determine all of its variables."""
         rng = self.rng
         parameters = [self.fresh(rng.choice(("Cup", "Shelf", "Thing"))) for _ in range(rng.randrange(3))]
         bound = list(parameters)
@@ -86,7 +86,7 @@ class BehaviorWriter:
             inner = list(bound)
             when = self.conditions(inner, rng.randint(1, 2), 1) if rng.random() < 0.4 else []
             effects.append(self.effect(inner, tuple(when)))
-        if rng.random() < 0.5:  # a second effect on the fact of another
+        if rng.random() < 0.5:  # a second effect on the fact of another effect
             one = rng.choice(effects)
             value = {TRUE: FALSE, FALSE: TRUE}.get(one.value) or rng.choice(CLASSES[SITUATIONS[one.situation].range])
             own = [t for t in (*one.arguments, one.value) if t.startswith("?") and t not in bound]
@@ -105,7 +105,7 @@ class BehaviorWriter:
         )  # fmt: skip
 
     def rule(self, situation: str) -> Rule:
-        """Return a rule of a defined situation type."""
+        """Return a random rule of a defined situation type."""
         wanted = DEFINED[situation].arguments
         parameters = [self.fresh(self.rng.choice((kind, kind, "Cup"))) for kind in wanted]
         conditions = self.conditions(list(parameters), self.rng.randint(1, 3), DEPTH)
@@ -119,18 +119,15 @@ class BehaviorWriter:
         return term
 
     def term(self, bound: list[str]) -> str:
-        """Return a bound term, or an individual."""
+        """Return a bound term or an individual."""
         return self.rng.choice(bound) if bound and self.rng.random() < 0.8 else self.rng.choice(CLASSES["Thing"])
 
     def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
-        """Return a conjunction; the variables that it determines are added to `bound`."""
+        """Return a random conjunction; the variables that the conjunction determines are added to `bound`."""
         return [self.condition(bound, depth) for _ in range(most)]
 
     def condition(self, bound: list[str], depth: int) -> Condition:
-        """Return a random condition with nested conditions up to a depth.
-
-        The variables that it determines are added to `bound`.
-        """
+        """Return a random condition of at most a nesting depth; the variables that it determines are added to `bound`."""
         rng = self.rng
         negated = rng.random() < 0.4
         match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any", "amount")):
@@ -151,7 +148,7 @@ class BehaviorWriter:
                 return Comparison(self.amount(bound, 1), rng.choice(sorted(COMPARING)), self.amount(bound, 1), negated)
             case "witness" if depth:
                 variable = self.fresh(kind := rng.choice(("Cup", "Shelf", "Thing")))
-                del self.kinds[variable]  # it isn't one of the behaviour's
+                del self.kinds[variable]  # the variable isn't a variable of the behaviour
                 self.flipped ^= negated
                 inner = self.conditions([*bound, variable], rng.randint(1, 2), depth - 1)
                 self.flipped ^= negated
@@ -169,7 +166,7 @@ class BehaviorWriter:
         return ValueCondition(situation, arguments, value, negated)
 
     def amount(self, bound: list[str], depth: int) -> Expression:
-        """Return an amount of bound terms, sometimes a missing one; linear in the changing amounts."""
+        """Return a random calculation over bound terms that is linear in the changing amounts; amounts may be missing."""
         rng = self.rng
         match rng.choice(
             ("constant", "amount", "amount", "measure", "sum", "product") if depth else ("constant", "amount")
@@ -206,7 +203,7 @@ class BehaviorWriter:
 
 
 def language(seed: int, behaviors: int = 2, defined: bool = False) -> Problem:
-    """Return a problem of one level with random behaviours, a random state and no goal; on request with random rules."""
+    """Return a problem of one level with random behaviours, a random state and no goal; with `defined`, also random rules."""
     rng = Random(seed)
     names = tuple(DEFINED) if defined else ()
     made = [BehaviorWriter(rng, names).behavior(f"B{i}") for i in range(behaviors)]

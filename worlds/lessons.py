@@ -1,4 +1,4 @@
-"""Generated scenes as problems, and experience gathered on small ones."""
+"""Generated scenes as problems, and experience gathered on small scenes."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from confab.reasoner.symbols import Problem, ValueCondition
 
 
 def as_it_is(text: str) -> str:
-    """Change nothing."""
+    """Return the text unchanged."""
     return text
 
 
 def reading_of(text: str) -> Reading:
-    """Return the problem of a scene in Turtle."""
+    """Return the reading of a scene in Turtle."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(text)
@@ -35,13 +35,13 @@ def reading_of(text: str) -> Reading:
 def problem(
     family: str, objects: int, seed: int = 0, clutter: int = 0, edit: Callable[[str], str] = as_it_is, hands: int = 2
 ) -> Problem:
-    """Return a generated scene; `edit` changes its Turtle."""
+    """Return the problem of a generated scene; `edit` changes the scene's Turtle."""
     return reading_of(edit(generate(family, objects, hands, clutter, seed))).problem
 
 
 @lru_cache(maxsize=64)
 def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Problem:
-    """Return the part of a generated scene that its task can need, as ``confab plan`` reads it."""
+    """Return the problem of a generated scene without the parts that are irrelevant to its task, like ``confab plan``."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(generate(family, objects, clutter=clutter, seed=seed))
@@ -49,16 +49,13 @@ def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Pr
 
 
 def single_level(problem: Problem, level: int) -> Problem:
-    """Return a problem whose first level is `level`: the levels above it are left out."""
+    """Return a problem without the levels above `level`."""
     behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level >= level}
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
 
 
 def backwards(rule: Rule) -> Rule:
-    """Return a rule that promises the opposite of its behaviour's effect, if possible.
-
-    Otherwise one with half of its conditions.
-    """
+    """Return a wrong rule, with the goal and the opposite condition exchanged or, if impossible, with half of the conditions."""
     for c in rule.asks:
         same = isinstance(c, ValueCondition) and (c.situation, c.arguments) == (
             rule.goal.situation,
@@ -71,7 +68,7 @@ def backwards(rule: Rule) -> Rule:
 
 @lru_cache(maxsize=8)
 def taught(families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100,)) -> Memory:
-    """Return a memory that saw scenes of 4 and 6 objects."""
+    """Return a memory that has learned from scenes of 4 and 6 objects."""
     experience = Experience("taught")
     for family in families:
         for objects in (4, 6):

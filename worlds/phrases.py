@@ -1,4 +1,4 @@
-"""Random conditions and effects over the content of a world, nested in one another."""
+"""Random conditions and effects over the situation types and individuals of a world."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from confab.reasoner.symbols import (
 )
 
 EACH, ANYONE = "?each", "?anyone"
-"""Variables of conditions that a scene writes as a class in the place of an individual, and as an absence condition."""
+"""Variables of conditions that a scene writes as a class in place of an individual (`EACH`), or as an absence (`ANYONE`)."""
 
 
 MOST_TERMS = 3
-"""Minimum number of terms; with fewer, and none that fits, an effect gets a parameter of its own."""
+"""Number of terms of a behaviour below which an effect without a fitting term may get a new parameter."""
 CONDITIONS = (
     *("value", "value", "value", "binding", "near", "class", "equal", "witness", "absence", "every", "any"),
     *("amount", "amount"),
@@ -40,7 +40,7 @@ CONDITIONS = (
 
 
 class Vocabulary:
-    """The vocabulary of conditions and effects; `values` has the values of lower levels, `ends` the classes of relations."""
+    """The vocabulary of conditions and effects; `values` has the levels of values, and `ends` the classes of relations."""
 
     def __init__(self, rng: Random) -> None:
         self.rng = rng
@@ -56,20 +56,20 @@ class Vocabulary:
 
 
 HIGHEST = 9
-"""A level that sees everything."""
+"""A level above all levels, for which all situation types are visible."""
 
 
 class Phrases:
-    """Draws conditions and effects of one behaviour or rule."""
+    """Draws the conditions and effects of one behaviour or rule."""
 
     def __init__(self, draft: Vocabulary, level: int) -> None:
         self.draft, self.rng, self.level = draft, draft.rng, level
         self.kinds: dict[str, str] = {}
         self.witnesses = 0
-        self.inner: dict[str, str] = {}  # the classes of the variables of witnesses
+        self.inner: dict[str, str] = {}  # the classes of quantified variables
 
     def terms(self) -> tuple[Parameter, ...]:
-        """Return the parameters and variables."""
+        """Return the parameters and variables drawn so far."""
         return tuple(Parameter(name, kind) for name, kind in self.kinds.items())
 
     def fresh(self, kind: str) -> str:
@@ -79,7 +79,7 @@ class Phrases:
         return term
 
     def seen(self, quantity: bool = False, changeable: bool = False) -> list[SituationType]:
-        """Return the situation types that a behaviour of this level may use."""
+        """Return the situation types, with numbers if `quantity`, that conditions or effects of this level may use."""
         return [
             one
             for one in self.draft.situations.values()
@@ -88,7 +88,7 @@ class Phrases:
         ]  # fmt: skip
 
     def term(self, bound: Sequence[str], kind: str) -> str | None:
-        """Return a term for an argument of a class: mostly one that fits, sometimes one of another class."""
+        """Return a term for an argument of a class, usually a term of the class and sometimes a term of another class."""
         members = self.draft.classes[kind]
         fitting = [t for t in bound if set(self.kinds_of(t)) & set(members)]
         if fitting and self.rng.random() < 0.92:
@@ -102,15 +102,15 @@ class Phrases:
         return self.draft.classes.get(self.inner.get(term) or self.kinds.get(term, ""), ())
 
     def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
-        """Return a conjunction; the variables that it determines are added to `bound`."""
+        """Return a random conjunction; the variables that the conjunction determines are added to `bound`."""
         return [self.condition(bound, depth) for _ in range(most)]
 
     def visible(self, values: Sequence[str]) -> list[str]:
-        """Return the values that exist on this level."""
+        """Return the values that are visible on this level."""
         return [value for value in values if self.draft.values.get(value, 1) <= self.level]
 
     def value(self, bound: Sequence[str], about: str | None = None) -> Condition:
-        """Return a condition on a value; `about` is among its arguments if possible."""
+        """Return a random condition on a value; `about` is among the condition's arguments if possible."""
         rng = self.rng
         seen = self.seen()
         if not seen:
@@ -135,12 +135,12 @@ class Phrases:
         return ValueCondition(one.name, terms, value, negated=rng.random() < 0.4)
 
     def same(self, bound: Sequence[str]) -> Condition:
-        """Return the trivial condition that an individual is itself."""
+        """Return the trivial condition that a term equals itself."""
         one = self.rng.choice([*bound, *self.draft.objects])
         return EqualityCondition(one, one)
 
     def condition(self, bound: list[str], depth: int) -> Condition:
-        """Return a condition; the variable that it determines, if any, is added to `bound`."""
+        """Return a random condition; a variable that the condition determines is added to `bound`."""
         rng, draft = self.rng, self.draft
         negated = rng.random() < 0.35
         kind = rng.choice(CONDITIONS)
@@ -202,7 +202,7 @@ class Phrases:
         return self.value(bound)
 
     def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
-        """Return a comparison of numbers; None if there are none."""
+        """Return a random comparison of numbers; None if the level has no numbers."""
         left = self.number(bound, 1)
         if not isinstance(left, Amount | Calculation):
             return None
@@ -214,7 +214,7 @@ class Phrases:
         )
 
     def number(self, bound: Sequence[str], depth: int, extrema: bool = True) -> Expression | None:
-        """Return a calculation; None if there are no numbers. Only conditions read maxima and minima."""
+        """Return a random calculation, or None if the level has no numbers; maxima and minima occur only with `extrema`."""
         rng, aggregates = self.rng, self.draft.aggregates
         seen = [s for s in self.seen(quantity=True) if extrema or s.name not in aggregates or aggregates[s.name].kept]
         if not seen:
@@ -235,10 +235,7 @@ class Phrases:
         return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
 
     def link(self, bound: Sequence[str], effect: ValueEffect) -> Condition | None:
-        """Return the condition that an effect of another behaviour holds for some individuals.
-
-        None if this level doesn't see it.
-        """
+        """Return the condition that an effect of another behaviour holds; None if the effect is not visible on this level."""
         situation = self.draft.situations[effect.situation]
         terms = [self.term(bound, kind) for kind in situation.arguments]
         if situation.level > self.level or None in terms or self.draft.values.get(effect.value, 1) > self.level:
@@ -250,7 +247,7 @@ class Phrases:
     # ----------------------------------------------------------------------------------------------------------- effects
 
     def effect(self, bound: list[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
-        """Draw an effect, unless it would contradict an existing one."""
+        """Draw an effect that contradicts no existing effect, and add it to `values` or `numbers`."""
         rng, draft = self.rng, self.draft
         of_numbers = self.seen(quantity=True, changeable=True)
         one = rng.choice([*self.seen(changeable=True), *of_numbers] or [None])
@@ -303,7 +300,7 @@ class Phrases:
 
 
 def _mentions_twice(condition: Condition) -> bool:
-    """Return whether a condition mentions each member of a class more than once, which a class in its place can't express."""
+    """Return whether a scene can't write a condition with a class in place of the variable `EACH`."""
     match condition:
         case ValueCondition(_, arguments, value):
             return (*arguments, value).count(EACH) > 1 or value == EACH
@@ -317,7 +314,7 @@ def contrary(condition: Condition) -> Condition:
 
 
 def named(conditions: Sequence[Condition]) -> set[str]:
-    """Return the situation types in conditions."""
+    """Return the situation types that occur in conditions."""
     found: set[str] = set()
     for one in conditions:
         match one:

@@ -1,4 +1,4 @@
-"""A second domain as values: a robot that carries keys through doors; booleans, two-place relations, disjunction, Witness."""
+"""A domain as values in which a robot carries keys through doors, with binary relations and disjunctions."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ SWITCH = Behavior(
 
 
 def rooms(count: int, seed: int) -> Problem:
-    """Return a building with a tree of rooms, half of its doors locked, a key for most of them, lights to be lit."""
+    """Return a random problem of a building with a tree of rooms, locked doors, keys and lights."""
     rng = random.Random(seed)
     names = [f"room{i + 1}" for i in range(count)]
     halls: set[tuple[str, ...]] = set()

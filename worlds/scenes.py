@@ -1,4 +1,4 @@
-"""A random world as one Turtle file: domain, scene and task, in all the forms that a scene may use."""
+"""Random worlds as Turtle files with domain, scene and task, in all forms that a scene may use."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ HEADER = """\
 
 
 def scene(world: RandomWorld) -> str:
-    """Return a world as Turtle."""
+    """Return a world as a scene in Turtle."""
     return HEADER + "\n".join(_Scene(world).lines()) + "\n"
 
 
@@ -56,7 +56,7 @@ def _decimal(number: Fraction) -> str:
 
 
 class _Scene:
-    """Writes one world."""
+    """Writes one world as Turtle."""
 
     def __init__(self, world: RandomWorld) -> None:
         self.world, self.problem = world, world.problem
@@ -93,7 +93,7 @@ class _Scene:
         return " ; ".join(parts) + " ."
 
     def part(self, kind: str, *said: str) -> str:
-        """Write a part of a behaviour, and return its IRI."""
+        """Write a part of a behaviour, and return the IRI of the part."""
         self.count += 1
         iri = f":{self.where}.c{self.count:03}"
         self.nodes.append(" ; ".join([f"{iri} a owl:NamedIndividual, c:{kind}", *said, 'rdfs:label "c"@en']) + " .")
@@ -234,7 +234,7 @@ class _Scene:
         return [f"c:{name} {self.put(term)}" for name, term in zip(ARGUMENTS, terms, strict=False)]
 
     def said(self, situation: str, arguments: Sequence[str], value: str) -> list[str]:
-        """Return the properties of a value, and whether it is false."""
+        """Return the properties that state a value of a situation type for its arguments."""
         first = f"c:situationType :{situation}"
         if situation in self.world.pairs:
             subject, target = arguments
@@ -246,7 +246,7 @@ class _Scene:
         return said if value == TRUE else [*said, f"c:value {self.put(value)}"]
 
     def condition(self, one: Condition) -> str:
-        """Write a condition with its nested conditions, and return its IRI."""
+        """Write a condition with its nested conditions, and return the IRI of the condition."""
         no = ["c:negated true"] if one.negated else []
         match one:
             case ValueCondition(situation, arguments, value):
@@ -295,7 +295,7 @@ class _Scene:
         return inside[0] if len(inside) == 1 else self.part("AllOf", f"c:condition {', '.join(inside)}")
 
     def side(self, name: str, one: Expression) -> str:
-        """Return the property for a number."""
+        """Return the property that states one side of a comparison or calculation."""
         if name == "right" and isinstance(one, Fraction):
             return f"c:amount {_decimal(one)}"
         return f"c:{name} {self.calculation(one)}"
@@ -337,7 +337,7 @@ class _Scene:
             yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {' '.join(sorted(map(_iri, [*everyone, *own])))} ) ] ."
 
     def facts(self) -> Iterator[str]:
-        """Yield the facts that no property of an individual expresses."""
+        """Yield the initial facts that can't be written as properties of individuals."""
         number = 0
         for symbol, value in self.problem.initial.items():
             situation = self.situations[symbol.situation]

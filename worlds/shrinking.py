@@ -1,4 +1,4 @@
-"""Shrinking of worlds: parts are left out one by one, as long as a predicate still holds."""
+"""Shrinking of worlds: parts are removed one by one, as long as a predicate holds."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from worlds.mixed import RandomWorld
 
 
 def shrunk(world: RandomWorld, still: Callable[[RandomWorld], bool], seconds: float = 60.0) -> RandomWorld:
-    """Return a world of which no part can be left out without `still` becoming false, or the best one within CPU seconds."""
+    """Return a world from which no part can be removed while `still` holds, or the smallest one found in CPU `seconds`."""
     end = process_time() + seconds
     again = True
     while again:
@@ -40,7 +40,7 @@ def shrunk(world: RandomWorld, still: Callable[[RandomWorld], bool], seconds: fl
 
 
 def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
-    """Yield worlds without one part, largest parts first."""
+    """Yield worlds without one part, with large parts such as behaviours first."""
     problem = world.problem
     domain = problem.domain
     for name in domain.behaviors:
@@ -183,7 +183,7 @@ def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
 
 
 def without_individual(world: RandomWorld, individual: str) -> RandomWorld | None:
-    """Return a world without an individual that is neither named nor a value."""
+    """Return a world without an individual; None if the domain, the goal or a value refers to the individual."""
     problem = world.problem
     if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
         return None
@@ -199,7 +199,7 @@ def without_individual(world: RandomWorld, individual: str) -> RandomWorld | Non
 
 
 def _mentioned(name: str, world: RandomWorld) -> bool:
-    """Return whether a situation type is used."""
+    """Return whether a situation type is used outside of its own definition."""
     problem = world.problem
     domain = problem.domain
     rules: list[Any] = [rule.conditions for other, its in domain.rules.items() if other != name for rule in its]

@@ -1,7 +1,8 @@
-"""Random timed worlds, and their least makespan by an exhaustive search over schedules.
+"""Random worlds with durative actions, and their least makespan by an exhaustive search over schedules.
 
-A world is a table of actions on a few facts: when each asks for what, when it changes what, how long it takes and which actor it
-keeps busy. The search knows neither behaviours nor plans: it tries at each whole second every action that can begin, in any order.
+A world is a table of actions on a few facts. An action has conditions and effects at its start, throughout or at its end, a
+duration, and an actor. At each whole second, the search tries every applicable action in any order. The search uses neither
+behaviours nor plans.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.timing import projected
 
 MOST_STATES = 20_000
-"""Maximum number of states of an exhaustive search; a larger world is replaced by another one."""
+"""Maximum number of states of an exhaustive search; a larger world is drawn again."""
 SPANS = {"start": Span.START, "throughout": Span.THROUGHOUT, "end": Span.END}
 
 Literal = tuple[int, bool]
@@ -58,7 +59,7 @@ class Action:
 
 @dataclass(frozen=True)
 class TimedWorld:
-    """Actions, initial facts, goals, and facts that never hold together."""
+    """Actions, initial facts, goal literals, and literals that may never hold together."""
 
     facts: int
     actions: tuple[Action, ...]
@@ -68,12 +69,12 @@ class TimedWorld:
 
 
 Running = tuple[int, int]
-"""An action and the seconds until its end."""
+"""The number of a running action and the seconds until its end."""
 State = tuple[frozenset[int], frozenset[Running]]
 
 
 def timed_world(seed: int, constrained: bool = False) -> TimedWorld:
-    """Return a random world, the same for the same seed; with `constrained`, two facts never hold together in it."""
+    """Return the random world of a seed; with `constrained`, two literals may never hold together."""
     rng = Random(seed)
     while True:
         world = _drawn(rng)
@@ -85,7 +86,7 @@ def timed_world(seed: int, constrained: bool = False) -> TimedWorld:
 
 
 def _violated(world: TimedWorld, facts: frozenset[int]) -> bool:
-    """Return whether the facts that never hold together do."""
+    """Return whether the literals that may never hold together hold."""
     return bool(world.never) and _hold(facts, list(world.never))
 
 
@@ -101,7 +102,7 @@ def _drawn(rng: Random) -> TimedWorld:
         makes = list(literals(2, ("throughout", "end", "end", "start")))
         if not makes:
             makes = [("end", (rng.randrange(facts), True))]
-        if rng.random() < 0.4:  # a value that holds only during the action
+        if rng.random() < 0.4:  # a fact that holds only during the action
             fact = rng.randrange(facts)
             makes = [one for one in makes if one[1][0] != fact]
             makes += [("start", (fact, True)), ("end", (fact, False))]
@@ -119,7 +120,7 @@ def _drawn(rng: Random) -> TimedWorld:
 
 
 def least_makespan(world: TimedWorld) -> int | None:
-    """Return the least makespan of any plan; None if there is no plan.
+    """Return the least makespan of all plans; None if there is no plan.
 
     Raises
     ------
@@ -148,7 +149,7 @@ def least_makespan(world: TimedWorld) -> int | None:
 
 
 def _next(world: TimedWorld, state: State) -> Iterator[tuple[int, State]]:
-    """Yield each state that may follow, with the seconds until then: an action begins, or a second passes."""
+    """Yield each successor with the seconds until it holds: an action begins (0), or a second passes (1)."""
     facts, running = state
     for number in range(len(world.actions)):
         after = _begun(world, facts, running, number)
@@ -183,7 +184,7 @@ def _begun(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]
 def _passed(
     world: TimedWorld, facts: frozenset[int], running: frozenset[Running], order: tuple[int, ...]
 ) -> State | None:
-    """Return the state a second later, where actions end one after the other; None if one can't."""
+    """Return the state after one second in which actions end in an order; None if an action can't end."""
     left = frozenset((number, seconds - 1) for number, seconds in running)
     for number in order:
         action = world.actions[number]
@@ -199,13 +200,13 @@ def _passed(
 
 
 def _taken(world: TimedWorld, running: frozenset[Running], literals: list[Literal]) -> bool:
-    """Return whether a fact is in the making in what runs."""
+    """Return whether a running action changes one of the facts throughout its duration."""
     making = {fact for number, _ in running for fact, _ in world.actions[number].at("throughout", "makes")}
     return any(fact in making for fact, _ in literals)
 
 
 def _kept(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]) -> bool:
-    """Return whether the conditions throughout of all running actions still hold."""
+    """Return whether the invariant conditions of all running actions hold."""
     return all(_hold(facts, world.actions[number].at("throughout")) for number, _ in running)
 
 
@@ -220,7 +221,7 @@ def _made(facts: frozenset[int], literals: list[Literal]) -> frozenset[int]:
 
 
 def problem_of(world: TimedWorld) -> Problem:
-    """Return a world as a planning problem: facts of one thing, one behaviour for each action, which names its actor."""
+    """Return a world as a planning problem with one behaviour for each action; the behaviour names its actor."""
     situations = {f"F{i}": SituationType(f"F{i}", ("Thing",), "Truth", boolean=True) for i in range(world.facts)}
     behaviors = {}
     for number, action in enumerate(world.actions):
@@ -257,7 +258,7 @@ def problem_of(world: TimedWorld) -> Problem:
 
 
 def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
-    """Return the fault of a plan in time in this world, which shares no code with any checker; None if there is none."""
+    """Return the fault of a timed plan in a world, found without the code of the plan checkers; None if the plan is valid."""
     if any(slot.begin.denominator != 1 for slot in timed.slots):
         return "a step begins between two seconds"
     facts, running = world.initial, frozenset[Running]()

@@ -1,4 +1,4 @@
-"""A plan with the situation before each of its primitives, and the rest of a plan."""
+"""Plans with the states before their primitives, and the rests of plans."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from confab.reasoner.symbols import Problem, State
 
 @dataclass(frozen=True)
 class Trial:
-    """A problem, a plan for it, and the situation before each primitive and in the end."""
+    """A problem, a plan for the problem, and the state before each primitive and at the end."""
 
     problem: Problem
     plan: Plan
@@ -21,7 +21,7 @@ class Trial:
 
     @classmethod
     def of(cls, problem: Problem) -> Trial:
-        """Plan, and go through the plan."""
+        """Return the trial of a problem with a new plan and its states."""
         found = hierarchical_plan(problem).plan
         assert found is not None
         states = [problem.initial]
@@ -33,7 +33,7 @@ class Trial:
 
 
 def rest_after(plan: Plan, count: int) -> list[Step]:
-    """Return the rest of a plan after so many primitives."""
+    """Return the rest of a plan after `count` primitives."""
     gone = {step.path for step in plan.primitives[:count]}
 
     def left(steps: Sequence[Step]) -> list[Step]:

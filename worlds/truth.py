@@ -1,12 +1,11 @@
-"""Reachable states, enumerated by a program that shares no code with the planner: the truth for random tables.
+"""Enumeration of reachable states without code of the planner, as the reference for random tables.
 
-It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.BehaviorReader`), and calls it only once
-for every
-combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which arrays
-of states descend.
+The plan checker's interpreter (`confab.planner.validation.BehaviorReader`) computes the effects of behaviours. It is called once
+for every combination of values of the symbols that it reads. Its results form a decision tree for each grounded behaviour, by
+which arrays of states are processed.
 
-code    a state as one integer, a field of bits per symbol
-tree    maps the values of a symbol to trees; a leaf has the assigned values, or None (not applicable)
+code    a state as one integer, with a field of bits for each symbol tree    maps the values of a symbol to trees; a leaf has
+the assigned values, or is None (not applicable)
 """
 
 from __future__ import annotations
@@ -28,19 +27,19 @@ FEW = 200
 
 
 class TooManyError(Exception):
-    """There are more states than allowed, or a state needs more than 63 bits."""
+    """Raised when there are more states than allowed, or when a state needs more than 63 bits."""
 
 
 @dataclass
 class Truth:
-    """`states` is the number of reachable states; `shortest` is the length of a shortest plan, or None if there is none."""
+    """The number of reachable `states`, and in `shortest` the length of a shortest plan or None."""
 
     states: int
     shortest: int | None
 
 
 class Asked(Facts):
-    """A state that records which symbols are read."""
+    """A state that records the symbols that are read."""
 
     def __init__(self, problem: Problem, values: dict[Symbol, str]) -> None:
         super().__init__(problem, values)
@@ -54,7 +53,7 @@ class Asked(Facts):
         return super().value(situation, arguments)
 
     def holders(self, situation: str, value: str) -> Iterator[tuple[str, ...]]:
-        """Yield the arguments of the symbols with a value; each symbol that is read is recorded."""
+        """Yield the arguments of the symbols with a value, and record each symbol that is read."""
         for symbol in self.values:
             if symbol.situation == situation and self.value(situation, symbol.arguments) == value:
                 yield symbol.arguments
@@ -62,7 +61,7 @@ class Asked(Facts):
 
 @dataclass
 class Node:
-    """A node of a decision tree: the symbol that the interpreter reads next; `known` maps its values to the next node."""
+    """A node of a decision tree, with the symbol that the interpreter reads next; `after` maps its values to trees."""
 
     symbol: int
     known: NDArray[np.int8]
@@ -70,7 +69,7 @@ class Node:
 
 
 class StateSpace:
-    """The lowest level of a problem, as states in 63 bits."""
+    """The states of the lowest level of a problem, encoded in 63 bits."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -109,11 +108,11 @@ class StateSpace:
         self.trees: list[Any] = [UNSEEN] * len(self.steps)
 
     def field(self, codes: Codes, symbol: int) -> NDArray[np.int64]:
-        """Return the ranks of a symbol's values in states."""
+        """Return the index of a symbol's value in each state."""
         return ((codes >> self.shifts[symbol]) & self.widths[symbol]).astype(np.int64)
 
     def explore(self, most: int) -> Truth:
-        """Visit all states, whether or not the goal is reached on the way."""
+        """Visit all reachable states, and return their number and the length of a shortest plan."""
         layer: Codes = np.zeros(1, np.uint64)
         known, depth, shortest = layer, 0, None
         while len(layer):
@@ -133,7 +132,7 @@ class StateSpace:
         return Truth(len(known), shortest)
 
     def wanted(self, codes: Codes) -> NDArray[np.bool_]:
-        """Return which states have all facts of the goal."""
+        """Return for each state whether the goal holds."""
         fits = np.ones(len(codes), np.bool_)
         for symbol, value in self.problem.goal.items():
             if symbol in self.number:
@@ -144,7 +143,7 @@ class StateSpace:
         return fits
 
     def do(self, number: int, codes: Codes, fields: list[NDArray[np.int64]]) -> Iterator[Codes]:
-        """Yield the states after a quantified behaviour, where it is applicable, by the leaves of its tree."""
+        """Yield the successors, by a grounded behaviour, of the states in which it is applicable."""
         if self.trees[number] is UNSEEN:
             self.trees[number] = self.grown(number, UNSEEN, codes[0])
         waiting: list[tuple[Any, NDArray[np.int64] | None]] = [(self.trees[number], None)]
@@ -173,7 +172,7 @@ class StateSpace:
                 waiting.append((tree.after[rank], rows if len(present) == 1 else rows[ranks == rank]))
 
     def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
-        """Ask the interpreter about one state, and return the tree extended by its result."""
+        """Call the interpreter for one state, and return the tree extended by the result."""
         ranks = [(int(code) >> shift) & mask for shift, mask in self.places]
         asked = Asked(self.problem, {s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
         changes = self.rules.changes(*self.steps[number], asked)
@@ -205,5 +204,5 @@ class StateSpace:
 
 
 def _breadth(condition: Condition) -> int:
-    """Return whether a condition reads many symbols; the order of a conjunction is free."""
+    """Return a rank of conditions by the number of symbols that they read, for the order of a conjunction."""
     return 2 * isinstance(condition, Witness | AnyOf) + isinstance(condition, ValueCondition)

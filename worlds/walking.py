@@ -1,4 +1,4 @@
-"""Whether a tree of steps is a plan by docs/levels.md, by the plain interpreter only."""
+"""Validation of plans by the rules of docs/levels.md, computed by the plain interpreter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from worlds.interpreter import NOTHING, Interpreter, State
 
 
 def faults(of: Interpreter, plan: Plan) -> list[str]:
-    """Return the faults of a plan by docs/levels.md; empty if it is valid."""
+    """Return the faults of a plan by the rules of docs/levels.md; empty if the plan is valid."""
     walk = _Walk(of)
     end = walk.sequence(plan.steps, 0, of.initial, False)
     if end is not None and not of.wanted(end):
@@ -19,7 +19,7 @@ def faults(of: Interpreter, plan: Plan) -> list[str]:
 
 
 def cost(of: Interpreter, plan: Plan) -> Any:
-    """Return the cost of a plan's steps of the lowest level."""
+    """Return the total cost of a plan's steps of the lowest level."""
     state, total = of.initial, 0
     for step in plan.at_level(of.problem.domain.levels[-1]):
         made = next(of.done(step.behavior, step.arguments, state), None)
@@ -30,7 +30,7 @@ def cost(of: Interpreter, plan: Plan) -> Any:
 
 
 class _Walk:
-    """A plan under execution, step by step."""
+    """The step-by-step execution of a plan."""
 
     def __init__(self, interpreter: Interpreter) -> None:
         self.of, self.problem = interpreter, interpreter.problem
@@ -39,7 +39,7 @@ class _Walk:
         self.rests = [slot for slot, symbol in enumerate(self.of.symbols) if kinds[symbol.situation].rest is not None]
 
     def sequence(self, steps: Sequence[Step], above: int, state: State, inside: bool) -> State | None:
-        """Execute the steps that refine a step of level `above` (0: the task); return the final state."""
+        """Execute the steps that refine a step of level `above`, where level 0 is the task; return the final state."""
         level = next((level for level in self.levels if level > above), None)
         if level is None:
             if steps:
@@ -57,7 +57,7 @@ class _Walk:
                     last += 1
                 after = self.sequence(steps[position:last], level, state, inside)
             else:
-                self.faults.append("a step of a level above stands below it")
+                self.faults.append("a step has a higher level than its parent")
                 return None
             if after is None:
                 return None
@@ -79,17 +79,17 @@ class _Walk:
             return None
         if step.level == self.levels[-1]:
             if step.steps:
-                self.faults.append(f"{step} is of the lowest level, and refined")
+                self.faults.append(f"{step} is of the lowest level, but has steps")
             return made[0][1]
         end = self.sequence(step.steps, step.level, state, True)
         if end is None:
             return None
         if not any(self.as_said(step.level, state, said, end) for _, said in made):
-            self.faults.append(f"{step} is refined to something else than it says")
+            self.faults.append(f"the refinement of {step} has another result than the step")
         return end
 
     def as_said(self, level: int, before: State, said: State, end: State) -> bool:
-        """Return whether a refinement leaves the symbols that a level sees as the step determines."""
+        """Return whether a refinement gives the symbols that a level sees the values that the step determines."""
         for slot in range(self.of.stated):
             symbol = self.of.symbols[slot]
             seen = self.problem.first_level(symbol) <= level

@@ -1,4 +1,4 @@
-"""Short functions for writing worlds as values."""
+"""Short functions that create parts of problems as values."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from confab.reasoner.symbols import (
 
 
 def has(situation: str, *terms: str) -> ValueCondition:
-    """Return ``situation(all terms but the last) = the last``."""
+    """Return the condition that a situation type of all terms but the last has the last term as its value."""
     return ValueCondition(situation, terms[:-1], terms[-1])
 
 
 def lacks(situation: str, *terms: str) -> ValueCondition:
-    """Return the negation of a condition."""
+    """Return the negation of the condition that `has` returns for the same arguments."""
     return ValueCondition(situation, terms[:-1], terms[-1], negated=True)
 
 
 def becomes(situation: str, *terms: str, when: tuple[Condition, ...] = ()) -> ValueEffect:
-    """Return the effect that a condition holds afterwards, if `when` held before."""
+    """Return the effect that makes the condition of `has` true; `when` has the effect's conditions."""
     return ValueEffect(situation, terms[:-1], terms[-1], when)
 
 
@@ -43,7 +43,7 @@ def behavior(
     effects: Iterable[ValueEffect],
     variables: str = "",
 ) -> Behavior:
-    """Return a behaviour; terms are given as ``"?b:Book ?p:Place"``."""
+    """Return a behaviour; terms are given in the form ``"?b:Book ?p:Place"``."""
 
     def parameters(text: str) -> tuple[Parameter, ...]:
         return tuple(Parameter(*term.split(":")) for term in text.split())
@@ -60,7 +60,7 @@ def world(
     relations: Mapping[str, Iterable[tuple[str, ...]]] = {},
     value_levels: Mapping[str, int] = {},
 ) -> Problem:
-    """Return a problem; facts are given as ``{"AT book": "shelf"}``."""
+    """Return a problem; facts are given in the form ``{"AT book": "shelf"}``."""
 
     def facts(stated: Mapping[str, str]) -> dict[Symbol, str]:
         return {Symbol(key.split()[0], tuple(key.split()[1:])): value for key, value in stated.items()}
@@ -77,7 +77,7 @@ def world(
 
 
 def quantified(problem: Problem, level: int) -> Iterator[tuple[Behavior, tuple[str, ...]]]:
-    """Yield the quantified behaviours of a level."""
+    """Yield the grounded behaviours of a level."""
     for one in problem.domain.at_level(level):
         for arguments in product(*(problem.classes.get(parameter.kind, ()) for parameter in one.parameters)):
             yield one, arguments
