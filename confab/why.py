@@ -461,7 +461,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
         return WhyNot(
             asked,
-            f"“{what}” isn't applicable. In place of {place}, where the fewest preconditions fail, it would require that",
+            f"“{what}” isn't applicable. In place of {place}, where the fewest conditions fail, it would require that",
             lacks,
         )
     if found.plan is not None:
@@ -469,7 +469,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
     if found.reason is not None:
         return WhyNot(
             asked,
-            f"“{what}” could be done in the place of {place}, but no plan was found from there on: {found.reason.text}",
+            f"“{what}” in the place of {place}: no plan with this step was found: {found.reason.text}",
         )
     return WhyNot(asked, f"the plan already has this step: {place}", more=0.0)
 

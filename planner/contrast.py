@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from confab.planner.causal_links import on_level
 from confab.planner.checked_conditions import Bindings
@@ -17,10 +18,24 @@ from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import BehaviorReader, Facts, successor, validate
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
+from confab.reasoner.amounts import Amount
+from confab.reasoner.symbols import (
+    AnyOf,
+    Behavior,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    State,
+    Symbol,
+    substituted,
+)
 
 Ask = Callable[[Problem], Outcome]
 """A planning function: Function that calls `confab.planner.solve.solve` with a fixed mode and fixed limits."""
+
+
+NO_NUMBER = Reason("one of its effects uses a number that isn't stated for these individuals")
 
 
 class NoChoiceError(ValueError):
@@ -78,6 +93,13 @@ def instead_of(
         found = rules.satisfied(behavior.preconditions, given, behavior.kinds, Facts(problem, states[i]))
         if found is not None:
             possible.append((i, tuple(found[p.name] for p in behavior.parameters)))
+    doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]
+    if possible and not doable:
+        at, arguments = possible[0]
+        asked = Contrast(before, behavior.name, arguments, course[at])
+        lacks = _beyond(rules, behavior, arguments, states[at])
+        return replace(asked, lacks=lacks) if lacks else replace(asked, reason=NO_NUMBER)
+    possible = doable
     if not possible:
         return _fewest_failures(
             rules, behavior, given, [(course[i], Facts(problem, states[i])) for i in places], before
@@ -115,6 +137,21 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, a
     if outcome.plan is None:
         return Contrast(before, reason=outcome.reason)
     return Contrast(before, plan=outcome.plan, cost=cost_of(problem, outcome.plan))
+
+
+def _beyond(
+    rules: BehaviorReader, behavior: Behavior, arguments: tuple[str, ...], state: State
+) -> tuple[Condition, ...]:
+    """Return the condition on an amount that keeps the amount within its bounds; empty if it stays within them."""
+    found = rules.beyond(behavior, arguments, Facts(rules.problem, state))
+    if found is None:
+        return ()
+    symbol, old, new = found[0].symbol, Fraction(found[0].value), Fraction(found[1].value)
+    quantity = rules.problem.domain.situations[symbol.situation].quantity
+    assert quantity is not None
+    sign, bound = ("<=", quantity.most) if quantity.most is not None and new > quantity.most else (">=", quantity.least)
+    needed = old if bound is None else old + bound - new
+    return (Comparison(Amount(symbol.situation, symbol.arguments), sign, needed),)
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:

@@ -182,7 +182,9 @@ class _Check:
             return False
         changes = self.rules.changes(behavior, step.arguments, self.facts)
         if changes is None:
-            self.fault(step.path, f"{step}: its preconditions don't hold where it is done")
+            beyond = self.rules.beyond(behavior, step.arguments, self.facts)
+            why = f"{beyond[1]} would be out of bounds" if beyond else "its preconditions don't hold where it is done"
+            self.fault(step.path, f"{step}: {why}")
             return False
         mark = len(self.facts.log)
         if not step.steps:
@@ -383,6 +385,19 @@ class BehaviorReader:
         quantities = {name: kind.quantity for name, kind in self.problem.domain.situations.items()}
         more = changed(read.on_amounts(values, facts), facts.value, quantities)
         return None if more is None else found + more
+
+    def beyond(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> tuple[Fact, Fact] | None:
+        """Return an amount before and after a behaviour whose preconditions hold, if the value after it isn't allowed."""
+        read = self.read(behavior)
+        values = [*arguments, *read.terms[len(arguments) :]]
+        if not all_hold(read.preconditions, facts, values):
+            return None
+        free = dict.fromkeys(self.problem.domain.situations, Quantity())
+        for situation, key, value in changed(read.on_amounts(values, facts), facts.value, free) or ():
+            quantity, before = self.problem.domain.situations[situation].quantity, facts.value(situation, key)
+            if quantity is not None and before is not None and not quantity.allows(Fraction(value)):
+                return Fact(Symbol(situation, key), before), Fact(Symbol(situation, key), value)
+        return None
 
     def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
         """Return the calculated cost of a behaviour in the present state, if it has a price and is applicable."""

@@ -6,6 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 import confab
+import ontology
 from confab.cli import app
 from confab.labels import labels_of
 from confab.lifted import Sayings
@@ -179,3 +180,23 @@ def test_the_command_line_tells_all_of_it() -> None:
         in run(app, ["explain", "beverage-serving", "--not", "B2_PICK left_hand bottle1"]).output
     )
     assert run(app, ["explain", "beverage-serving", "L9#0"]).exit_code != 0
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("L2#0", "trolley has charge at least 8"),
+        ("L2#14", "one of its effects uses a number that isn't stated for these individuals"),
+    ],
+)
+def test_an_alternative_that_leaves_the_bounds_of_an_amount_is_not_called_applicable(
+    place: str, said: str, tmp_path: Path
+) -> None:
+    for folder, name in (("domains", "canteen"), ("scenes", "canteen-small")):
+        text = (ontology.ROOT / folder / f"{name}.ttl").read_text("utf-8")
+        text = text.replace("https://w3id.org/confab/canteen", "https://example.org/canteen")
+        text = text.replace(":L2_DRIVE.at, :L2_DRIVE.charged", ":L2_DRIVE.at")  # only the bounds of the battery count
+        (tmp_path / f"{name}.ttl").write_text(text, "utf-8")
+    told = str(confab.load(str(tmp_path / "canteen-small.ttl")).plan().why_not("L2_DRIVE trolley table2", place))
+    assert said in told
+    assert "could be done" not in told
