@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import local_name
 from confab.reasoner.pddl.formulas import (
     TRUE,
     Assignment,
@@ -144,7 +145,7 @@ class _Export:
 
     def exported(self) -> Exported:
         """Return the texts of the domain and the problem with their name mappings."""
-        named = self.words.name("domain", self.problem.scene.rsplit("/", 2)[-2])
+        named = self.words.name("domain", local_name(self.problem.scene))
         constants = {term.name for term in self.named_in_domain() if not term.variable}
         found = [one for fact in self.facts for one in (fact.terms if isinstance(fact, Atom) else fact[0].terms)]
         goals = (self.goal, *(soft for _, _, soft in self.preferences))
@@ -240,7 +241,7 @@ class _Export:
         unmet = "".join(f" (* {decimal(weight)} (is-violated {name}))" for name, weight, _ in self.preferences)
         cost = f"(+ (total-cost){unmet})" if unmet else "(total-cost)"
         metric = f"  (:metric minimize {cost})\n" if self.costs else ""
-        name = self.words.name("problem", self.problem.scene.rsplit("/", 1)[-1])
+        name = self.words.name("problem", local_name(self.problem.scene))
         soft = [f"(preference {name} {formula_text(one)})" for name, _, one in self.preferences]
         goals = LINE.join([*map(formula_text, conjuncts(self.goal)), *soft])
         return (
