@@ -249,7 +249,7 @@ def _plan(
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, deadline)
     elif asks_for_times(problem, options.minimise):
-        outcome, timed = scheduled(problem, outcome, deadline)
+        outcome, timed = scheduled(problem, outcome, deadline, options.minimise == "makespan")
     queries = scene.knowledge.round_trips - asked
     part = seen if in_part else None
     seconds = {**scene.seconds, "quantify": quantified}

@@ -54,13 +54,15 @@ def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan
     return outcome, timed.plan
 
 
-def scheduled(problem: Problem, outcome: Outcome, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
+def scheduled(
+    problem: Problem, outcome: Outcome, deadline: Deadline, shorten: bool
+) -> tuple[Outcome, TimedPlan | None]:
     """Return an outcome with its plan in time; if no schedule keeps the times of the task, the outcome is "gave up"."""
-    from confab.planner.timed.call import in_time
+    from confab.planner.timed.call import best_in_time
 
     if outcome.plan is None:
         return outcome, None
-    timed = in_time(problem, outcome.plan, deadline.left)
+    timed = best_in_time(problem, outcome.plan, deadline.left, shorten)
     if timed.plan is None:
         return replace(outcome, status=Status.GAVE_UP, plan=None, reason=timed.reason, left=(), cost=None), None
     return replace(outcome, plan=timed.plan.plan), timed.plan

@@ -30,6 +30,8 @@ from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
 """Maximum number of seconds for a schedule if no limit is given; exchanges of turns are also bounded by their work."""
+FIRST, SHARING = 0.2, 0.7
+"""Shares of the remaining time for the schedule of the first plan, and then for sharing its goals among actors."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,34 @@ class Timed:
 
     plan: TimedPlan | None = None
     reason: Reason | None = None
+
+
+def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, shorten: bool = True) -> Timed:
+    """Return a plan in time for the goals of a plan; its steps may be others, by other actors and in another order.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        A plan of it.
+    seconds : float, optional
+        Limit of the search for a short schedule.
+    shorten : bool
+        Whether a short schedule is wanted; otherwise the first one is returned that keeps all windows and deadlines.
+    """
+    from confab.planner.timed.sharing import shared
+
+    until = perf_counter() + (SECONDS if seconds is None else seconds)
+    first = in_time(problem, plan, (until - perf_counter()) * FIRST)
+    if first.plan is not None and not shorten:
+        return first
+    other = shared(problem, plan, perf_counter() + (until - perf_counter()) * SHARING, shorten)
+    if other is None:
+        return first
+    found = in_time(problem, other, max(until - perf_counter(), 0.0))
+    if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):
+        return first
+    return found
 
 
 def in_time(

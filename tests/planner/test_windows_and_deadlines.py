@@ -102,3 +102,39 @@ def test_windows_without_common_time_are_both_named(tmp_path: Path) -> None:
     windows = [("r1", 0, 9), ("a", 20, None)]
     text = said(planned(tmp_path, {"r1": "hall"}, {"a": None}, windows))
     assert "r1 is available only from 0 to 9 s" in text or "a is available only from 20 s on" in text
+
+
+def test_a_robot_whose_window_ends_leaves_the_rest_to_another(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall", "r2": "hall"}, {"a": None, "b": None, "c": None}, [("r1", 0, 15)])
+    assert result.timed is not None
+    assert result.timed.makespan == 24
+
+
+def test_a_robot_that_is_available_too_late_leaves_the_goal_to_another(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall", "r2": "hall"}, {"a": 13, "b": None}, [("r1", 20, None)])
+    assert result.solved
+
+
+def test_two_robots_in_different_rooms_meet_deadlines_that_one_alone_misses(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall", "r2": "cellar"}, {"a": 13, "b": 13})
+    assert result.timed is not None
+    assert {actor for actor, _ in result.timed.lanes()} == {"r1", "r2"}
+
+
+def test_the_goal_with_the_earliest_deadline_is_achieved_first(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall"}, {"a": None, "b": 25, "c": 13})
+    assert result.timed is not None
+    assert [slot.step.arguments[1] for slot in result.timed.slots if slot.step.behavior == "WASH"] == ["c", "b", "a"]
+
+
+def test_a_charger_with_a_window_that_is_too_short_is_avoided(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall"}, {"a": None, "b": None}, [("k1", 0, 3)], {"k1": "hall", "k2": "cellar"})
+    assert result.timed is not None
+    assert {"k2"} == {slot.step.arguments[1] for slot in result.timed.slots if slot.step.behavior == "CHARGE"}
+
+
+def test_a_charging_window_for_one_robot_is_enough_if_the_other_needs_no_charge(tmp_path: Path) -> None:
+    robots, goals = {"r1": "hall", "r2": "hall"}, {"a": None, "b": None, "c": 30}
+    result = planned(tmp_path, robots, goals, [("k1", 12, 18)], {"k1": "hall"})
+    assert result.timed is not None
+    assert result.timed.makespan == 30

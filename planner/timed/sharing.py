@@ -1,0 +1,313 @@
+"""Who does what: the goals are achieved again one after another, in another order and by other actors, for a better schedule.
+
+crew      the chosen individual for each class of actors, and the individuals with windows that are avoided; steps towards a goal
+          name no others. The empty crew allows all.
+task      a goal with its crew
+stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
+
+A first sequence of tasks is built greedily: each goal is given to the crew that achieves it first. Then the crew or position of
+one task is changed at a time, preferably of a task on the critical path. The work is bounded by numbers of stretches, so the
+result is the same on every machine unless the time is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import islice, product
+from random import Random
+from time import perf_counter
+from typing import TypeAlias
+
+from confab.planner.hierarchical.agenda import Agenda
+from confab.planner.hierarchical.call import Call, Compiled, compiled
+from confab.planner.plan import Plan, Step, UnsolvableError, renumbered
+from confab.planner.timed.activities import InapplicableError, activities, in_sequence
+from confab.planner.timed.network import earliest, network_of
+from confab.planner.timed.order import order_of
+from confab.planner.timed.pieces import default_actors
+from confab.planner.timed.schedules import turn_edges
+from confab.planner.validation import BehaviorReader, Facts
+from confab.reasoner.limits import LimitError
+from confab.reasoner.symbols import Behavior, EqualityCondition, Problem, Symbol
+from confab.reasoner.timing import timing_of
+
+MOST_CREWS = 64
+"""Maximum number of crews."""
+MOST_STRETCHES = 2_000
+"""Maximum number of stretches that are planned."""
+MOST_CHANGES = 400
+"""Maximum number of changes of the sequence that are tried."""
+BARREN = 60
+"""Maximum number of changes that are tried without a better schedule."""
+EXPANSIONS = 500
+"""Maximum number of expansions for a stretch."""
+
+State: TypeAlias = "dict[Symbol, str]"
+Task: TypeAlias = "tuple[Symbol, Crew]"
+
+
+@dataclass(frozen=True)
+class Crew:
+    """The chosen individual for each class of actors, and the individuals that are avoided."""
+
+    chosen: tuple[tuple[str, str], ...] = ()
+    avoided: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    steps: tuple[Step, ...]
+    after: State
+
+
+@dataclass
+class _Sequence:
+    """Tasks with their stretches and the schedule of all their steps."""
+
+    tasks: list[Task]
+    stretches: list[_Stretch]
+    cost: tuple[Fraction, Fraction, Fraction]
+    """The value to be minimised: the lateness, the makespan, and the sum of all durations."""
+    end: Fraction
+    """The end of the last stretch."""
+    critical: list[int]
+    """The tasks on the critical path, or on the path to the activity that is latest."""
+
+
+def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> Plan | None:
+    """Return a plan for the same goals whose steps are shared among actors for a short schedule; None if none is found.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        A plan of it, which determines the first order of the goals.
+    until : float
+        The end of the search, on the clock of `perf_counter`.
+    shorten : bool
+        Whether the search continues after a schedule has been found that keeps all windows and deadlines.
+    """
+    search = _Search(problem, plan, until, shorten)
+    if len(search.crews) * len(search.goals) < 2:
+        return None
+    with suppress(LimitError):
+        search.run()
+    best = search.best
+    if best is None:
+        return None
+    return Plan(renumbered(step for one in best.stretches for step in one.steps))
+
+
+def crews_of(problem: Problem) -> Iterator[Crew]:
+    """Yield the crews of a problem, first the one that allows all individuals."""
+    resting = default_actors(problem)
+    kinds = dict.fromkeys(
+        behavior.kinds[term]
+        for behavior in problem.domain.behaviors.values()
+        for term in _actor_terms(problem, behavior, resting)
+    )
+    classes = {kind: problem.classes.get(kind, ()) for kind in kinds}
+    several = {kind: its for kind, its in classes.items() if len(its) > 1}
+    windows = (problem.times.windows if problem.times else {}).keys()
+    acting = {one for its in classes.values() for one in its}
+    avoidable = [(), *((one,) for one in sorted(windows - acting))]
+    choices = [(), *(tuple(zip(several, its, strict=True)) for its in product(*several.values()) if several)]
+    for avoided, chosen in product(avoidable, choices):
+        yield Crew(chosen, avoided)
+
+
+def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
+    """Return the parameters and variables of a behaviour that denote actors."""
+    stated = timing_of(behavior).actors
+    if stated:
+        return tuple(term for term in stated if term in behavior.kinds)
+    its = (p.name for p in behavior.parameters if not resting.isdisjoint(problem.classes.get(p.kind, ())))
+    return tuple(islice(its, 1))
+
+
+def with_crew(problem: Problem, crew: Crew) -> Problem:
+    """Return a problem whose behaviours ask for the individuals of a crew."""
+    lowest, resting, chosen = problem.domain.levels[-1], default_actors(problem), dict(crew.chosen)
+
+    def asked(behavior: Behavior) -> Behavior:
+        acting = _actor_terms(problem, behavior, resting) if behavior.level == lowest else tuple(behavior.kinds)
+        own = [EqualityCondition(t, chosen[k]) for t in acting if (k := behavior.kinds[t]) in chosen]
+        others = [
+            EqualityCondition(term, one, negated=True)
+            for one in crew.avoided
+            for term, kind in behavior.kinds.items()
+            if one in problem.members(kind)
+        ]
+        return replace(behavior, preconditions=(*behavior.preconditions, *own, *others))
+
+    behaviors = {name: asked(behavior) for name, behavior in problem.domain.behaviors.items()}
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
+
+
+@dataclass
+class _Search:
+    problem: Problem
+    plan: Plan
+    until: float
+    shorten: bool
+    best: _Sequence | None = None
+    stretches: dict[object, _Stretch | None] = field(default_factory=dict)
+    tried: int = 0
+    compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
+
+    @cached_property
+    def crews(self) -> list[Crew]:
+        """The crews to choose from."""
+        return list(islice(crews_of(self.problem), MOST_CREWS))
+
+    @cached_property
+    def goals(self) -> list[Symbol]:
+        """The goals that the plan achieves, those with deadlines first, then in the order of their last changes."""
+        rules, facts = BehaviorReader(self.problem), Facts(self.problem, self.problem.initial)
+        last: dict[Symbol, int] = {}
+        for number, step in enumerate(self.plan.primitives):
+            behavior = self.problem.domain.behaviors[step.behavior]
+            for situation, key, value in rules.changes(behavior, step.arguments, facts) or ():
+                last[Symbol(situation, key)] = number
+                facts.put(situation, key, value)
+        deadlines = self.problem.times.deadlines if self.problem.times else {}
+        count = len(self.plan.primitives)
+        open_ = [
+            symbol for symbol in self.problem.goal if symbol in last or symbol.situation in self.problem.domain.rules
+        ]
+        return sorted(open_, key=lambda s: (s not in deadlines, deadlines.get(s, 0), last.get(s, count)))
+
+    def run(self) -> None:
+        """Build a first sequence of tasks and change it."""
+        now = self.greedy()
+        self.best = now
+        if now is None:
+            return
+        random, barren = Random(0), 0
+        for _ in range(MOST_CHANGES):
+            if barren >= BARREN or not (self.shorten or now.cost[0]):
+                break
+            other = self.built(self.changed(now, random), now)
+            barren += 1
+            if other is None or other.cost > now.cost:
+                continue
+            if other.cost < now.cost:
+                barren = 0
+            now = self.best = other
+
+    def greedy(self) -> _Sequence | None:
+        """Return the goals in their order, each given to the crew that achieves it first; None if a goal isn't achieved.
+
+        A goal that no crew achieves yet waits for the next one.
+        """
+        now: _Sequence | None = None
+        waiting = list(self.goals)
+        while waiting:
+            tasks = [] if now is None else now.tasks
+            found: list[_Sequence] = []
+            for goal in waiting:
+                found = [one for crew in self.crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
+                if found:
+                    waiting.remove(goal)
+                    break
+            if not found:
+                return None
+            now = min(found, key=lambda one: (one.cost[0], one.end, *one.cost[1:]))
+        return now
+
+    def changed(self, now: _Sequence, random: Random) -> list[Task]:
+        """Return the tasks of a sequence with a change: another crew for one, exchanged crews of two, or another position."""
+        tasks = list(now.tasks)
+        i = random.choice(now.critical) if now.critical and random.random() < 0.8 else random.randrange(len(tasks))
+        j = random.randrange(len(tasks))
+        kind = random.randrange(3)
+        if kind == 0 and len(self.crews) > 1:
+            tasks[i] = tasks[i][0], random.choice([crew for crew in self.crews if crew != tasks[i][1]])
+        elif kind == 1 and tasks[i][1] != tasks[j][1]:
+            tasks[i], tasks[j] = (tasks[i][0], tasks[j][1]), (tasks[j][0], tasks[i][1])
+        else:
+            tasks.insert(j, tasks.pop(i))
+        return tasks
+
+    def built(self, tasks: Sequence[Task], like: _Sequence | None) -> _Sequence | None:
+        """Return the sequence of tasks; None if one of them isn't achieved.
+
+        Where it begins as another sequence does, it has the same stretches.
+        """
+        same = 0
+        if like is not None:
+            while same < min(len(tasks), len(like.tasks)) and tasks[same] == like.tasks[same]:
+                same += 1
+        stretches = [] if like is None else like.stretches[:same]
+        state = stretches[-1].after if stretches else dict(self.problem.initial)
+        for number in range(same, len(tasks)):
+            stretch = self.stretch(state, [goal for goal, _ in tasks[: number + 1]], tasks[number][1])
+            if stretch is None:
+                return None
+            stretches.append(stretch)
+            state = stretch.after
+        return self.scheduled(list(tasks), stretches)
+
+    def stretch(self, state: State, goals: Sequence[Symbol], crew: Crew) -> _Stretch | None:
+        """Return the steps by which a crew achieves the last of some goals and keeps the others; None if they aren't found."""
+        key = frozenset(state.items()), frozenset(goals), crew
+        if key not in self.stretches:
+            self.tried += 1
+            if self.tried > MOST_STRETCHES:
+                raise LimitError(f"{MOST_STRETCHES} stretches")
+            if perf_counter() > self.until:
+                raise LimitError("the time limit")
+            self.stretches[key] = self.planned(state, goals, crew)
+        return self.stretches[key]
+
+    def planned(self, state: State, goals: Sequence[Symbol], crew: Crew) -> _Stretch | None:
+        """Plan a stretch with the default planner."""
+        if crew not in self.compiled:
+            allowed = with_crew(self.problem, crew) if crew != Crew() else self.problem
+            self.compiled[crew] = allowed, compiled(allowed)
+        problem, using = self.compiled[crew]
+        wanted = {s: v for s, v in self.problem.goal.items() if s in goals or s not in self._open}
+        call = Call(replace(problem, initial=state, goal=wanted), using, self.until, EXPANSIONS)
+        levels = problem.domain.levels
+        leaves = any(step.level != levels[0] for step in self.plan.steps)
+        agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, solvable=True, forward=True)
+        with suppress(LimitError, UnsolvableError):
+            if agenda.achieve_all():
+                after = {s: v for s, v in call.table.state().items() if s.situation not in problem.domain.rules}
+                return _Stretch(call.tree().steps, after)
+        return None
+
+    @cached_property
+    def _open(self) -> frozenset[Symbol]:
+        return frozenset(self.goals)
+
+    def scheduled(self, tasks: list[Task], stretches: list[_Stretch]) -> _Sequence | None:
+        """Return tasks with the earliest schedule of their steps in this order."""
+        plan = Plan(renumbered(step for one in stretches for step in one.steps))
+        steps = plan.primitives
+        try:
+            order = order_of(self.problem, activities(self.problem, steps, in_sequence(steps)), in_sequence(steps))
+        except InapplicableError:
+            return None
+        network = network_of(order)
+        own = [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(order.resources)]
+        begins = earliest(network, turn_edges(order, own))
+        if begins is None:
+            return None
+        of = [k for k, one in enumerate(stretches) for _ in Plan(one.steps).primitives]
+        ends = [begin + lasts for begin, lasts in zip(begins.begins, network.durations, strict=True)]
+        critical, at = dict[int, None](), begins.latest
+        if at < 0 and of:
+            at = max(range(len(of)), key=ends.__getitem__)
+        passed = set[int]()
+        while at >= 0 and at not in passed:
+            passed.add(at)
+            critical[of[at]] = None
+            at = begins.waits_for[at]
+        late, makespan, work = (cost * network.unit for cost in (*begins.cost, sum(network.durations)))
+        end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
+        return _Sequence(tasks, stretches, (late, makespan, work), end, list(critical))
