@@ -23,7 +23,7 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "hierarchical": {"grounded"},
     "experience": {"hierarchical"},
     "acting": {"hierarchical"},
-    "timed": {"grounded"},
+    "timed": {"grounded", "hierarchical"},
 }
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 

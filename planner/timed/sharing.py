@@ -12,6 +12,7 @@ result is the same on every machine unless the time is over.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -30,7 +31,7 @@ from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import order_of
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, Facts, validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Behavior, EqualityCondition, Problem, Symbol
 from confab.reasoner.timing import timing_of
@@ -39,10 +40,12 @@ MOST_CREWS = 64
 """Maximum number of crews."""
 MOST_STRETCHES = 2_000
 """Maximum number of stretches that are planned."""
-MOST_CHANGES = 400
+MOST_CHANGES = 1_000
 """Maximum number of changes of the sequence that are tried."""
-BARREN = 60
+BARREN = 150
 """Maximum number of changes that are tried without a better schedule."""
+MOST_KNOWN = 4
+"""Maximum number of known steps that are tried for a stretch."""
 EXPANSIONS = 500
 """Maximum number of expansions for a stretch."""
 
@@ -71,7 +74,7 @@ class _Sequence:
     tasks: list[Task]
     stretches: list[_Stretch]
     cost: tuple[Fraction, Fraction, Fraction]
-    """The value to be minimised: the lateness, the makespan, and the sum of all durations."""
+    """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
     end: Fraction
     """The end of the last stretch."""
     critical: list[int]
@@ -157,7 +160,14 @@ class _Search:
     best: _Sequence | None = None
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
     tried: int = 0
+    known: dict[Task, list[tuple[Step, ...]]] = field(default_factory=dict)
+    """The steps found for each task, which are tried again before other steps are searched."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
+
+    @cached_property
+    def rules(self) -> BehaviorReader:
+        """The behaviours as the checker reads them."""
+        return BehaviorReader(self.problem)
 
     @cached_property
     def crews(self) -> list[Crew]:
@@ -167,7 +177,7 @@ class _Search:
     @cached_property
     def goals(self) -> list[Symbol]:
         """The goals that the plan achieves, those with deadlines first, then in the order of their last changes."""
-        rules, facts = BehaviorReader(self.problem), Facts(self.problem, self.problem.initial)
+        rules, facts = self.rules, Facts(self.problem, self.problem.initial, self.rules)
         last: dict[Symbol, int] = {}
         for number, step in enumerate(self.plan.primitives):
             behavior = self.problem.domain.behaviors[step.behavior]
@@ -261,24 +271,40 @@ class _Search:
                 raise LimitError(f"{MOST_STRETCHES} stretches")
             if perf_counter() > self.until:
                 raise LimitError("the time limit")
-            self.stretches[key] = self.planned(state, goals, crew)
+            problem = replace(self.problem, initial=state, goal=self.wanted(goals))
+            known = self.known.setdefault((goals[-1], crew), [])
+            again = (steps for steps in reversed(known[-MOST_KNOWN:]) if not validate(problem, Plan(steps)))
+            steps = next(again, None) or self.planned(problem, crew)
+            if steps is not None and steps not in known:
+                known.append(steps)
+            self.stretches[key] = None if steps is None else _Stretch(steps, self.after(state, steps))
         return self.stretches[key]
 
-    def planned(self, state: State, goals: Sequence[Symbol], crew: Crew) -> _Stretch | None:
-        """Plan a stretch with the default planner."""
+    def wanted(self, goals: Sequence[Symbol]) -> State:
+        """Return some goals, and those that the plan doesn't change, with their values."""
+        return {s: v for s, v in self.problem.goal.items() if s in goals or s not in self._open}
+
+    def after(self, state: State, steps: tuple[Step, ...]) -> State:
+        """Return the state after steps."""
+        facts = Facts(self.problem, state, self.rules)
+        for step in Plan(steps).primitives:
+            for change in self.rules.changes(self.problem.domain.behaviors[step.behavior], step.arguments, facts) or ():
+                facts.put(*change)
+        return facts.state()
+
+    def planned(self, problem: Problem, crew: Crew) -> tuple[Step, ...] | None:
+        """Return steps of a crew that the default planner finds for a problem."""
         if crew not in self.compiled:
             allowed = with_crew(self.problem, crew) if crew != Crew() else self.problem
             self.compiled[crew] = allowed, compiled(allowed)
-        problem, using = self.compiled[crew]
-        wanted = {s: v for s, v in self.problem.goal.items() if s in goals or s not in self._open}
-        call = Call(replace(problem, initial=state, goal=wanted), using, self.until, EXPANSIONS)
+        allowed, using = self.compiled[crew]
+        call = Call(replace(allowed, initial=problem.initial, goal=problem.goal), using, self.until, EXPANSIONS)
         levels = problem.domain.levels
         leaves = any(step.level != levels[0] for step in self.plan.steps)
         agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, solvable=True, forward=True)
         with suppress(LimitError, UnsolvableError):
             if agenda.achieve_all():
-                after = {s: v for s, v in call.table.state().items() if s.situation not in problem.domain.rules}
-                return _Stretch(call.tree().steps, after)
+                return call.tree().steps
         return None
 
     @cached_property
@@ -308,6 +334,12 @@ class _Search:
             passed.add(at)
             critical[of[at]] = None
             at = begins.waits_for[at]
-        late, makespan, work = (cost * network.unit for cost in (*begins.cost, sum(network.durations)))
+        work: dict[str, Fraction] = defaultdict(Fraction)
+        for one in order.activities:
+            for actor in one.actors:
+                work[actor] += one.duration
+        late, makespan = (cost * network.unit for cost in begins.cost)
         end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
-        return _Sequence(tasks, stretches, (late, makespan, work), end, list(critical))
+        return _Sequence(
+            tasks, stretches, (late, makespan, sum((its**2 for its in work.values()), Fraction(0))), end, list(critical)
+        )

@@ -8,6 +8,7 @@ from pathlib import Path
 import confab
 from confab.planner.plan import Status
 from confab.planning import Result
+from confab.timing import Minimise
 
 ROBOTS = '''
 @prefix : <https://example.org/robots#> .
@@ -49,6 +50,7 @@ def planned(
     goals: Mapping[str, int | None],
     windows: Sequence[tuple[str, int, int | None]] = (),
     chargers: Mapping[str, str] | None = None,
+    minimise: Minimise | None = None,
 ) -> Result:
     """Plan a world: robots with their rooms, rooms to be washed with deadlines, windows, chargers with their rooms.
 
@@ -79,7 +81,7 @@ def planned(
             f":{one}.goal a owl:NamedIndividual, c:ValueCondition ; c:situationType :CLEAN ; c:about :{one}{deadline} ."
         )
     (folder / "robots.ttl").write_text(given + "\n".join(lines), "utf-8")
-    return confab.load(folder / "robots.ttl").plan()
+    return confab.load(folder / "robots.ttl").plan(minimise=minimise)
 
 
 def said(result: Result) -> str:
@@ -138,3 +140,16 @@ def test_a_charging_window_for_one_robot_is_enough_if_the_other_needs_no_charge(
     result = planned(tmp_path, robots, goals, [("k1", 12, 18)], {"k1": "hall"})
     assert result.timed is not None
     assert result.timed.makespan == 30
+
+
+def test_robots_in_different_rooms_share_the_work_if_the_makespan_is_minimised(tmp_path: Path) -> None:
+    goals = dict.fromkeys(("a", "b", "c", "d"))
+    result = planned(tmp_path, {"r1": "hall", "r2": "cellar"}, goals, minimise="makespan")
+    assert result.timed is not None
+    assert result.timed.makespan == 24  # each robot goes to two rooms and washes them
+
+
+def test_the_same_task_gets_the_same_schedule(tmp_path: Path) -> None:
+    robots, goals = {"r1": "hall", "r2": "cellar", "r3": "attic"}, dict.fromkeys(("a", "b", "c", "d"))
+    one, other = (planned(tmp_path, robots, goals, minimise="makespan") for _ in range(2))
+    assert one.timed == other.timed
