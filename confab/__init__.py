@@ -99,7 +99,7 @@ def __dir__() -> list[str]:
     return [*__all__, "__doc__", "__version__"]
 
 
-if "IPython" in _sys.modules:  # a notebook also shows the values of rooms that know no HTML
+if "IPython" in _sys.modules:  # notebooks show HTML for values of modules that contain no HTML
     from confab.page.notebook import register as _register
 
     _register()

@@ -1,4 +1,4 @@
-"""Conversion of arguments with several forms, such as a plan, an object with a plan, or the name of a plan file."""
+"""Conversion of arguments that have several forms: a plan, for example, may also be an object with a plan or a file's name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Problem
 
 
 class HasPlan(Protocol):
-    """An object with a plan: a result, an execution, a report."""
+    """An object with a plan, such as a result, an execution or a report."""
 
     @property
     def plan(self) -> Plan:
@@ -26,13 +26,14 @@ class HasPlan(Protocol):
 
 
 AnyPlan: TypeAlias = "Plan | HasPlan | str | Path"
-"""A plan, an object with a plan, or the file that ``confab plan --json`` wrote."""
+"""A plan, an object with a plan, or the path of a file that ``confab plan --json`` wrote."""
 Facts: TypeAlias = "str | Iterable[str] | Mapping[str, str]"
-"""One fact or several, each like ``cup2 LOCATION location8``, as a text, as its words, or as symbols with their values."""
+"""One or several facts: a text like ``cup2 LOCATION location8``, several texts, the words of a fact, or a mapping of symbols to
+values."""
 
 
 class Stated(list[str]):
-    """Facts as texts. The value of a fact is found by the words before it: ``facts["cup1 LOCATION"]``."""
+    """A list of facts as texts, which also maps a symbol to its value: ``facts["cup1 LOCATION"]``."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...
@@ -50,7 +51,7 @@ class Stated(list[str]):
 
 
 def plan_of(given: AnyPlan, problem: Problem) -> Plan:
-    """Return the plan of an argument; a plan in a file is read for a problem.
+    """Return the plan that an argument contains; a plan file is read with the names of `problem`.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
 
 
 def check_goal(scene: str, problem: Problem) -> None:
-    """Raise `KnowledgeError` if there is no goal or no behaviour, or if a goal has a value outside its situation type."""
+    """Raise `KnowledgeError` if a problem has no behaviour or no goal, or a goal whose value isn't in its situation type."""
     if not problem.domain.behaviors:
         raise KnowledgeError(f"{scene} has no behaviours, so that nothing can be done; import a domain that has some")
     if not problem.goal:
@@ -85,7 +86,7 @@ def check_goal(scene: str, problem: Problem) -> None:
 
 @contextmanager
 def possible() -> Iterator[None]:
-    """Turn the message about an impossible state into a `KnowledgeError`."""
+    """Raise `KnowledgeError` in place of an `ImpossibleStateError` of the block."""
     try:
         yield
     except ImpossibleStateError as error:
@@ -93,7 +94,7 @@ def possible() -> Iterator[None]:
 
 
 def several(given: Facts) -> list[str]:
-    """Return facts as a list of texts, from one text, several texts, the words of a fact, or a mapping of symbols to values.
+    """Return facts as a list of texts. `given` is a text, several texts, the words of a fact, or a mapping of symbols to values.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def several(given: Facts) -> list[str]:
 
 
 def number(name: str, given: object, wanted: str = "a number") -> None:
-    """Raise `KnowledgeError` if the argument for a parameter is no number; None is allowed.
+    """Raise `KnowledgeError` if the argument of a parameter is neither a number nor None.
 
     Examples
     --------
@@ -133,12 +134,12 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 
 
 def sparql_of(given: str | Path) -> str:
-    """Return a query: the text itself, or the content of the file or shipped query of that name.
+    """Return the text of a SPARQL query, which is given as text, as a file, or by the name of a shipped query.
 
     Raises
     ------
     KnowledgeError
-        There is no such file, or no such query.
+        The file or the shipped query doesn't exist.
 
     Examples
     --------

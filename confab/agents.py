@@ -1,8 +1,8 @@
-"""An MCP server: plan, query, validate, why, why not, verify and replan as tools of a language model's agent, on stdio.
+"""An MCP server on stdio: language models' agents plan, replan, query, validate, explain and verify by its tools.
 
-Each call is answered in a separate process, which ends with the call: when its time is over, when the client cancels it, or
-when the server ends. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the
-complete text. Files are read in one folder; only a scene's reach facts are written, beside it.
+Each call runs in a separate process. The process ends with the call, at its time limit, when the client cancels the call, or
+with the server. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the complete
+text. The server reads files of one folder only. The only files that it writes are files of reach facts.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
 SHOWN, KEPT = 4_000, 50
-"""Maximum number of bytes of an answer, and maximum number of long answers that are kept completely."""
+"""Maximum number of bytes of an answer, and maximum number of complete texts of cut answers that the server keeps."""
 MORE, MEGABYTES, MOST_SECONDS = 10.0, 6_000, 600.0
-"""Seconds by which a process may exceed its time limit, its maximum memory in megabytes, and the greatest time limit in seconds."""
+"""Seconds by which a process may exceed its time limit, maximum memory of a process in megabytes, and greatest time limit in
+seconds."""
 
 SceneName = Annotated[
     str, Field(description="A shipped scene (tool scenes), or a file in the folder, e.g. kitchen.ttl")
@@ -42,14 +43,14 @@ Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=M
 
 
 class Kept:
-    """The complete texts of answers that were cut, by number; the latest `KEPT` of them."""
+    """The complete texts of the latest `KEPT` answers that were cut, by number."""
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}
         self._count = 0
 
     def shown(self, text: str) -> str:
-        """Return an answer, or its beginning with the address of the complete text."""
+        """Return an answer; if it is too long, return its beginning and the address of the complete text."""
         if len(text.encode()) <= SHOWN:
             return text
         self._count += 1
@@ -59,7 +60,7 @@ class Kept:
         return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
 
     def whole(self, number: str) -> str:
-        """Return the complete text of an answer.
+        """Return the complete text of the answer with a number.
 
         Raises
         ------
@@ -70,7 +71,7 @@ class Kept:
 
 
 def _wrong_arguments(name: str, error: ValidationError) -> str:
-    """Return in a sentence which arguments of a tool are missing or wrong."""
+    """Return a sentence that names the missing and wrong arguments of a tool."""
     faults = [
         f"{'.'.join(map(str, one['loc']))}: {'missing' if one['type'] == 'missing' else one['msg']}"
         for one in error.errors()
@@ -99,10 +100,10 @@ def server(folder: Path) -> MCPServer[Any]:
         raise KnowledgeError(f"{folder}: there is no such folder")
 
     class Server(MCPServer[Any]):
-        """The SDK's server, whose errors about arguments are one sentence."""
+        """The server of the SDK, with error messages about arguments in one sentence."""
 
         async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
-            """Call a tool by its name with its arguments."""
+            """Call a tool by name with arguments."""
             try:
                 return await super().call_tool(name, arguments, context)
             except ToolError as error:
@@ -142,12 +143,12 @@ def server(folder: Path) -> MCPServer[Any]:
 
     @made.tool()
     async def scenes() -> str:
-        """List the scenes that the other tools take: shipped ones, and files in the folder."""
+        """List the scenes that the other tools accept: shipped scenes, and files in the folder."""
         return await answered(answers.scenes, seconds=20.0)
 
     @made.tool()
     async def plan(scene: SceneName, goals: Goals = [], mode: Mode = "guarded", seconds: Seconds = 20.0) -> str:  # noqa: B006
-        """Plan: the steps of all levels, or the reason why there is no plan, with its proof."""
+        """Return a plan with the steps of all levels; if there is no plan, return the reason and its proof."""
         return await answered(answers.plan, scene, goals, [], mode, seconds, seconds=seconds)
 
     @made.tool()
@@ -159,7 +160,7 @@ def server(folder: Path) -> MCPServer[Any]:
     async def query(
         scene: SceneName, sparql: Annotated[str, Field(description="A SPARQL 1.1 query")], seconds: Seconds = 20.0
     ) -> str:
-        """Query a scene in SPARQL (SELECT, ASK or CONSTRUCT); its prefixes are declared already."""
+        """Query a scene in SPARQL (SELECT, ASK or CONSTRUCT). The scene's prefixes needn't be declared."""
         return await answered(answers.query, scene, sparql, seconds, seconds=seconds)
 
     @made.tool()
@@ -174,7 +175,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Explain why a step is in the plan: its effects, and the steps that need them."""
+        """Explain why a step is in the plan by its effects and the steps that need these effects."""
         return await answered(answers.why, scene, goals, step, seconds, seconds=seconds)
 
     @made.tool()
@@ -186,7 +187,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Explain why an alternative isn't in the plan: its failing conditions, or its additional cost."""
+        """Explain why an alternative isn't in the plan by its failing conditions or its additional cost."""
         return await answered(answers.why_not, scene, goals, instead, seconds, seconds=seconds)
 
     @made.tool()
@@ -197,7 +198,7 @@ def server(folder: Path) -> MCPServer[Any]:
         seed: int = 0,
         seconds: Seconds = 120.0,
     ) -> str:
-        """Plan, and execute the plan in physics: which steps had their effects, with measurements."""
+        """Make a plan, execute it in physics, and return a verdict with measurements for each step."""
         return await answered(answers.verify, scene, goals, rollouts, seed, seconds, seconds=seconds)
 
     @made.resource("confab://answers/{number}", mime_type="text/plain")

@@ -1,4 +1,4 @@
-"""Tools for authors: begin a domain, compare two versions of a scene, rename terms in a memory."""
+"""Tools for authors of domains: write a skeleton, compare two versions of a scene, rename terms in a memory."""
 
 from __future__ import annotations
 
@@ -40,15 +40,16 @@ ROLES = [CORE + name for name in ARGUMENTS]
 
 
 def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False) -> list[Path]:
-    """Write a commented skeleton that validates: a domain, a scene, a catalog. Return the files.
+    """Write a valid, commented skeleton of a domain with a scene and a catalog, and return the paths of its files.
 
-    By default the folder has the domain's name. With `bodies`, also a table, shapes and skills, so that physics can
-    carry the scene's plan out. The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
+    By default the folder has the domain's name. With `bodies`, the skeleton also has a table, shapes and skills, which physics
+    needs to execute a plan. The catalog also lists the files of the shipped ontologies for Protégé.
 
     Raises
     ------
     KnowledgeError
-        The name is no word, or one of the files already exists.
+        The name contains other signs than letters, digits, ``_`` and ``-``, doesn't begin with a letter, or one of the files
+        exists.
 
     Examples
     --------
@@ -80,14 +81,14 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
 
 
 def validate(*files: str | Path, deep: bool = False) -> Table:
-    """Return the findings in ontology files and their imports: a row for each, with its remedy.
+    """Return a table of the findings in ontology files and their imports, with a remedy for each finding.
 
     `deep` also runs HermiT, which needs Java.
 
     Raises
     ------
     KnowledgeError
-        There is no such file, or no Java for a deep validation.
+        A file doesn't exist, or a deep validation is requested and Java isn't installed.
 
     Examples
     --------
@@ -112,12 +113,12 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
 def generate(
     family: str, path: str | Path | None = None, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0
 ) -> Scene:
-    """Return a scene for trials, and write it as an ontology file if a path is given (docs/quantification.md has the families).
+    """Return a generated scene of a family (docs/quantification.md), and write it as an ontology file if a path is given.
 
     Raises
     ------
     KnowledgeError
-        There is no such family, the family has no table for these numbers, or the path doesn't end in ``.ttl``.
+        The family doesn't exist or has no table for these numbers, or the path doesn't end in ``.ttl``.
 
     Examples
     --------
@@ -137,7 +138,7 @@ def generate(
 
 
 def turtle_path(given: str | Path) -> Path:
-    """Return the path for a new scene file; the suffix must be that of a readable format."""
+    """Return the path for a new scene file; raise `KnowledgeError` if its suffix isn't ``.ttl``."""
     path = Path(given)
     if path.suffix.lower() != ".ttl" and path != STDOUT:
         raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
@@ -149,7 +150,7 @@ def turtle_path(given: str | Path) -> Path:
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference between two scenes: names added and removed by kind, and the plans before and after."""
+    """The difference between two versions of a scene: added and removed names by kind, and the lines of both plans."""
 
     gained: dict[str, tuple[str, ...]]
     lost: dict[str, tuple[str, ...]]
@@ -184,7 +185,7 @@ class Difference:
 
 
 def difference(old: Scene, new: Scene, mode: Mode) -> Difference:
-    """Return the effects of an edit on objects, behaviours, quantified behaviours and the plan."""
+    """Return the difference between two versions of a scene in individuals, situation types, behaviours and the plan."""
     before, after = _inventory(old), _inventory(new)
     return Difference(
         {kind: tuple(n for n in after[kind] if n not in set(before[kind])) for kind in after},
@@ -206,7 +207,7 @@ def _inventory(scene: Scene) -> dict[str, list[str]]:
 
 
 def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
-    """Return a scene's plan, one line per step, or the reason why there is none."""
+    """Return the plan of a scene, one line per step, or the reason why the scene has no plan."""
     result = scene.plan(mode=mode)
     if not result.solved:
         return (f"no plan: {result.json().get('reason')}",)
@@ -219,12 +220,12 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 
 
 def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
-    """Return the terms of a domain that occur in a memory and not in a scene, each with the most similar name in the scene.
+    """Return the domain's terms in a memory that a scene doesn't contain, each with the most similar name in the scene.
 
-    Individuals of other scenes, which the paper's links may name, are left out.
+    Individuals of other scenes, which the paper's links may name, are no terms of the domain.
     """
     spoken: set[str] = set()
-    with suppress(SyntaxError):  # reading the memory reports it
+    with suppress(SyntaxError):  # `Memory.load` reports a syntax error
         kinds = {t.subject for t in memory.triples if getattr(t.object, "value", "") == CORE + "GoalKind"}
         spoken = {
             t.object.value
@@ -243,14 +244,15 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
 
 
 def migrate(memory: Path, renames: Sequence[str]) -> int:
-    """Rename terms in a memory file, each given as ``OLD=NEW``; return the number of changed triples.
+    """Rename terms in a memory file, and return the number of changed triples.
 
-    OLD and NEW are IRIs or their last parts; a NEW without a namespace gets the namespace of OLD.
+    Each element of `renames` is ``OLD=NEW``, where OLD and NEW are IRIs or their last parts. A NEW that isn't an IRI gets the
+    namespace of OLD.
 
     Raises
     ------
     KnowledgeError
-        The file is no memory; OLD isn't in it, or names two terms.
+        The file is no memory, or OLD names no term or two terms of the memory.
     """
     with alone(memory):
         quads, prefixes = _parse(memory)
@@ -281,7 +283,7 @@ def _rename(text: str, iris: set[str]) -> tuple[str, str]:
 
 
 def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.Triple:
-    """Return a triple with its IRIs renamed, including terms in texts."""
+    """Return a triple with its terms renamed in IRIs and in texts."""
     value: Any = quad.object
     if isinstance(value, ox.NamedNode):
         value = ox.NamedNode(table.get(value.value, value.value))
@@ -291,10 +293,10 @@ def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.
 
 
 def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:
-    """Return the content of a memory file, and its prefixes."""
+    """Return the quads and the prefixes of a memory file."""
     if not memory.is_file():
         raise KnowledgeError(f"{memory}: no such memory file")
-    Memory.load(memory)  # raises the better message
+    Memory.load(memory)  # its error message is more precise than the parser's
     parser = ox.parse(path=str(memory), format=ox.RdfFormat.TURTLE, base_iri=memory.resolve().as_uri())
     quads = list(parser)
     return quads, dict(parser.prefixes)

@@ -1,4 +1,4 @@
-"""A certificate in a file, verified against a scene by the checker that shares no code with any search."""
+"""Verification of a certificate file against a scene; the checker shares no code with the search."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """The verdict of the checker on a certificate. `refused` is the reason that it isn't a proof.
+    """The verdict of the checker on a certificate of unsolvability.
 
-    None if it proves that there is no plan.
+    `refused` is the reason why the certificate is no proof. It is None if the certificate proves that there is no plan.
+    `claims` are the claims of the proof as sentences.
     """
 
     refused: str | None
@@ -32,11 +33,11 @@ class Checked:
         return self.refused is None
 
     def json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the verdict as JSON data."""
         return {"holds": self.holds, "refused": self.refused, "proof": list(self.claims)}
 
     def __str__(self) -> str:
-        """Return it as text."""
+        """Return the verdict as text."""
         if self.refused is not None:
             return f"not accepted: {self.refused}"
         return "\n  ".join(["the certificate holds: there is no plan", *self.claims])
@@ -49,7 +50,7 @@ def checked_certificate(scene: Scene, goals: tuple[str, ...], file: Path) -> Che
     ----------
     scene : Scene
     goals : tuple of str
-        Each replaces the scene's goal of that symbol, as in planning.
+        Each goal replaces the scene's goal for the same symbol, as in planning.
     file : Path
         The output of `confab plan --json` for an unsolvable task, or the certificate alone.
 

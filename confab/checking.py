@@ -1,4 +1,4 @@
-"""A plan made in a part of a scene, checked against the scene itself."""
+"""Validation against the whole scene of a plan that was made in a part of the scene."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ from confab.reasoner.symbols import Symbol
 def refused(
     graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = (), unmet: Collection[Symbol] = ()
 ) -> list[Fault]:
-    """Return the faults in the whole scene of a plan that was made in a part of the scene; empty if the plan is valid.
+    """Return the faults that a plan made in a part of a scene has in the whole scene; the list is empty if the plan is valid.
 
-    The plan is executed with the individuals of the part, and the checker reports the other individuals on which each condition
-    and effect depends. The graph is queried for these until none is missing. Task recognition plays no part in this.
+    The checker executes the plan with the individuals of the part. It reports the other individuals on which conditions and
+    effects depend. These individuals are read from the graph, and the check is repeated until no individual is missing. The
+    check doesn't use the code that selects the part of a scene.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""The command line: a table of commands and their functions, which are in `confab/commands/`, grouped by purpose.
+"""The command line: a table of the commands, whose functions are in `confab/commands/`.
 
-Results go to stdout, progress and errors to stderr (`confab.terminal`). Exit 0: yes; 1: the answer is no; 2: misuse or
-unreadable input; 3: gave up at a limit; 4: a fault of ours. The module of a command is imported when the command is called;
-heavy imports are inside the commands that need them.
+Results go to stdout, progress and errors go to stderr (`confab.terminal`). The exit codes are 0 for a positive answer, 1 for a
+negative answer, 2 for misuse or unreadable input, 3 for a call that gave up at a limit, and 4 for a fault of the program. The
+module of a command is imported when the command is called. Slow imports are inside the functions that need them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from click.exceptions import Exit
 from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
-GROUPS = {  # as the help lists them, the main ones first
+GROUPS = {  # in the order of the help
     "Plan and act": ("plan", "run", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
     "Look": ("report", "runs"),
@@ -70,7 +70,7 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command of a name; for a wrong name, suggest the most similar one."""
+        """Return the command with a name; for an unknown name, the error suggests the most similar name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             from confab.guessing import chosen
             from confab.reasoner.names import nearest
@@ -126,8 +126,9 @@ def app() -> None:
 
 
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
-    """Run the command line; it always ends with an exit code and at most one line on stderr.
+    """Run the command line, and end the process with an exit code and at most one line on stderr.
 
-    `ending` ends the process if a step continues long after its deadline; inside another program, the process isn't ended.
+    `ending` is called to end the process if a step continues long after its deadline. Without it, the process isn't ended at a
+    deadline, so that another program can call `main`.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

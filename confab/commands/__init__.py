@@ -1,1 +1,1 @@
-"""The commands by their purpose; `confab.cli` has the table of them."""
+"""The functions of the commands, in a module for each purpose; `confab.cli` lists the commands."""

@@ -1,4 +1,4 @@
-"""SPARQL queries on scenes, here or as an endpoint."""
+"""The commands query, serve and mcp: SPARQL queries on scenes, a SPARQL endpoint, and tools for agents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes and domains: begun, fetched, drawn, checked, generated, and PDDL in and out."""
+"""Commands for authors of scenes and domains: new, fetch, picture, validate, generate, convert, import, export."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def validate(
 
 
 def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: float | None, as_json: bool) -> int:
-    """Check some files, print what was found, and return the exit code."""
+    """Validate files, print the findings, and return the exit code."""
     from confab.reasoner.validation.findings import ERROR, WARNING, listing
     from confab.reasoner.validation.validate import STAGES
     from confab.reasoner.validation.validate import validate as check
@@ -296,7 +296,7 @@ def export(
 
 
 def _exported_trees(loaded: Scene, plan: Path | None, goal: tuple[str, ...], out: Path) -> tuple[Path, Path]:
-    """Write the behaviour tree of a plan, made here if none is given; exit where there is none."""
+    """Write the behaviour tree of a given plan or of a new plan; exit if there is no plan."""
     from confab.commands.given import plan_in
     from confab.trees import export_trees
 

@@ -1,4 +1,4 @@
-"""Reading the arguments of commands: scenes, memories, plans, and files to write."""
+"""Functions that read the arguments of commands: scenes, memories, plans, and output files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def load_scene(source: str, iri: str | None = None) -> Scene:
-    """Load a scene, with reach facts if it has a body; ``-`` is read from standard input."""
+    """Load a scene, and compute its reach facts if it has a robot's body; the source ``-`` is standard input."""
     from confab.reaching import with_current_reach
     from confab.scene import load, load_text
 
@@ -31,7 +31,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
 
 
 def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
-    """Report in one line that `confab validate` finds errors in a user's scene, if there are any and time is left."""
+    """Print the first error that a quick validation finds in a scene file of the user; do nothing if no time is left."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return
@@ -47,7 +47,7 @@ def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
 
 
 def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
-    """List the places that no hand reaches, with the obstacle, if there is no plan and time is left."""
+    """If there is no plan and time is left, print each place that no hand reaches, and the obstacle."""
     if outcome.plan is None and deadline.left != 0:
         from confab.reaching import unreached
         from confab.reasoner.limits import LimitError, within
@@ -58,11 +58,11 @@ def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
 
 
 NAMED = 3
-"""Maximum number of unknown terms of a memory that are named."""
+"""Maximum number of unknown terms of a memory that a message names."""
 
 
 def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
-    """Return the requested memory."""
+    """Return the memory in a file; None if no file is given, or if the file can't be read and planning continues without it."""
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:
@@ -88,14 +88,14 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
 
 def json_file(path: Path) -> Path:
-    """Return the path of a plan or of verdicts to write, if its suffix is that of JSON."""
+    """Return the path of an output file for a plan or verdicts; raise `KnowledgeError` if its suffix isn't ``.json``."""
     if path.suffix.lower() != ".json" and path != STDOUT:
         raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
     return path
 
 
 def plan_in(path: Path, scene: Scene) -> Plan:
-    """Return the plan in a file: Confab's JSON, or the list of actions that a PDDL planner writes for an exported level."""
+    """Return the plan in a file, which contains Confab's JSON or a PDDL planner's list of actions for an exported level."""
     if path.suffix.lower() in (".json", ""):
         from confab.interchange import read_plan
 

@@ -1,4 +1,4 @@
-"""Options of several commands, declared once."""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from confab.reasoner.files import STDOUT
 from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
 
 TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
-"""Kinds of content that can go to standard output; the empty kind is the result of a query."""
+"""Kinds of content that a command can write to standard output; the empty text is the kind of query results."""
 
 STDIN = Path("/dev/stdin")
 
@@ -37,14 +37,14 @@ FOLDER = click.Path(path_type=Path)
 
 
 class Output(click.Path):
-    """A file that a command writes; ``-`` is standard output, for text that is the result of a command.
+    """A file that a command writes; ``-`` is standard output, which only the kinds in `TEXTS` may use.
 
     Parameters
     ----------
     kind : str
-        The kind of the output file, as in `confab.reasoner.kinds`; empty if only the command knows.
+        The kind of the output file, as in `confab.reasoner.kinds`; empty if the command determines the kind.
     may_be : str
-        The parameter whose files may be replaced.
+        The name of the parameter whose input file the output may replace.
     """
 
     def __init__(self, kind: str = "", may_be: str = "") -> None:
@@ -52,7 +52,7 @@ class Output(click.Path):
         self.kind, self.may_be = kind, may_be
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path, if content of this kind may be written there."""
+        """Return the path; fail if content of this kind can't be written to it."""
         path = Path(str(super().convert(value, param, ctx)))
         if path == STDOUT and self.kind not in TEXTS:
             self.fail(f"{self.kind or 'this'} can't be written to stdout; wanted the name of a file", param, ctx)
@@ -64,10 +64,10 @@ class Output(click.Path):
 
 
 class Command(click.Command):
-    """A command whose outputs differ from its inputs and from each other, and that reads stdin for at most one input."""
+    """A command that refuses an output file that is also an input or another output, and refuses stdin for two inputs."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command, unless one file is given for two purposes."""
+        """Run the command; raise `UsageError` if one file, or stdin, is given for two purposes."""
         read = [p for p in self.params if _reads_stdin(ctx.params.get(p.name or ""), p)]
         if len(read) > 1:
             names = " and ".join(map(_name, read))
@@ -89,18 +89,18 @@ class Command(click.Command):
 
 
 def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
-    """Return whether a parameter's value denotes standard input."""
+    """Return whether a value of a parameter denotes standard input."""
     values = given if isinstance(given, tuple) else (given,)
     return any(value in (STDIN, "-") for value in values) and not isinstance(parameter.type, Output)
 
 
 def _same_file(path: Path, given: object, parameter: click.Parameter) -> bool:
-    """Return whether the value of a parameter denotes a given file, possibly through links."""
+    """Return whether the value of a parameter denotes the same file as a path, possibly through links."""
     if not isinstance(given, str | Path):
         return False
     try:
         return path.samefile(given)
-    except (OSError, ValueError):  # one of them isn't there
+    except (OSError, ValueError):  # one of the files doesn't exist
         is_file = isinstance(parameter, click.Argument) or isinstance(parameter.type, click.Path)
         return is_file and os.path.realpath(path) == os.path.realpath(str(given).replace("\0", ""))
 
@@ -125,7 +125,7 @@ def _verbose(context: click.Context, option: click.Parameter, wanted: bool) -> N
 
 
 def scene_names(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
-    """Return the completions of a scene's name: shipped names, and ontology files."""
+    """Return the completions of the beginning of a scene argument: names of shipped scenes, folders and ontology files."""
     folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
     found = sorted(folder.glob(f"{glob.escape(begun.rpartition('/')[2])}*"))
     files = [str(path) + "/" * path.is_dir() for path in found if path.is_dir() or path.suffix in ontology.SUFFIXES]
@@ -140,8 +140,8 @@ _VERBOSE = click.option(
 )
 
 
-def QUIET(function: Any) -> Any:  # noqa: N802 - an option as the others
-    """Add the two options for the amount of output."""
+def QUIET(function: Any) -> Any:  # noqa: N802 - it is used like the constants that are options
+    """Add the options ``--quiet`` and ``--verbose`` to a command."""
     return _QUIET(_VERBOSE(function))
 
 
@@ -172,18 +172,18 @@ MODE = click.option(
 
 
 class Seconds(click.FloatRange):
-    """A number of seconds that a clock can wait for."""
+    """A time limit in seconds, of at most `LONGEST`."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the seconds, if they are a number within the maximum."""
+        """Return the value as a number of seconds; fail if the value exceeds `LONGEST` or isn't a number."""
         seconds = float(super().convert(value, param, ctx))
-        if not seconds <= LONGEST:  # as 'nan' isn't
+        if not seconds <= LONGEST:  # also excludes 'nan'
             self.fail(f"'{value}' is no time to wait; wanted seconds up to {LONGEST:,.0f}", param, ctx)
         return seconds
 
 
 LONGEST = 1e9
-"""Maximum number of seconds of a time limit; beyond it, leave the limit out."""
+"""Maximum time limit in seconds."""
 TIME_LIMIT = click.option(
     "--time-limit",
     type=Seconds(min=0.0),

@@ -1,4 +1,4 @@
-"""Plans: made, checked in physics, carried out, explained."""
+"""The commands plan, run, verify, execute and explain."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def plan(
     if out is not None:
         told(result.save(out), summary(result.outcome))
     else:
-        # What draws trees is imported for a plan alone: there may be no time left for it.
+        # Only a plan is printed with rich, whose import takes time: without a plan, the time limit may be over.
         show_result(result.json() if as_json else result if result.solved else str(result))
     if dearer := result.dearer():
         remark(dearer)
@@ -333,13 +333,13 @@ def execute(
             noise=noise,
             both_hands=both_hands,
         )
-    if execution.episode.refuted and on is None:  # a robot's refusals are no geometry of the scene
+    if execution.episode.refuted and on is None:  # refusals of an external robot don't follow from the scene's geometry
         from confab.refuting import keep
 
-        met = {found.individual for found, _ in execution.episode.discovered}  # of which no other episode knows
+        met = {found.individual for found, _ in execution.episode.discovered}  # not in the scene of later calls
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
-        with undisturbed(memory):  # other processes may have learned meanwhile
+        with undisturbed(memory):  # other processes may have changed the file during the episode
             newest = Memory.load(memory, loaded)
             newest.live(loaded.problem, execution.episode)
             newest.save(memory)
@@ -423,7 +423,7 @@ def _explained(
     against: str | None,
     plot: Path | None,
 ) -> Any:
-    """Return the requested reasons; if there is no plan, the result of planning."""
+    """Plan in a scene, and return the requested explanation; if there is no plan, return the result of planning."""
     loaded = load_scene(scene)
     remembered = memory_for(memory, False, loaded)
     with progress("planning"):
@@ -444,7 +444,7 @@ def _explained(
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
-    """Return why memory prefers one step of a plan to another, and draw the reasons."""
+    """Return why memory prefers a step of a plan to an alternative; draw the reasons into `plot` if given."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
     from confab.why import find_step

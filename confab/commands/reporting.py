@@ -1,4 +1,4 @@
-"""The page as a file: of a saved plan, execution or verification, and of stored runs."""
+"""The commands report and runs, which write pages of saved plans, executions, verifications and runs."""
 
 from __future__ import annotations
 
