@@ -1,1 +1,1 @@
-"""Measurements that the documentation quotes: `python -m benchmarks`."""
+"""Benchmarks whose results the documentation quotes; `python -m benchmarks` runs them."""

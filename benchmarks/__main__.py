@@ -1,8 +1,8 @@
-"""Run the measurements that the documentation quotes: all of them, or those named on the command line.
+"""Run all benchmarks, or the benchmarks named on the command line.
 
     python -m benchmarks [NAME …]
 
-Each is a module of this folder with a function ``main()`` that prints its tables.
+A benchmark is a module of this folder with a function ``main()`` that prints tables.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whole processes beside flat planners, on two encodings of the same tables; and the cost of optimal plans, proved twice."""
+"""Comparison of whole planning processes with other planners, and of the costs of optimal plans with Fast Downward."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from confab.reasoner.symbols import Problem
 
 HERE = Path(__file__).parent
 SHORT, LONG, PROVING = 60, 300, 20
-"""CPU seconds for a planner's process (long: lama-first on the encoding by hand from 50 objects on), and for a proof of cost."""
+"""Limits in CPU seconds: of a process, of lama-first on the handwritten encoding from 50 objects on, and of a proof of cost."""
 RUNS, QUICK = 3, 5.0
-"""Number of runs for the median, and the seconds below which runs are repeated."""
+"""Number of runs for a median, and the CPU seconds below which a run is repeated."""
 
 Row = tuple[float | None, int | None, int]
-"""CPU seconds and steps, or None without a plan; the seconds allowed."""
+"""CPU seconds and number of steps, both None without a plan, and the time limit in seconds."""
 
 
 class Rows:
-    """Measurements by planner, encoding and size; kept in a file if `CONFAB_PEER_ROWS` names one."""
+    """Measurements by planner, encoding and size, stored in the file that `CONFAB_PEER_ROWS` names, if any."""
 
     def __init__(self) -> None:
         self.file = Path(os.environ["CONFAB_PEER_ROWS"]) if "CONFAB_PEER_ROWS" in os.environ else None
@@ -40,7 +40,7 @@ class Rows:
             self.known = {key: tuple(row) for key, row in map(json.loads, self.file.open())}
 
     def get(self, key: str, measure: Callable[[], Row]) -> Row:
-        """Return a row, measured now unless it is known."""
+        """Return the stored row of a key, or measure and store the row."""
         if key not in self.known:
             self.known[key] = measure()
             if self.file is not None:
@@ -50,17 +50,17 @@ class Rows:
 
 
 def served(folder: str, n: int, seed: int) -> tuple[Path, Problem]:
-    """Write a served table and return its file and its problem."""
+    """Write a scene of the family `served`, and return its file and its problem."""
     path = Path(folder) / f"served-{n}.ttl"
     write_scene(path, "served", n, 2, 0, seed)
     return path, read(load(str(path))).problem
 
 
 def beside_peers(python: str, seed: int) -> None:
-    """Print the CPU seconds and steps of whole processes, and how many times ours each peer takes.
+    """Print CPU seconds and steps of whole processes, and the ratio of each planner's time to confab's.
 
-    The peers get a domain by hand, which favours them (see `_tabletop.pddl`), and the one that `confab export` writes.
-    A planner without a plan within its time at one size isn't tried on larger ones of that encoding.
+    The other planners get two encodings: a handwritten domain, which favours them (see `_tabletop.pddl`), and the output of
+    `confab export`. A planner that finds no plan in time at one size isn't tried on larger problems of the same encoding.
     """
     commands, rows = planners(python), Rows()
     print("| n | confab plan | steps | planner | encoding | CPU s | steps | times ours |")
@@ -101,7 +101,7 @@ def beside_peers(python: str, seed: int) -> None:
 
 
 def medians(command: Sequence[str], domain: Path, problem: Path, cap: int) -> Row:
-    """Run a peer, several times if it is quick."""
+    """Return the median of one or more runs of a planner; quick runs are repeated."""
     runs = [run(command, domain, problem, cap)]
     while runs[0].plan is not None and runs[0].seconds < QUICK and len(runs) < RUNS:
         runs.append(run(command, domain, problem, cap))
@@ -110,7 +110,7 @@ def medians(command: Sequence[str], domain: Path, problem: Path, cap: int) -> Ro
 
 
 def whole_process(path: Path) -> Row:
-    """Run `confab plan --json`, from a cold start each time."""
+    """Return the median of several runs of `confab plan --json`, each in a new process."""
     command = [str(Path(sys.executable).with_name("confab")), "plan", str(path), "--json"]
     runs: list[Run] = [run(command, path, path, SHORT) for _ in range(RUNS)]
     output = runs[0].output
@@ -119,7 +119,7 @@ def whole_process(path: Path) -> Row:
 
 
 def optimal_costs(python: str, seed: int) -> None:
-    """Compare the bound that `confab plan --optimal` proves with the cost of Fast Downward's optimal plans; exit if they differ."""
+    """Compare the costs that `confab plan --optimal` proves with those of Fast Downward's optimal plans; exit if they differ."""
     commands = planners(python)
     downward = [w for w in commands["lama-first"] if w not in ("--alias", "lama-first")]
     command = [*downward, "--search", "astar(lmcut())"]

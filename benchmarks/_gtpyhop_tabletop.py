@@ -1,10 +1,10 @@
-"""The tabletop as an expert writes it for GTPyhop: hand-written methods on three levels. Run by a Python that has gtpyhop.
+"""The tabletop domain for GTPyhop, with handwritten methods on three levels, run by a Python that has gtpyhop.
 
     python _gtpyhop_tabletop.py TABLE.json
 
-The table: ``at`` (object → place), ``drinks`` (vessel → beverage or null), ``reach`` (hand → places), ``goals`` (object → place),
-``pours`` (cup → beverage). Prints the CPU seconds of planning and the number of primitives, or ``none``. It serves tables
-with room to spare; full tables and swaps it doesn't know how to do.
+The table has the keys ``at`` (object → place), ``drinks`` (vessel → beverage or null), ``reach`` (hand → places), ``goals`` (object
+→ place) and ``pours`` (cup → beverage). The program prints the CPU seconds of planning and the number of primitives, or ``none``.
+The methods solve tables with free places, but not full tables and swaps.
 """
 
 import json

@@ -1,14 +1,14 @@
-"""Axioms inside planning, compared with Fast Downward, which supports them: solvability and the least number of steps.
+"""Comparison with Fast Downward on tasks with axioms: solvability and length of a shortest plan.
 
 python -m benchmarks axioms
-CONFAB_PROBLEMS=200 …        how many random problems of each kind
-CONFAB_KINDS=packing …       only some kinds: packing, gallery, random
-CONFAB_SEED=0 …              the first one's seed
+CONFAB_PROBLEMS=200 …        number of random problems of each kind
+CONFAB_KINDS=packing …       kinds: packing, gallery, random (all by default)
+CONFAB_SEED=0 …              seed of the first problem
 CONFAB_PEERS=PYTHON …        a Python that has up-fast-downward
 
-The first two kinds are nested boxes and rooms that open doors join: the shipped worlds packing and gallery with other individuals,
-states and goals, of which Fast Downward gets what `confab export` writes. The third is random PDDL (`worlds.axioms`), read by both,
-and by a plain reading that tries everything. Fast Downward searches by A* without a heuristic.
+The kinds packing (nested boxes) and gallery (rooms joined by open doors) are the shipped worlds with other individuals, states and
+goals. Fast Downward gets the PDDL that `confab export` writes. The kind random is random PDDL (`worlds.axioms`), which both
+planners read. The evaluator `worlds.axioms.Plain` also solves these tasks. Fast Downward searches by A* without a heuristic.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from worlds.axioms import Plain, axioms
 
 SECONDS = 60.0
 GOAL = "REACH_GOAL"
-"""The behaviour that represents an imported goal which is no conjunction of changeable facts; its cost is 0."""
+"""The behaviour, with cost 0, that stands for an imported goal that is not a conjunction of changeable facts."""
 
 
 def boxes(problem: Problem, rng: Random) -> Problem:
@@ -57,7 +57,7 @@ def boxes(problem: Problem, rng: Random) -> Problem:
 
 
 def rooms(problem: Problem, rng: Random) -> Problem:
-    """Return a random problem of rooms that doors join: where the guard shall be, and ways that shall be open or not."""
+    """Return a random problem of rooms joined by doors, with goals on the guard's room and on connections between rooms."""
     count = rng.choice((4, 5, 6))
     places = [f"room{i}" for i in range(count)]
     doors, initial = [], {}
@@ -93,7 +93,7 @@ def _with(
 
 
 def downward(domain: str, problem: str, command: list[str]) -> int | None:
-    """Return the length of Fast Downward's shortest plan, None if it proves that there is none."""
+    """Return the length of Fast Downward's shortest plan, or None if Fast Downward proves that there is no plan."""
     with TemporaryDirectory() as folder:
         files = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
         for file, text in zip(files, (domain, problem), strict=True):
@@ -105,14 +105,14 @@ def downward(domain: str, problem: str, command: list[str]) -> int | None:
 
 
 def deepest(problem: Problem) -> int:
-    """Return the length of the longest chain of a transitive situation in the initial state."""
+    """Return the length of the longest chain of a transitive situation type in the initial state."""
     name = "INSIDE" if "INSIDE" in problem.domain.rules else "WAY"
     facts, (one, other) = Facts(problem, problem.initial), problem.domain.situations[name].arguments
     return max(sum(facts.value(name, (a, b)) == TRUE for b in problem.classes[other]) for a in problem.classes[one])
 
 
 def made(kind: str, seed: int) -> tuple[Problem, str, str]:
-    """Return a random problem of a kind, and as PDDL."""
+    """Return a random problem of a kind, and its domain and problem as PDDL."""
     if kind == "random":
         domain, text = axioms(Random(seed))
         return imported(parse(domain, text)).problem, domain, text
@@ -126,7 +126,7 @@ KINDS = {"packing": boxes, "gallery": rooms}
 
 
 def main() -> None:
-    """Print how many problems agree."""
+    """Print statistics of the problems, and all disagreements with Fast Downward."""
     count, first = int(os.environ.get("CONFAB_PROBLEMS", "200")), int(os.environ.get("CONFAB_SEED", "0"))
     kinds = os.environ.get("CONFAB_KINDS", "packing,gallery,random").split(",")
     command = planners(peers())["lama-first"]

@@ -1,7 +1,7 @@
-"""Whole calls compared with an earlier commit, alternating, so that load on the machine affects both.
+"""Comparison of whole calls with an earlier commit; calls of both commits alternate, so that machine load affects both.
 
 python -m benchmarks before
-CONFAB_BEFORE=f43f953 …      the commit; its files are taken from Git into a temporary folder
+CONFAB_BEFORE=f43f953 …      the commit, whose files are extracted from Git into a temporary folder
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from confab.reasoner.generate import write_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED, LONG, LIMIT = 100, 1.0, 60.0
-"""What takes longer than the second is measured once; the third is the limit of a call, all in seconds."""
+"""Seed of the problems, CPU seconds after which a call isn't repeated, and time limit of a call in seconds."""
 CASES = (
     *(("served", n, 2, 0) for n in (4, 50, 200, 1000)),
     ("served", 4, 2, 20_000),
@@ -41,7 +41,7 @@ print(json.dumps([min(found), len(result.plan.primitives) if result.solved else 
 
 
 def main() -> None:
-    """Print the table, and how long plans and calls are on average."""
+    """Print a table of both commits, and the mean ratios of plan lengths and times."""
     commit = os.environ.get("CONFAB_BEFORE", "f43f953")
     with tempfile.TemporaryDirectory() as folder:
         before = Path(folder) / "before"
@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def call(tree: Path, scene: Path, planning: bool) -> tuple[float, int]:
-    """Return the least CPU seconds of some whole calls, or of planning alone, and the primitives of the plan; 0 without one."""
+    """Return the least CPU seconds of repeated whole calls, or of planning alone, and the number of primitives of the plan."""
     script = CALL.format(long=LONG, limit=LIMIT)
     line = [sys.executable, "-c", script, str(scene), "plan" if planning else "whole"]
     done = subprocess.run(

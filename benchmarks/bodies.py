@@ -1,12 +1,12 @@
-"""Tasks, robots and noise: the share of verified perturbed rollouts, the failures, and the cost of a rollout.
+"""Physical verification of tasks by robot and noise: share of successful rollouts, failures, and cost of a rollout.
 
-    python -m benchmarks.bodies            the table of all rollouts of the present code so far
-    python -m benchmarks.bodies run [MM …] [TASK …]   run the missing rollouts of the reporting seeds, one row after another
-    python -m benchmarks.bodies carry [TASK …]   count older rollouts of tasks whose first two are reproduced bit by bit
-    python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, with each failure
+    python -m benchmarks.bodies            print the table of all rollouts of the present code
+    python -m benchmarks.bodies run [MM …] [TASK …]   run the missing rollouts of the reporting seeds
+    python -m benchmarks.bodies carry [TASK …]   count older rollouts of tasks whose first two rollouts are reproduced bit by bit
+    python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   run development seeds of one task
 
-A line per rollout goes to confab-out/bodies.jsonl, with a digest of its code; an interrupted run continues where it was. Seeds
-from 7000 are for development, and their failures may be corrected; seeds from 80000 are for reporting only.
+Each rollout adds a line, with a digest of the code, to confab-out/bodies.jsonl. An interrupted run can be continued. Seeds from
+7000 are for development: code may be changed because of their failures. Seeds from 80000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ DEVELOPMENT, REPORTING = 7000, 80000
 NOISE = {4: 100, 0: 100, 8: 20}
 """Standard deviation in millimetres of every perceived position, with the number of rollouts per task.
 
-Rows are measured in this order."""
+The noises are measured in this order."""
 AGAIN = 2
-"""Number of rollouts of a task that are repeated to find out whether other code gives the same results."""
+"""Number of rollouts of a task that are repeated to check that changed code gives the same results."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
-"""Files on which a rollout depends most: when one of them changes, all rollouts are repeated."""
+"""Files on which a rollout depends most; after a change of one of these files, all rollouts are repeated."""
 
 
 @dataclass(frozen=True)
 class Case:
     """A task of the table: a scene and its steps.
 
-    The steps are primitives (behaviour and arguments), or the plan for `goals`, or the plan for the scene's goals.
+    The steps are the stated primitives (behaviour and arguments), or otherwise the plan for `goals` or for the scene's goals.
     """
 
     robot: str
@@ -84,7 +84,7 @@ def _scene(name: str) -> Scene:
 
 
 def steps_of(case: Case) -> tuple[Step, ...]:
-    """Return the primitives that a case consists of."""
+    """Return the primitives of a case."""
     if case.primitives:
         words = [text.split() for text in case.primitives]
         return tuple(Step((i,), 0, 3, name, tuple(arguments)) for i, (name, *arguments) in enumerate(words))
@@ -99,7 +99,7 @@ def steps_of(case: Case) -> tuple[Step, ...]:
 
 @cache
 def trial(name: str, noise: int) -> Trial:
-    """Return a case at some noise, to be rolled out by seeds."""
+    """Return the trial of a case with noise in millimetres."""
     case = CASES[name]
     scene, steps = _scene(case.scene), steps_of(case)
     expected = expectations(scene.problem, steps)
@@ -107,7 +107,7 @@ def trial(name: str, noise: int) -> Trial:
 
 
 def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
-    """Return the record of a rollout."""
+    """Return the stored record of a rollout."""
     failure = rollout.failure
     return {
         "task": name,
@@ -125,25 +125,25 @@ def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
 
 
 def code() -> str:
-    """Return the identity of the committed code and bodies: git's names of their contents."""
+    """Return the identity of the committed code and bodies: Git's hashes of their contents."""
     command = ["git", "rev-parse", *(f"HEAD:{path}" for path in MEASURED)]
     found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
     return "-".join(name[:7] for name in found)
 
 
 def read() -> list[dict[str, Any]]:
-    """Return the lines of all rollouts."""
+    """Return the records of all rollouts."""
     return [json.loads(text) for text in KEPT.read_text(encoding="utf-8").splitlines()] if KEPT.exists() else []
 
 
 def kept() -> list[dict[str, Any]]:
-    """Return the lines of the rollouts of the present code."""
+    """Return the records of the rollouts of the present code."""
     now = code()
     return [one for one in read() if one["code"] == now]
 
 
 def carry(names: Sequence[str]) -> None:
-    """Keep rollouts of older code, of tasks and noises whose first rollouts give the same results."""
+    """Assign rollouts of older code to the present code if the first rollouts of the task and noise give equal results."""
     rows, now = read(), code()
     for name, noise in product(names, NOISE):
         older = [one for one in rows if (one["task"], one["noise"]) == (name, noise) and one["code"] != now]
@@ -163,7 +163,7 @@ def missing(names: Sequence[str], noises: Sequence[int]) -> Iterator[tuple[str, 
 
 
 def run(names: Sequence[str], noises: Sequence[int]) -> None:
-    """Roll out the missing cases of some tasks, and append a line for each."""
+    """Run the missing rollouts of tasks, and append a record for each."""
     KEPT.parent.mkdir(parents=True, exist_ok=True)
     now = code()
     for name, noise, seed in missing(names, noises):
@@ -173,7 +173,7 @@ def run(names: Sequence[str], noises: Sequence[int]) -> None:
 
 
 def tried(name: str, noise: int, seeds: Sequence[int]) -> None:
-    """Print development rollouts of a task, and each failure."""
+    """Run and print rollouts of a task with development seeds, with each failure."""
     good = 0
     for seed in seeds:
         found = row(name, noise, trial(name, noise).run(seed))

@@ -1,6 +1,6 @@
-"""Whole valid inputs, and how each is broken: in its structure or in its bytes, at every door of the command line.
+"""Valid inputs of the command line, and random mutations that break their structure or their bytes.
 
-A door is a function that breaks something in a folder, as a random number generator draws, and returns the command to run there.
+A *door* is a kind of input with a function that breaks a file in a folder and returns the command that reads the file.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ DOMAINS = ("tearoom", "ferry", "served")
 
 
 def sources(folder: Path) -> None:
-    """Write the valid inputs of the cases: three small domains with a scene each, a memory, a plan, observed facts."""
+    """Write the valid inputs: three small domains, each with a scene, a memory, a plan and observed facts."""
     import confab
     from confab.authoring import new_domain
     from confab.memory import Memory
@@ -96,7 +96,7 @@ def sources(folder: Path) -> None:
         scene = confab.load(folder / domain / "scene.ttl")
         result, memory = scene.plan(), Memory.of(scene)
         result.save(folder / domain / "plan.json")
-        memory.experience.replica = "fuzz"  # in place of one that differs in every run
+        memory.experience.replica = "fuzz"  # the same name in every run
         memory.teach(scene, result.plan)
         links = list(memory.links.tables.items())[:3]
         memory.links = Links({conclusion: dict(list(table.items())[:3]) for conclusion, table in links})
@@ -105,7 +105,7 @@ def sources(folder: Path) -> None:
 
 
 def mutated_triples(draw: random.Random, file: Path, mutations: Sequence[Mutation] | None = None) -> None:
-    """Break an ontology file in its structure: parts deleted, doubled, swapped, given another type, another end, a circle."""
+    """Break the structure of an ontology file by random mutations of its triples."""
     parser = ox.parse(path=str(file), format=ox.RdfFormat.TURTLE, base_iri="urn:fuzz:base")
     triples = [quad.triple for quad in parser]
     for _ in range(draw.choice((1, 1, 1, 2, 3, 5))):
@@ -119,13 +119,13 @@ Mutation = Callable[[random.Random, Triples], None]
 
 
 def _any(draw: random.Random, triples: Triples) -> int:
-    """Return the place of a triple, one about the core's words rather than another."""
+    """Return the index of a random triple, preferably of a triple with a property of the core ontology."""
     places = [i for i, t in enumerate(triples) if t.predicate.value.startswith(CORE) or draw.random() < 0.4]
     return draw.choice(places or range(len(triples)))
 
 
 def delete(draw: random.Random, triples: Triples) -> None:
-    """Drop a triple."""
+    """Delete a triple."""
     if triples:
         del triples[_any(draw, triples)]
 
@@ -138,7 +138,7 @@ def delete_node(draw: random.Random, triples: Triples) -> None:
 
 
 def double(draw: random.Random, triples: Triples) -> None:
-    """Copy all triples of a node to another one, and perhaps its uses."""
+    """Copy all triples of a node to a new node, and perhaps the references to the node."""
     if triples:
         node = triples[_any(draw, triples)].subject
         twin = ox.NamedNode(getattr(node, "value", "x") + "Twin") if isinstance(node, ox.NamedNode) else ox.BlankNode()
@@ -148,7 +148,7 @@ def double(draw: random.Random, triples: Triples) -> None:
 
 
 def swap(draw: random.Random, triples: Triples) -> None:
-    """Let two triples lead where the other led."""
+    """Exchange the objects of two triples."""
     if triples:
         one, other = _any(draw, triples), _any(draw, triples)
         a, b = triples[one], triples[other]
@@ -165,7 +165,7 @@ def retype(draw: random.Random, triples: Triples) -> None:
 
 
 def other_end(draw: random.Random, triples: Triples) -> None:
-    """Let a triple lead to anything: another node, itself, a text, a number, something without a name."""
+    """Replace the object of a triple by another node, its own subject, a text, a number or a blank node."""
     if not triples:
         return
     place = _any(draw, triples)
@@ -189,14 +189,14 @@ def other_end(draw: random.Random, triples: Triples) -> None:
 
 
 def other_property(draw: random.Random, triples: Triples) -> None:
-    """Change the property of a triple."""
+    """Replace the property of a triple."""
     if triples:
         place, by = _any(draw, triples), draw.choice(triples).predicate
         triples[place] = ox.Triple(triples[place].subject, by, triples[place].object)
 
 
 def axiom(draw: random.Random, triples: Triples) -> None:
-    """Add a statement of OWL or of the core between two nodes."""
+    """Add a triple with a property of OWL or of the core ontology between two nodes."""
     if triples:
         said = [OWL + word for word in OWL_WORDS.split()] + [CORE + word for word in CORE_WORDS.split()]
         said += [RDF + "rest", RDF + "first", RDFS + "subClassOf"]
@@ -205,7 +205,7 @@ def axiom(draw: random.Random, triples: Triples) -> None:
 
 
 def rename(draw: random.Random, triples: Triples) -> None:
-    """Give a node another name wherever it is named."""
+    """Rename a node in all triples."""
     named = [t.subject for t in triples if isinstance(t.subject, ox.NamedNode)]
     if named:
         old = draw.choice(named)
@@ -237,7 +237,7 @@ MUTATIONS: tuple[Mutation, ...] = (
 
 
 def mutated_bytes(draw: random.Random, file: Path) -> None:
-    """Break a file anywhere: bytes dropped, doubled, changed, cut off."""
+    """Delete, copy, change or cut off bytes of a file."""
     content = bytearray(file.read_bytes())
     for _ in range(draw.choice((1, 1, 2, 5, 20))):
         at = draw.randrange(len(content) + 1)
@@ -257,7 +257,7 @@ def mutated_bytes(draw: random.Random, file: Path) -> None:
 
 
 def mutated_words(draw: random.Random, text: str, more: Sequence[str] = ()) -> str:
-    """Break a text in its words and signs: dropped, doubled, swapped, nested, or others in their place."""
+    """Delete, copy, exchange, nest or replace words and signs of a text."""
     words = re.findall(r"\w+|\s+|[^\w\s]", text)
     for _ in range(draw.choice((1, 1, 2, 3, 6))):
         if not words:
@@ -282,7 +282,7 @@ def mutated_words(draw: random.Random, text: str, more: Sequence[str] = ()) -> s
 
 
 def mutated_json(draw: random.Random, data: Any) -> Any:
-    """Break JSON data in its structure."""
+    """Break the structure of JSON data."""
     odd: list[Any] = [None, True, 0, -1, 1.5, 10**30, "", "x", [], {}, [[]], {"steps": []}, float("nan"), *ODD[:12]]
     if isinstance(data, dict) and data and draw.random() < 0.85:
         key = draw.choice(sorted(data))
@@ -325,14 +325,14 @@ def _domain(draw: random.Random) -> str:
 
 
 def _broken(draw: random.Random, folder: Path) -> str:
-    """Break the ontology of a domain; return its scene."""
+    """Break an ontology file of a domain; return the path of the scene."""
     files = [file for file in sorted(folder.glob("*.ttl")) if file.stem in ("scene", "tearoom")]
     mutated_triples(draw, draw.choice(files))
     return str(folder / "scene.ttl")
 
 
 def plan(draw: random.Random, folder: Path) -> Arguments:
-    """Plan in a scene whose structure is broken."""
+    """Plan with a scene whose structure is broken."""
     modes: tuple[Arguments, ...] = (
         ["--mode", "paper"],
         ["--optimal"],
@@ -345,12 +345,12 @@ def plan(draw: random.Random, folder: Path) -> Arguments:
 
 
 def validate(draw: random.Random, folder: Path) -> Arguments:
-    """Validate it."""
+    """Validate a scene whose structure is broken."""
     return ["validate", _broken(draw, folder)]
 
 
 def look(draw: random.Random, folder: Path) -> Arguments:
-    """Query affordances; draw, export, explain or learn."""
+    """Query, draw, export, explain, learn or execute with a scene whose structure is broken."""
     scene, memory = _broken(draw, folder), str(folder / "memory.ttl")
     return draw.choice(
         [
@@ -376,7 +376,7 @@ def look(draw: random.Random, folder: Path) -> Arguments:
 
 
 def files(draw: random.Random, folder: Path) -> Arguments:
-    """Plan in a scene whose bytes are broken, in each of the formats; or with a broken catalog."""
+    """Plan with a scene whose bytes are broken, in each file format, or with a broken catalog."""
     scene = folder / "scene.ttl"
     catalog = folder / "catalog-v001.xml"
     if catalog.is_file() and draw.random() < 0.2:
@@ -431,7 +431,7 @@ TOKENS = [
 
 
 def sparql(draw: random.Random, folder: Path) -> Arguments:
-    """Send a broken query."""
+    """Send a broken SPARQL query."""
     text = draw.choice(QUERIES)
     text = mutated_words(draw, text, TOKENS) if draw.random() < 0.95 else "SELECT * WHERE " + "{" * 2000 + "}" * 2000
     more = (
@@ -469,7 +469,7 @@ def pddl(draw: random.Random, folder: Path) -> Arguments:
 
 
 def plans(draw: random.Random, folder: Path) -> Arguments:
-    """Begin with a broken plan, or learn from it."""
+    """Start from a broken plan, or learn from a broken plan."""
     file, scene = folder / "plan.json", str(folder / "scene.ttl")
     if draw.random() < 0.8:
         data = json.loads(file.read_text())
@@ -484,7 +484,7 @@ def plans(draw: random.Random, folder: Path) -> Arguments:
 
 
 def memory(draw: random.Random, folder: Path) -> Arguments:
-    """Use a broken memory, or a good one with a broken one."""
+    """Use a broken memory, or merge a valid memory with a broken memory."""
     good, broken, scene = folder / "memory.ttl", folder / "broken.ttl", str(folder / "scene.ttl")
     shutil.copy(good, broken)
     if draw.random() < 0.7:
@@ -540,7 +540,7 @@ FACTS = (
 
 
 def interventions(draw: random.Random, folder: Path) -> Arguments:
-    """Give a broken intervention."""
+    """Execute with broken interventions."""
     call = ["execute", str(folder / "scene.ttl"), "--json"]
     for _ in range(draw.choice((1, 2, 4))):
         when = draw.choice(("after=1", "after=0", "at=0", "at=1.5", "after=0.0", "after=99"))
@@ -550,7 +550,7 @@ def interventions(draw: random.Random, folder: Path) -> Arguments:
 
 
 def options(draw: random.Random, folder: Path) -> Arguments:
-    """Ask a question in meaningless words."""
+    """Call commands with meaningless option values."""
     scene, out = str(folder / "scene.ttl"), str(folder / "out")
     calls = (
         ["plan", scene, "--goal", mutated_words(draw, draw.choice(FACTS)), "--time-limit", "5"],
@@ -621,7 +621,7 @@ def options(draw: random.Random, folder: Path) -> Arguments:
 
 
 def observed(draw: random.Random, folder: Path) -> Arguments:
-    """Start from observed facts in a broken file."""
+    """Plan from a broken file of observed facts."""
     draw.choice((mutated_triples, mutated_triples, mutated_bytes))(draw, folder / "observed.ttl")
     return [
         "plan",
@@ -635,7 +635,7 @@ def observed(draw: random.Random, folder: Path) -> Arguments:
 
 
 def bodies(draw: random.Random, folder: Path) -> Arguments:
-    """Validate broken measures of bodies, robots, shapes and skills."""
+    """Validate a domain with broken bodies, robots, shapes and skills."""
     from confab.authoring import new_domain
 
     files = new_domain("pouring", folder / "bodies", bodies=True)
@@ -645,7 +645,7 @@ def bodies(draw: random.Random, folder: Path) -> Arguments:
 
 
 def catalogs(draw: random.Random, folder: Path) -> Arguments:
-    """Find imports by a broken catalog."""
+    """Plan or validate with imports that a broken catalog resolves."""
     catalog = folder / "catalog-v001.xml"
     if not catalog.is_file():
         scene = "urn:fuzz:scene"
@@ -712,7 +712,7 @@ def urdf(draw: random.Random, folder: Path) -> Arguments:
 
 
 def _without_zeros(call: Arguments) -> Arguments:
-    """No process can be given a zero byte."""
+    """Replace zero bytes, which the arguments of a process can't contain."""
     return [word.replace("\0", "0") for word in call]
 
 
@@ -735,6 +735,6 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
         (urdf, 5),
     )
 }
-"""The kinds of broken inputs, and the number of cases of each among some thousand: slow ones get fewer."""
+"""The doors with their functions, and their relative numbers of cases; slow doors have fewer cases."""
 TARGETS = {"memory.ttl", "broken.ttl", "out", "out.ttl", "out.svg"}
-"""Time limit and files of a case."""
+"""Names of the files that a command may change."""

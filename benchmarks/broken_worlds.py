@@ -1,4 +1,4 @@
-"""More doors as in `benchmarks.broken_inputs`: definitions, amounts, updates, numbers in PDDL, edited rules, meshes."""
+"""Further doors (`benchmarks.broken_inputs`): definitions, amounts, SPARQL updates, numbers in PDDL, rules and meshes."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ STL = "\n".join(
 
 
 def sources(folder: Path) -> None:
-    """Write the valid inputs of the cases: small worlds with definitions or amounts, in both forms, and a memory of each."""
+    """Write the valid inputs: small worlds with definitions or amounts, with and without SPARQL updates, and their memories."""
     import confab
     from confab.memory import Memory
     from confab.reasoner.updates.converting import convert
@@ -142,7 +142,7 @@ def sources(folder: Path) -> None:
 
 
 def defining(draw: random.Random, triples: Triples) -> None:
-    """State of two nodes that one defines the other, or that a property is transitive, symmetric or an inverse."""
+    """Add an axiom between two nodes, a type of property, or a property chain."""
     if triples:
         one, other = draw.choice(triples), draw.choice(triples)
         if draw.random() < 0.2:
@@ -161,7 +161,7 @@ def defining(draw: random.Random, triples: Triples) -> None:
 
 
 def numeric(draw: random.Random, triples: Triples) -> None:
-    """Replace a number, a sign or a change in a calculation by another one, or add a part to the calculation."""
+    """Replace a number, sign or operation of a calculation, or add a part to a calculation."""
     kinds = ("decimal", "integer", "double", "string")
     number = ox.Literal(draw.choice(NUMBERS), datatype=ox.NamedNode(XSD + draw.choice(kinds)))
     places = [i for i, t in enumerate(triples) if re.fullmatch(r"[-+.\dEe]+", getattr(t.object, "value", ""))]
@@ -203,7 +203,7 @@ def defined(draw: random.Random, folder: Path) -> Arguments:
 
 
 def amounts(draw: random.Random, folder: Path) -> Arguments:
-    """Plan where amounts, their bounds and calculations are broken."""
+    """Plan with broken amounts, bounds and calculations."""
     more = (numeric, numeric, *draw.choices(MUTATIONS, k=2))
     mutated_triples(draw, folder / draw.choice(("domain.ttl", "scene.ttl")), more)
     return _planned(draw, folder)
@@ -237,7 +237,7 @@ def updates(draw: random.Random, folder: Path) -> Arguments:
 
 
 def numbers(draw: random.Random, folder: Path) -> Arguments:
-    """Plan in broken PDDL with derived predicates and numbers, or import it, if it can't be."""
+    """Plan with or import broken PDDL that has derived predicates and numbers."""
     from confab.pddl_commands import import_pddl
 
     texts = list(PDDL)
@@ -248,14 +248,14 @@ def numbers(draw: random.Random, folder: Path) -> Arguments:
         file.write_text(text, encoding="utf-8", errors="replace")
     try:
         import_pddl(files[0], files[1], folder / "imported.ttl")
-    except Exception:  # the command must report every error
+    except Exception:  # the command must report the error
         return ["import", *map(str, files), "-o", str(folder / "out.ttl")]
     mode: tuple[Arguments, ...] = (["--optimal"], ["--mode", "paper"], [], [])
     return ["plan", str(folder / "imported.ttl"), "--time-limit", "5", "--json", *draw.choice(mode)]
 
 
 def _regrouped(draw: random.Random, text: str) -> str:
-    """Break formulas and calculations: one dropped, negated, nested, or another of its kind in its place."""
+    """Delete, negate, nest or replace formulas and calculations of a PDDL text."""
     for _ in range(draw.choice((1, 1, 2, 3))):
         kinds: dict[bool, list[tuple[int, int]]] = {True: [], False: []}
         opened: list[int] = []
@@ -291,7 +291,7 @@ def _regrouped(draw: random.Random, text: str) -> str:
 
 
 def edited(draw: random.Random, folder: Path) -> Arguments:
-    """Plan with edited rules: other conditions, roles, steps, counts."""
+    """Plan with a memory whose rules have random changes of conditions, roles, steps and counts."""
     file, scene = folder / "memory.ttl", str(folder / "scene.ttl")
     text = file.read_text()
     for _ in range(draw.choice((1, 1, 2, 4))):
@@ -322,7 +322,7 @@ def meshes(draw: random.Random, folder: Path) -> Arguments:
     """Compute the reach of a robot whose hand has a broken mesh."""
     from benchmarks.broken_inputs import urdf
 
-    call = urdf(random.Random(0), folder)  # writes the files; then the robot's files are restored
+    call = urdf(random.Random(0), folder)  # writes the files; the URDF is replaced below
     robot, bodies = ROOT / "ontology" / "robots" / "two-arms.urdf", folder / "bodies"
     kind, text = draw.choice((("obj", OBJ), ("stl", STL)))
     boxes = list(re.finditer(r"<box size=\"[^\"]*\"/>", robot.read_text()))
@@ -345,4 +345,4 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
     door.__name__: (door, share)
     for door, share in ((defined, 40), (amounts, 40), (updates, 40), (numbers, 60), (edited, 30), (meshes, 3))
 }
-"""The kinds of broken inputs, and the number of cases of each besides those of `benchmarks.broken_inputs`."""
+"""The doors with their functions, and their relative numbers of cases, in addition to `benchmarks.broken_inputs`."""

@@ -1,8 +1,8 @@
-"""Certificates of "unsolvable": their share and kind, the time of checking compared with planning, and corrupted ones.
+"""Certificates of unsolvability: their share and kind, the time to check them, and the rejection of corrupted certificates.
 
     python -m benchmarks certificates       100 worlds of each kind, and 50 corrupted certificates (docs/figures/promises.md)
 
-CERTIFICATES_FROM and CERTIFICATES_COUNT choose other worlds.
+CERTIFICATES_FROM and CERTIFICATES_COUNT select other worlds.
 """
 
 from __future__ import annotations
@@ -40,33 +40,33 @@ from worlds.scenes import scene
 
 FIRST, COUNT = 4_000_000, 100
 CORRUPTED = 50
-"""Number of certificates that prove nothing, drawn from all worlds."""
+"""Number of certificates that are corrupted, drawn from all worlds."""
 MOST_STATES = 600
-"""Maximum number of states of a world in which certificates without a claim are judged."""
+"""Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
 LIMITS = Limits(expansions=20_000, seconds=20.0)
-"""Of problems that are values."""
+"""Limits of planning for problems that are values."""
 SAMPLE = 20
-"""Number of states that are changed for that."""
+"""Number of reachable states that are changed to refute a certificate."""
 SECONDS = 20.0
-"""Time limit of a plan in a scene."""
+"""Time limit in seconds of planning for a scene."""
 DOORS = ("defined", "amounts", "updates")
-"""The doors of `benchmarks.fuzz` that break scenes of derived situations, of amounts and of SPARQL updates."""
+"""The doors of `benchmarks.fuzz` that break scenes with derived situations, amounts and SPARQL updates."""
 Answer = tuple[Problem, Outcome, float]
 """A problem, its outcome, and the CPU seconds of planning."""
 T = TypeVar("T")
 NOTHING = "nothing"
-"""A name that no world has."""
+"""A name that occurs in no world."""
 VALUES: dict[str, Callable[[int], Problem]] = {
     "levels": hierarchy,
     "tables": random_table,
     "jugs": lambda seed: jugs(Random(seed))[0],
     "rounds": lambda seed: rounds(Random(seed))[0],
 }
-"""Problems as values."""
+"""Functions from a seed to a problem, by kind."""
 
 
 class Scenes:
-    """Scenes in files of a folder: random worlds, generated tables without a plan, and broken scenes of the fuzzer."""
+    """Scenes in files of a folder: random worlds, generated unsolvable tables, and broken scenes of the fuzzer."""
 
     def __init__(self, folder: Path) -> None:
         self.file, self.given = folder / "world.ttl", folder / "given"
@@ -78,13 +78,13 @@ class Scenes:
         return self.file
 
     def unsolvable(self, seed: int) -> Path:
-        """Write a table on which no hand reaches the goal of one cup."""
+        """Write a table on which no hand reaches the goal place of one cup."""
         self.file.unlink(missing_ok=True)
         confab.generate("unsolvable", self.file, objects=2 + 2 * (seed % 5), seed=seed)
         return self.file
 
     def broken(self, seed: int) -> Path:
-        """Write a scene in which the fuzzer has broken definitions, amounts or updates, and that can still be read."""
+        """Write a readable scene with definitions, amounts or updates that the fuzzer has broken."""
         draw, case = Random(f"certificates {seed}"), self.given.parent / "case"
         while True:
             door = draw.choice(DOORS)
@@ -99,7 +99,7 @@ class Scenes:
 
 
 def answers(folder: Path, seeds: Iterable[int]) -> Iterator[tuple[str, Iterator[Answer]]]:
-    """Yield the answers in each kind of worlds."""
+    """Yield the answers for each kind of world."""
     scenes = Scenes(folder)
     for name, make in VALUES.items():
         yield name, map(of_value, map(make, seeds))
@@ -108,13 +108,13 @@ def answers(folder: Path, seeds: Iterable[int]) -> Iterator[tuple[str, Iterator[
 
 
 def of_value(problem: Problem) -> Answer:
-    """Return the answer to a problem."""
+    """Plan for a problem, and return the answer."""
     outcome, seconds = timed(lambda: solve(Request(problem, limits=LIMITS)))
     return problem, outcome, seconds
 
 
 def of_scenes(write: Callable[[int], Path], seeds: Iterable[int]) -> Iterator[Answer]:
-    """Yield the answer to the task of each scene that isn't refused."""
+    """Plan for each scene, and yield the answers; scenes that confab rejects are left out."""
     for seed in seeds:
         try:
             loaded = confab.load(write(seed))
@@ -131,7 +131,7 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
 
 
 def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterator[tuple[str, Certificate]]:
-    """Yield certificates that prove nothing: with a false claim, of another goal, or without a claim that is needed."""
+    """Yield invalid certificates: with a false claim, for another goal, or without a necessary claim."""
     goal = certificate.unmet[0]
     other = Fact(Symbol(goal.symbol.situation, (NOTHING,)), goal.value)
     yield "without a goal", replace(certificate, unmet=())
@@ -161,10 +161,10 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
 
 
 def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, values: Iterable[str]) -> bool:
-    """Return whether a state that a certificate allows leads to one that it excludes.
+    """Return whether a state that a certificate allows leads to a state that the certificate excludes.
 
-    Such a state is a reachable one with another value of the symbol about which a claim was dropped; the other claims hold in it.
-    The plain interpreter, which shares no code with the checker, finds the goal or the opposite of a claim.
+    The first state is a reachable state with another value of the symbol whose claim was removed. All other claims hold in this
+    state. The plain interpreter, which shares no code with the checker, searches for the goal or the opposite of a claim.
     """
     at, level = meant.slots.get(symbol), meant.problem.domain.levels[-1]
     if at is None or at >= meant.stated or meant.kinds[symbol.situation].quantity is not None:
@@ -190,7 +190,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
 
 
 def main() -> int:
-    """Print the share of answers with a certificate, kinds, times, and the result of corrupted ones; return 1 on a fault."""
+    """Print shares, kinds and times of certificates, and the results for corrupted certificates; return 1 on a fault."""
     first, count = int(os.environ.get("CERTIFICATES_FROM", FIRST)), int(os.environ.get("CERTIFICATES_COUNT", COUNT))
     proved: list[tuple[Problem, Certificate]] = []
     wrong = 0

@@ -1,9 +1,9 @@
-"""Plans of about 150 problems, saved as JSON or held against an earlier run: statuses, levels kept, lengths, CPU seconds.
+"""Plans of about 150 problems, saved as JSON or compared with an earlier run: statuses, lengths and CPU seconds.
 
 python -m benchmarks compared
-COMPARED_TO=before.json …       save the results there
-COMPARED_WITH=before.json …     compare with the results that are there
-COMPARED_ONLY=families,scenes   some of: families, scenes, hierarchies, tables
+COMPARED_TO=before.json …       save the results in the file
+COMPARED_WITH=before.json …     compare with the results in the file
+COMPARED_ONLY=families,scenes   kinds: families, scenes, hierarchies, tables (all by default)
 COMPARED_MORE=a.ttl,b.ttl       further scenes
 """
 
@@ -31,7 +31,7 @@ from worlds.hierarchies import hierarchy
 LIMIT = Limits(seconds=float(os.environ.get("COMPARED_SECONDS", "10")))
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 LEAST = 0.05
-"""Minimum CPU seconds of a call when times are compared: shorter times are noise."""
+"""Minimum CPU seconds of a call for the comparison of times, since shorter times are noise."""
 Made = tuple[str, Callable[[], Problem]]
 
 
@@ -59,7 +59,7 @@ def scene(source: str) -> Problem:
 
 
 def measured(problem: Problem) -> list[Any]:
-    """Return the status, the steps of each level, the CPU seconds of the first plan and of the whole call."""
+    """Return the status, the number of steps of each level, and CPU seconds of the first plan and of the whole call."""
     begin = process_time()
     first = plan(problem, limits=LIMIT, improve=0)
     middle = process_time()
@@ -73,7 +73,7 @@ def measured(problem: Problem) -> list[Any]:
 
 
 def main() -> None:
-    """Print what differs, and the means."""
+    """Print the problems whose results differ, and the mean ratios."""
     found: dict[str, list[Any]] = {}
     before = json.loads(Path(path).read_text()) if (path := os.environ.get("COMPARED_WITH")) else {}
     print("| problem | before | now | CPU s before | now |\n|---|---|---|---|---|")
@@ -97,5 +97,5 @@ def main() -> None:
 
 
 def told(row: list[Any]) -> str:
-    """Return a status and the steps of the levels."""
+    """Return a text of the status and the number of steps of each level."""
     return f"{row[0]} {' / '.join(map(str, row[1]))}"

@@ -1,8 +1,8 @@
-"""The effect of each tuned constant of the planner: halved and doubled, changes in lengths, expansions and time.
+"""The effects of halving and doubling each constant of the planner on plan lengths, expansions and time.
 
-Each run is a separate process on a copy of the planner with one changed number, so that no module is patched. It plans
-what its room is there for (`INSTRUMENTS`). CONFAB_ROOMS names the rooms in `planner/` that are tried, all if left out; with
-CONFAB_ROWS=FILE results are stored there, and stored ones aren't measured again.
+Each run is a separate process on a copy of the planner with one changed number. The problems of a run depend on the folder of the
+constant (`INSTRUMENTS`). CONFAB_ROOMS names the folders in `planner/` that are measured, all by default. With CONFAB_ROWS=FILE,
+results are stored in the file, and stored results aren't measured again.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ ROOT = Path(__file__).resolve().parents[1]
 SIZES = (4, 10, 16, 40)
 FIRST = 4_000_000
 LENGTH, EFFORT, TIME = 0.002, 0.05, 0.4
-"""Minimum change that counts, as a share: of primitives, of expansions, and (noisy) of CPU seconds."""
+"""Minimum relative changes that count: of primitives, of expansions, and of CPU seconds, which are noisy."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant in a module: its name, its position under that name, its line, and its description."""
+    """A constant in a module: name, index among the numbers of the name, syntax node and description."""
 
     path: Path
     name: str
@@ -53,18 +53,18 @@ class Constant:
     said: str
 
     def __str__(self) -> str:
-        """Return its name, and which of the numbers it is if there are several."""
+        """Return the name, with the index of the number if the name has several numbers."""
         return self.name + (f" [{self.number}]" if self.number else "")
 
     def times(self, factor: float) -> float:
-        """Return the number halved or doubled; a whole number stays one, and is at least 1."""
+        """Return the number multiplied by a factor; a whole number is rounded, and is at least 1."""
         old = self.node.value
         assert isinstance(old, int | float)
         return max(1, round(old * factor)) if isinstance(old, int) and old else old * factor
 
 
 def constants(room: Path) -> Iterator[Constant]:
-    """Yield the numbers that the modules of a room give names in capitals."""
+    """Yield the numeric constants, with names in capitals, of the modules of a folder."""
     for path in sorted(room.glob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         for node, following in zip(body, [*body[1:], ast.Pass()], strict=True):
@@ -86,14 +86,14 @@ def constants(room: Path) -> Iterator[Constant]:
 
 
 def comment(node: ast.stmt) -> str:
-    """Return the text that stands behind an assignment, in one line."""
+    """Return the docstring of an assignment in one line."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
         return " ".join(node.value.value.split())
     return ""
 
 
 def changed(text: str, constant: Constant, factor: float) -> str:
-    """Return a module's text with another number."""
+    """Return a module's text with the constant multiplied by a factor."""
     lines, node = text.splitlines(keepends=True), constant.node
     line = lines[node.lineno - 1].encode()
     new = str(constant.times(factor)).encode()
@@ -104,17 +104,17 @@ def changed(text: str, constant: Constant, factor: float) -> str:
 # ---------------------------------------------------------------------------------------------------------- what is planned
 
 Row: TypeAlias = "tuple[str, int, int]"
-"""How a call ended, its primitives and its expansions."""
+"""Status of a call, and numbers of primitives and expansions."""
 
 
 def row(outcome: Outcome) -> Row:
-    """Return what counts of an outcome."""
+    """Return the status, primitives and expansions of an outcome."""
     primitives = len(outcome.plan.primitives) if outcome.plan else 0
     return outcome.status.value, primitives, sum(counts.expanded for counts in outcome.search.values())
 
 
 def planned() -> Iterator[Row]:
-    """Plan families, tables and worlds of levels in the default mode."""
+    """Plan for families, tables and hierarchical worlds in the default mode."""
     problems = [family(name, n) for name in FAMILIES for n in SIZES if name != "packed" or n < 16]
     problems += [random_table(seed) for seed in range(FIRST, FIRST + 20)]
     problems += [hierarchy(seed) for seed in range(FIRST, FIRST + 200)]
@@ -123,7 +123,7 @@ def planned() -> Iterator[Row]:
 
 
 def flat() -> Iterator[Row]:
-    """Plan the lowest level of some of them alone."""
+    """Plan for the lowest level alone of families and hierarchical worlds."""
     problems = [family(name, 4) for name in FAMILIES if name != "packed"]
     problems += [hierarchy(seed) for seed in range(FIRST, FIRST + 40)]
     for problem in problems:
@@ -131,7 +131,7 @@ def flat() -> Iterator[Row]:
 
 
 def led() -> Iterator[Row]:
-    """Plan tables with a memory of smaller ones."""
+    """Plan for tables with a memory of smaller tables."""
     memory = taught(("served", "swap", "handover"))
     for name in ("served", "swap", "handover", "full", "blocked"):
         for n in (8, 16):
@@ -140,7 +140,7 @@ def led() -> Iterator[Row]:
 
 
 def repaired() -> Iterator[Row]:
-    """Repair a plan after interventions of all kinds; the result is the repair's cost, and whether it is a new plan."""
+    """Repair a plan after interventions of all kinds, and yield the cost of each repair."""
     trial = Trial.of(served(10))
     for seed in range(80):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]
@@ -154,7 +154,7 @@ def repaired() -> Iterator[Row]:
 
 
 def on_paper() -> Iterator[Row]:
-    """Plan small worlds in the paper's mode."""
+    """Plan for small worlds in the paper's mode."""
     for seed in range(FIRST, FIRST + 40):
         yield row(
             paper_plan(
@@ -173,11 +173,11 @@ INSTRUMENTS: Mapping[str, tuple[Callable[[], Iterator[Row]], ...]] = {
     "paper": (on_paper,),
     "": (planned,),
 }
-"""The problems that measure the constants of a room."""
+"""The functions that measure the constants of a folder of `planner/`."""
 
 
 def measured(room: str) -> dict[str, float]:
-    """Return the results of planning all problems of a room."""
+    """Return the summed results of all measurements of a folder."""
     found: dict[str, float] = {"solved": 0, "unsolvable": 0, "gave-up": 0, "primitives": 0, "expansions": 0}
     begin = process_time()
     for instrument in INSTRUMENTS[room]:
@@ -189,7 +189,7 @@ def measured(room: str) -> dict[str, float]:
 
 
 def with_change(room: str, constant: Constant | None, factor: float) -> dict[str, float]:
-    """Return the results with a constant multiplied by a factor; None if that fails."""
+    """Return the results with a constant multiplied by a factor; an empty result if the run fails."""
     with TemporaryDirectory() as folder:
         for path in ROOT.iterdir():
             if path.is_dir() and not path.name.startswith(".") and path.name != "planner":
@@ -211,7 +211,7 @@ def with_change(room: str, constant: Constant | None, factor: float) -> dict[str
 
 
 def verdict(base: Mapping[str, float], found: Mapping[str, float]) -> str:
-    """Return the effect of a change in a few words; empty if it can't be measured."""
+    """Return a short description of the effect of a change; empty if there is no measurable effect."""
     if not found:
         return "fails"
     said = []
@@ -227,7 +227,7 @@ def verdict(base: Mapping[str, float], found: Mapping[str, float]) -> str:
 
 
 def main() -> None:
-    """Print a table for each room: each constant with its description and the effects of halving and doubling it."""
+    """Print a table for each folder with the constants, their descriptions, and the effects of halving and doubling."""
     file = Path(os.environ["CONFAB_ROWS"]) if "CONFAB_ROWS" in os.environ else None
     known: dict[str, dict[str, float]] = json.loads(file.read_text()) if file is not None and file.exists() else {}
 

@@ -1,7 +1,7 @@
-"""Results of the planners that are the same on every machine: lengths, expansions, fallbacks; with CPU seconds.
+"""Plan lengths, expansions and fallbacks, which are equal on every machine, and CPU seconds.
 
 python -m benchmarks counts
-CONFAB_COUNTS=worlds …       some of: families, worlds
+CONFAB_COUNTS=worlds …       tables: families, worlds (both by default)
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from confab.reasoner.symbols import Problem
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SIZES, SEED, SECONDS = (4, 10, 20, 50), 100, 60.0
-REPEATS, LONG = 3, 1.0  # what takes longer is measured once
+REPEATS, LONG = 3, 1.0  # a longer call is measured once
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def families() -> None:
-    """Plan tables of all families, each once for the counts and some times for the seconds."""
+    """Plan for tables of all families, several times for the seconds."""
     print("| family | n | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
@@ -43,7 +43,7 @@ def families() -> None:
 
 
 def worlds() -> None:
-    """Plan the shipped worlds of `docs/worlds.md`."""
+    """Plan for the shipped worlds of `docs/worlds.md`."""
     print("| scene | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
     print("|---|---|---|---|---|---|")
     for small in sorted(name for name in scenes() if name.endswith("-small")):
@@ -52,7 +52,7 @@ def worlds() -> None:
 
 
 def measured(source: str) -> str:
-    """Return the cells of one scene, which is loaded afresh each time."""
+    """Return the table cells of one scene, which is loaded again before each call."""
     seconds: list[float] = []
     while len(seconds) < REPEATS and sum(seconds) < LONG:
         scene = confab.load(source)
@@ -63,7 +63,7 @@ def measured(source: str) -> str:
 
 
 def row(problem: Problem, outcome: Outcome) -> str:
-    """Return status, steps and expansions of each level, and fallbacks."""
+    """Return the table cells of an outcome: status, steps and expansions of each level, and fallbacks."""
     steps = outcome.plan.length if outcome.plan else {}
     lengths = " / ".join(str(steps.get(level, 0)) for level in problem.domain.levels) if outcome.plan else "–"
     expanded = " / ".join(str(count.expanded) for _, count in sorted(outcome.search.items())) or "–"

@@ -1,8 +1,8 @@
-"""Twenty interventions in PyBullet's world: objects pushed and knocked over, boxes put in the way, things taken, links shut.
+"""Twenty interventions in PyBullet's world, such as pushed objects, boxes in the way and shut doors.
 
-``python -m benchmarks.disturbed FROM TO [NUMBER …]`` runs all interventions, or the numbered ones, with seeds FROM to TO - 1,
-bodies perturbed. An episode *recovers* if it reaches its goals; it *gives up rightly* if each goal that is left is one that the
-intervention made impossible, and a reason names the cause. Anything else is wrong.
+``python -m benchmarks.disturbed FROM TO [NUMBER …]`` runs all interventions, or the numbered interventions, with perturbed bodies
+and seeds FROM to TO - 1. An episode *recovers* if it reaches its goals. An episode *gives up rightly* if the intervention made
+every unreached goal impossible, and a reason names the cause. Every other result is wrong.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("spice-drawer", ("at=4 door OPENED false",), ""),
     ("centrifuge", ("at=8 push tube2 2 6",), ""),
 )
-"""Scene, interventions, and words of the reason that is right; none where the goals can be reached."""
+"""Scene, interventions, and words of the right reason, which are empty if the goals can be reached."""
 
 
 def outcome(episode: Episode, words: str) -> str:
-    """Return how an episode ended: recovered, gave up rightly, or wrong, with the fault."""
+    """Return the result of an episode: recovered, gave up rightly, or wrong, with the fault."""
     open_ = [str(symbol) for symbol, value in episode.goal.items() if episode.observed.get(symbol) != value]
     reasons = "; ".join(reason.text for reason in episode.reasons)
     if episode.missed:
@@ -55,7 +55,7 @@ def outcome(episode: Episode, words: str) -> str:
 
 
 def main() -> None:
-    """Print a line per episode, and how they ended."""
+    """Print a line for each episode, and the number of episodes by result."""
     begin, end, *numbers = (int(word) for word in sys.argv[1:] or ("0", "1"))
     ends = Counter[str]()
     for number in numbers or range(1, len(CASES) + 1):

@@ -1,8 +1,8 @@
-"""Definitions in random states: the derived facts of search, checker and plain Python, compared with those that HermiT entails.
+"""Comparison of the facts that search, checker and plain Python derive in random states with HermiT's entailments.
 
 python -m benchmarks entailed
-CONFAB_STATES=10000 …        how many states; 10,000 take an hour of one core
-CONFAB_SEED=0 …              the first one's seed
+CONFAB_STATES=10000 …        number of states; 10,000 states take an hour of one core
+CONFAB_SEED=0 …              seed of the first state
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ BATCH = 500
 
 
 def main() -> None:
-    """Print how many states agree, and what doesn't."""
+    """Print the number of states in which each definition is true, and the differences of each evaluator."""
     count, first = int(os.environ.get("CONFAB_STATES", "10000")), int(os.environ.get("CONFAB_SEED", "0"))
     problem, true, wrong, done = first_problem(), Counter[str](), dict[str, list[str]](), 0
     began, java = process_time(), times().children_user

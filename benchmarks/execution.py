@@ -1,6 +1,6 @@
-"""The closed loop: figure 8, random interventions, repair against replanning, learning from failure, both hands at once.
+"""Execution in a closed loop: figure 8, random interventions, repair, learning from failure, and both hands at once.
 
-``python -m benchmarks execution``; parts by name with ``python -m benchmarks.execution figure8 repair …``.
+``python -m benchmarks execution`` runs all parts, and ``python -m benchmarks.execution figure8 repair …`` runs the named parts.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ SYMBOLIC_ROBOTS, ROBOTS, EPISODES = 40, 3, 8
 
 
 def served(objects: int) -> Problem:
-    """Return a generated scene in which every cup shall be moved and filled, and every bottle be back."""
+    """Return the problem of a generated scene: each cup is to be moved and filled, and each bottle returned to its place."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"served-{objects}.ttl"
         write_scene(path, "served", objects)
@@ -53,10 +53,10 @@ def served(objects: int) -> Problem:
 
 
 def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
-    """Return a plausible intervention for a situation.
+    """Return a plausible intervention in a state.
 
-    Places and contents are recognised from the domain: values that exist from a later level on (in the hand) mark the situation
-    type of places; the other situation type of the first level is that of contents.
+    Of the two situation types with values on the first level, the type of places has a value of a lower level (in the hand). The
+    other type is the type of contents.
     """
     first = [s for s in problem.domain.situations.values() if s.level == 1 and not s.boolean]
     where = next(s for s in first if problem.value_levels.keys() & set(problem.classes[s.range]))
@@ -95,21 +95,21 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
 
 
 def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
-    """Return the value "nothing" and the other values: the former belongs to no class below that of the values."""
+    """Return the value for empty, which belongs to no subclass of the type's range, and the other values."""
     below = {v for k, m in problem.classes.items() if content.range in problem.parents.get(k, ()) for v in m}
     values = problem.classes[content.range]
     return next(v for v in values if v not in below), [v for v in values if v in below]
 
 
 def timed(intervention: Intervention, trial: Trial, position: int, inside: bool, second: float) -> Intervention:
-    """Return the time of an intervention: a second inside a primitive, or after a step; goals change between primitives."""
+    """Return an intervention with a time, a second inside a primitive or after a step; goals change after steps."""
     if inside and intervention.of_world:
         return replace(intervention, at=second)
     return replace(intervention, after=trial.plan.primitives[position].path)
 
 
 def figure8() -> None:
-    """Print the course of figure 8 in both worlds, by ID."""
+    """Print the executed steps of the paper's figure 8 in both worlds, by ID."""
     scene = confab.load("beverage-serving")
     texts = ["after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8"]
     print(
@@ -127,7 +127,7 @@ def figure8() -> None:
 
 
 def interventions() -> None:
-    """Print how episodes with one random intervention end, in the symbolic world."""
+    """Print the results of episodes with one random intervention in the symbolic world."""
     trial, ends = Trial.of(served(20)), Counter[tuple[str, str]]()
     begin, longest, wrong = perf_counter(), 0, 0
     for seed in range(SYMBOLIC):
@@ -149,7 +149,7 @@ def interventions() -> None:
 
 
 def physical() -> None:
-    """Print the results of episodes with one random intervention in PyBullet; a line per episode goes to a file."""
+    """Print the results of episodes with one random intervention in PyBullet, and write a line per episode to a file."""
     scene = confab.load("beverage-serving")
     trial, ends = Trial.of(scene.problem), Counter[tuple[str, str]]()
     failures, wrong, lines = Counter[str](), 0, list[str]()
@@ -180,7 +180,7 @@ def physical() -> None:
 
 
 def physical_intervention(trial: Trial, seed: int) -> Intervention:
-    """Return what happens in an episode in PyBullet, half of it at a second that may be inside a primitive."""
+    """Return the intervention of an episode in PyBullet, at a second for half of the episodes."""
     random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
     position = random.randrange(len(trial.plan.primitives))
     intervention = random_intervention(trial.problem, trial.states[position], random, kind)
@@ -190,7 +190,7 @@ def physical_intervention(trial: Trial, seed: int) -> Intervention:
 
 
 def repair() -> None:
-    """Print cost, distance and latency of repair against replanning."""
+    """Print cost, distance and latency of repair compared with replanning."""
     print(
         "| n | interventions | cost, sum | over 1.1 × | worst | distance | ratio, median "
         "| CPU ms, median | CPU ms, p95 | replanned |"
@@ -242,7 +242,7 @@ def _repair_row(objects: int, count: int) -> None:
 
 
 def after_intervention(before: Problem, intervention: Intervention) -> Problem:
-    """Return the situation and the goal after an intervention; goals about removed objects are dropped."""
+    """Return the problem after an intervention; goals about removed objects are dropped."""
     goal = dict(before.goal)
     if intervention.change is InterventionKind.GOAL:
         goal.update((fact.symbol, fact.value) for fact in intervention.facts)
@@ -261,7 +261,7 @@ def after_intervention(before: Problem, intervention: Intervention) -> Problem:
 
 
 def learning() -> None:
-    """Print success over episodes with a planted obstacle, with and without learning from failure."""
+    """Print the success rate by episode with a planted obstacle, with and without learning from failure."""
     scene = confab.load("beverage-serving")
     retry_policy = RetryPolicy(failures=2)
     curves: dict[str, list[float]] = {}
@@ -294,7 +294,7 @@ def learning() -> None:
 
 
 def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, retry_policy: RetryPolicy) -> list[Episode]:
-    """Return perturbed episodes of a robot with a post that it doesn't perceive where its left arm reaches for bottle2."""
+    """Return perturbed episodes in which an unperceived post stands where the left arm reaches for bottle2."""
     caution, found = Caution(), list[Episode]()
     for number in range(episodes):
         run = execute(
@@ -313,7 +313,7 @@ def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, retry_p
 
 
 def hidden_post(world: Any, at: tuple[float, float, float] = (0.35, -0.05, 0.7), height: float = 0.06) -> None:
-    """Put up a post 2 cm thick that the robot doesn't perceive; a hand that comes from the right gets past it."""
+    """Put up a post 2 cm thick that the robot doesn't perceive; a hand from the right can pass the post."""
     import pybullet
 
     half = [0.01, 0.01, height / 2]
@@ -327,7 +327,7 @@ def hidden_post(world: Any, at: tuple[float, float, float] = (0.35, -0.05, 0.7),
 
 
 def _save_curves(curves: Mapping[str, Sequence[float]], path: Path) -> Path:
-    """Draw success over episodes, and return where."""
+    """Draw the success rates by episode, and return the path of the picture."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -346,7 +346,7 @@ def _save_curves(curves: Mapping[str, Sequence[float]], path: Path) -> Path:
 
 
 def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, retry_policy: RetryPolicy) -> list[bool]:
-    """Return which episodes of a robot succeed if its first way to the plan's last object is mostly blocked."""
+    """Return for each episode of a robot whether it succeeds; the first grasp of the plan's last object is mostly blocked."""
     random, caution, found = Random(seed), Caution(), list[bool]()
     reach = next(
         s
@@ -382,13 +382,13 @@ def _where(problem: Problem) -> str:
 
 
 def _is_source(problem: Problem, step: Step) -> bool:
-    """Whether a primitive reaches for something that another hand could take as well."""
+    """Return whether a primitive reaches for an object that another hand also reaches."""
     rows = next(iter(problem.relations.values()))
     return len(step.arguments) == 2 and sum(row[1] == step.bindings.get("place") for row in rows) > 1
 
 
 def both_hands() -> None:
-    """Print makespan with both hands against serial, and draw the Gantt strip."""
+    """Print the makespan with both hands and of serial execution, and draw a Gantt chart."""
     from confab.sim.together import perform_together
     from confab.sim.verify import expectations, verify
     from confab.sim.world import PhysicsWorld
@@ -414,7 +414,7 @@ def both_hands() -> None:
 
 
 def _right(episode: Episode) -> bool:
-    """Whether the claims of an episode are true: the goals hold in the end, and no goal is called impossible without reason."""
+    """Return whether an episode's claims are true: goals hold at the end, and reasons are given only for unreached goals."""
     holds = all(episode.observed.get(s, FALSE) == v for s, v in episode.goal.items())
     return holds and (episode.status is End.REACHED) == (not episode.reasons)
 
@@ -437,7 +437,7 @@ PARTS: dict[str, Callable[[], None]] = {
 
 
 def main() -> None:
-    """Print all tables, or those named on the command line of this module."""
+    """Print all parts, or the parts named on the command line of this module."""
     for name in [a for a in sys.argv[1:] if a in PARTS] or PARTS:
         print(f"\n### {name}\n", flush=True)
         PARTS[name]()

@@ -1,8 +1,8 @@
-"""Faults that are planted in the paper's plan, and in plans with joints: where these stop, with which code, objects and number.
+"""Faults planted in the paper's plan and in plans with joints: the step at which the plan stops, and the failure.
 
-    python -m benchmarks.faults          print the table, and write it to docs/physics-faults.md
+    python -m benchmarks.faults          print the table
 
-Faults that stop at another step or with another code than expected are marked.
+Faults that stop the plan at another step or with another code than expected are marked.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ MEANS = {
     "stuck": "joint",
     "too slow": "seconds",
 }
-"""The measured number that characterises a failure code, if it is always the same."""
+"""The measured number that characterises a failure code, for codes with such a number."""
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A fault, the number of the primitive at which it must stop the plan, the code, and objects that must be named."""
+    """A fault, the number of the primitive at which it must stop the plan, and the code and objects that must be named."""
 
     kind: str
     fault: PlantedFault
@@ -151,7 +151,7 @@ def row(planted: Planted, rollout: Rollout) -> str:
 
 @cache
 def nominal(name: str) -> Trial:
-    """Return the plan of a scene without a fault: the paper's, or that of a scene with joints."""
+    """Return the trial of a scene without a fault: the paper's plan, or the plan of a scene with joints."""
     if name == "beverage-serving":
         return case(name)
     scene = confab.load(name)
@@ -160,7 +160,7 @@ def nominal(name: str) -> Trial:
 
 
 def rows() -> Iterator[tuple[bool, str]]:
-    """Yield whether each fault was found as expected, and its line."""
+    """Yield for each fault whether it was found as expected, and its line of the table."""
     for planted in PLANTED:
         rollout = planted.run(nominal(planted.scene))
         yield planted.found(rollout), row(planted, rollout)

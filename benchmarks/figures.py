@@ -1,16 +1,17 @@
-"""Figures in the documentation: each block names the command that printed it, the commit, and the code that it measures.
+"""Blocks of figures in the documentation; each names the command that printed it, the commit, and the measured code.
 
     <!-- figures NAME: COMMAND; commit ABC1234; 2026-01-31; measures PATH PATH; table 2; quick -->
     …
     <!-- end -->
 
-    python -m benchmarks.figures            which blocks are older than the code that they measure
-    python -m benchmarks.figures quick      update those marked quick: counts, lengths, ratios (`make figures`)
-    python -m benchmarks.figures all        update all, which takes hours (`make bench`)
-    python -m benchmarks.figures NAME …     update these
+    python -m benchmarks.figures            list the blocks that are older than the code that they measure
+    python -m benchmarks.figures quick      update the blocks marked quick: counts, lengths, ratios (`make figures`)
+    python -m benchmarks.figures all        update all blocks, which takes hours (`make bench`)
+    python -m benchmarks.figures NAME …     update the named blocks
 
-A block holds what its command printed, or the table of that number in it. Several blocks may share a command, which is then run
-once. A block marked `prose` was edited by hand: its new figures go to confab-out/figures/NAME.md, to be edited again.
+A block contains the output of its command, or the table of the stated number in the output. Several blocks may share a command,
+which is then run once. A block marked `prose` was edited by hand. Its new figures are written to confab-out/figures/NAME.md,
+for another edit by hand.
 """
 
 from __future__ import annotations
@@ -29,11 +30,11 @@ ASIDE = ROOT / "confab-out" / "figures"
 BLOCK = re.compile(r"<!-- figures (?P<name>[\w-]+): (?P<header>.*?) -->\n(?P<text>.*?)<!-- end -->", re.DOTALL)
 COMMIT, DATE = re.compile(r"commit ([0-9a-f]{7,40})"), re.compile(r"\d{4}-\d\d-\d\d")
 NOISE = re.compile(r"(?m)^(#+ .*|\(\w+: \d+ s\))$\n?")
-"""The headings of `python -m benchmarks` and the time that it took."""
+"""The headings and times that `python -m benchmarks` prints."""
 
 
 class NoHistoryError(Exception):
-    """Git can't tell what has changed since a commit: there is none, or the clone is too shallow."""
+    """Raised when Git can't list the changes since a commit, for example in a shallow clone."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Block:
 
     @property
     def commit(self) -> str:
-        """The commit that the figures were measured at."""
+        """The commit at which the figures were measured."""
         return next((found[1] for field in self.fields[1:] if (found := COMMIT.fullmatch(field))), "")
 
     @property
@@ -65,7 +66,7 @@ class Block:
         return next((int(field[6:]) for field in self.fields[1:] if field.startswith("table ")), 0)
 
     def faults(self, root: Path) -> Iterator[str]:
-        """Yield the missing fields of the header."""
+        """Yield a message for each missing or wrong field of the header."""
         if not re.search(r"\bpython -m \w", self.fields[0]):
             yield f"{self}: no command, but '{self.fields[0]}'; wanted one with 'python -m …' first"
         if not self.commit:
@@ -90,7 +91,7 @@ class Block:
         return done.stdout.split()
 
     def last(self, root: Path) -> str:
-        """Return the last commit that changed the measured code; unlike the head, it survives a rebase of later commits."""
+        """Return the last commit that changed the measured code, which a rebase of later commits leaves unchanged."""
         command = ["git", "-C", str(root), "log", "-1", "--format=%h", "--", *self.measures]
         return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
 
@@ -99,13 +100,13 @@ class Block:
 
 
 def blocks(root: Path = ROOT) -> list[Block]:
-    """Return all blocks of figures in README and docs/, subfolders included."""
+    """Return all blocks of figures in README.md and docs/, including subfolders."""
     pages = [page for page in (root / "README.md", *sorted((root / "docs").rglob("*.md"))) if page.exists()]
     return [Block(page, m["name"], m["header"]) for page in pages for m in BLOCK.finditer(page.read_text("utf-8"))]
 
 
 def stale(root: Path = ROOT) -> list[str]:
-    """Return a line for each block that is older than the measured code, or whose age is unknown."""
+    """Return a line for each block that is older than the measured code or has an unknown age."""
     found = []
     for block in blocks(root):
         try:
@@ -119,7 +120,7 @@ def stale(root: Path = ROOT) -> list[str]:
 
 
 def printed(command: str) -> str:
-    """Run a command with this Python and return its output; empty if it fails."""
+    """Run a command with this Python, and return its output; an empty text if the command fails."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     env = {**os.environ, "PATH": path}
     done = subprocess.run(command, shell=True, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True, check=False)
@@ -127,7 +128,7 @@ def printed(command: str) -> str:
 
 
 def chosen(text: str, number: int) -> str:
-    """Return a table of a text, counted from 1, or all of it: unchanged if it has tables, otherwise as a code block."""
+    """Return table `number` of a text; for 0 the whole text, as a code block if it has no tables."""
     tables = [found.strip() for found in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE)]
     if number:
         return tables[number - 1] if number <= len(tables) else ""
@@ -135,7 +136,7 @@ def chosen(text: str, number: int) -> str:
 
 
 def write(wanted: Sequence[Block]) -> int:
-    """Measure again and write each result into its page at once; return 1 if a result is missing."""
+    """Measure blocks again, and write each result into its page at once; return 1 if a result is missing."""
     failed = 0
     for command in dict.fromkeys(block.fields[0] for block in wanted):
         text = printed(command)
@@ -159,7 +160,7 @@ def write(wanted: Sequence[Block]) -> int:
 
 
 def main(names: Sequence[str]) -> int:
-    """Write blocks, or list the stale ones."""
+    """Update the named blocks, or list the stale blocks."""
     there = blocks()
     unknown = set(names) - {block.name for block in there} - {"quick", "all"}
     if unknown:

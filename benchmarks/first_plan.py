@@ -1,8 +1,8 @@
-"""From a clone to the first verified plan: the time without installed packages and caches.
+"""The time from a clone to the first verified plan, without installed packages and caches.
 
     python -m benchmarks.first_plan
 
-Cloning, installing from the package index, and `make demo`, which films and reports besides.
+The steps are the clone, the installation from the package index, and `make demo`, which also makes a film and a report.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
-    """Run a command; return its seconds, CPU seconds, and output."""
+    """Run a command; return its duration in seconds, its CPU seconds and its output."""
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")}
     begin, before = perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
@@ -34,7 +34,7 @@ def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
 
 
 def main() -> None:
-    """Print a table: cloning, installing, and the main job, with all that it films and writes."""
+    """Print a table of the steps and their times."""
     print("| step | s | CPU s |\n|---|---|---|")
     total = work = 0.0
     with TemporaryDirectory() as name:

@@ -1,10 +1,11 @@
-"""The cost of derived situations: a scene with three defined ones, compared with the same scene with handwritten effects.
+"""The cost of derived situations: a scene with three definitions, compared with the same scene with handwritten effects.
 
 python -m benchmarks following
-CONFAB_SIZES=66,333 …   how many cups; there are two places to each, and two rooms
+CONFAB_SIZES=66,333 …   numbers of cups; each scene has two places for each cup, and two rooms
 
-Cups stand at places of rooms. Which room a cup is in, whether a place is taken, and whether a cup is servable (clean, in the
-hall) are defined by a chain and two classes, or kept by each behaviour. A tenth of the cups shall be servable. Calls by turns.
+Cups stand at places of rooms. Three facts are derived: the room of a cup, a taken place, and a servable cup (clean and in the
+hall). They are defined by a property chain and two classes, or updated by the effects of each behaviour. A tenth of the cups must
+become servable. Calls of both forms alternate.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Faults found by hand, and the present answers: each case is built from shipped files and run as a user would.
+"""Faults that were found by hand, with the present answers; each case is built from shipped files and run as a command.
 
-python -m benchmarks.found    the table of docs/figures/promises.md; exit 1 if an answer isn't foreseen
+python -m benchmarks.found    print the table of docs/figures/promises.md; exit with 1 on an unexpected answer
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from confab.scene import load
 START = "from confab.cli import main; import sys; main(sys.argv[1:])"
 RDF = 'xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"'
 FEW = 3_000_000
-"""KB of address space that a command gets."""
+"""Maximum address space of a command in kilobytes."""
 Case = tuple[str, str, tuple[int, ...]]
-"""What broke, the command line, and how it may end."""
+"""Description of the input, the command line, and the allowed exit codes."""
 
 
 def bomb(before: str = "") -> str:
-    """Return RDF/XML whose entities double themselves thirty times."""
+    """Return RDF/XML with nested entities, whose expansion doubles thirty times."""
     entities = '<!ENTITY a0 "x">' + "".join(f'<!ENTITY a{i} "&a{i - 1};&a{i - 1};">' for i in range(1, 31))
     return f'<?xml version="1.0"?>{before}<!DOCTYPE r [{entities}]><rdf:RDF {RDF}><x>&a30;</x></rdf:RDF>'
 

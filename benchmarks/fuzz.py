@@ -1,14 +1,14 @@
-"""Broken inputs at every door of the command line (`benchmarks.broken_inputs`): each answer is a result or one line.
+"""Broken inputs of the command line (`benchmarks.broken_inputs`); each answer must be a result or one line of error.
 
-    python -m benchmarks.fuzz                          until 100,000 cases are tried, going on where the last run ended
-    python -m benchmarks.fuzz --cases 500 --door plan  so many more of one door
-    python -m benchmarks.fuzz --again memory:17        one case again, its files kept
-    python -m benchmarks.fuzz --table                  the number of inputs tried and broken, as in docs/figures/promises.md
+    python -m benchmarks.fuzz                          run up to 100,000 cases, continuing the last run
+    python -m benchmarks.fuzz --cases 500 --door plan  run 500 more cases of one door
+    python -m benchmarks.fuzz --again memory:17        run one case again, and keep its files
+    python -m benchmarks.fuzz --table                  print the table of docs/figures/promises.md
 
-A case is a door and a number, from which everything in it is drawn. Cases run one after the other in a process that has limits of
-time and memory and ends after `BATCH` of them; what breaks is run again in a process of its own. How many were tried stands in
-``fuzz-tried.json``, what broke and what was mended in ``fuzz-seeds.txt``; `tests/confab/test_fuzz.py` runs that again, and a share
-of new cases.
+A case is a door and a number, which is the seed of all random choices. A process with limits of time and memory runs `BATCH`
+cases one after the other. A case that breaks is run again in a separate process. ``fuzz-tried.json`` has the number of cases,
+and ``fuzz-seeds.txt`` has the cases that broke, with their corrections. `tests/confab/test_fuzz.py` runs these cases and some
+new cases.
 """
 
 from __future__ import annotations
@@ -53,24 +53,24 @@ DOORS = {**broken_inputs.DOORS, **broken_worlds.DOORS}
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
 CASES, ROUND, BATCH = 100_000, 1_000, 100
 SECONDS, WAITING, MEGABYTES = 30, 600, 4_000
-"""Of CPU time, and by the clock: a machine may be busy with other things."""
+"""Limits of a case: CPU seconds, seconds by the clock (for busy machines), and memory in megabytes."""
 TIME_IS_OVER = {signal.SIGPROF: f"{SECONDS} s of CPU time", signal.SIGALRM: f"{WAITING} s"}
 KEPT, ALIKE = 2, 70
 """Maximum number of kept cases with the same message, and number of characters compared."""
 FEW_STATES, FEW_STEPS = 300, 60
-"""A world of so few states and quantified behaviours is searched to the end, where the answer is that there is no plan."""
+"""Maximum numbers of states and grounded behaviours of a world in which an answer without a plan is checked by search."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """What broke: the case, and how."""
+    """A case that broke, with a description of the fault."""
 
     door: str
     seed: int
     what: str
 
     def __str__(self) -> str:
-        """Return the case as it is written in the file of seeds."""
+        """Return the line of the case in the file of seeds."""
         return f"{self.door}:{self.seed}  {' '.join(self.what.split())[:160]}"
 
 
@@ -78,23 +78,23 @@ class Failure:
 
 
 def sources(given: Path) -> None:
-    """Write what all cases begin with."""
+    """Write the valid inputs of all doors."""
     broken_inputs.sources(given)
     broken_worlds.sources(given)
 
 
 def run_case(door: str, seed: int, given: Path, keep: bool = False) -> Failure | None:
-    """Run a case in a process of its own; return what broke."""
+    """Run a case in a separate process; return the fault or None."""
     return next(run_batch(door, [seed], given, keep), None)
 
 
 def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) -> Iterator[Failure]:
-    """Run cases of a door in one process, and continue in another one after a crash; yield the faults."""
+    """Run cases of a door in one process, and continue in another process after a crash; yield the faults."""
     left = list(seeds)
     while left:
         reading, writing = os.pipe()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python warns of forking beside threads
+            warnings.simplefilter("ignore")  # Python warns about forks with threads
             child = os.fork()
         if child == 0:
             os.close(reading)
@@ -106,7 +106,7 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
                     yield Failure(door, left[0], what)
                 left.pop(0)
         _, state = os.waitpid(child, 0)
-        if left:  # the process ended within a case
+        if left:  # the process ended during a case
             if os.WIFSIGNALED(state):
                 sign = os.WTERMSIG(state)
                 over = {int(which): limit for which, limit in TIME_IS_OVER.items()}
@@ -117,7 +117,7 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
 
 
 def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep: bool) -> None:
-    """In the child: run cases, write a line for each, and exit."""
+    """Run cases in the child process, write a line for each case, and exit."""
     code = 1
     try:
         for sign in TIME_IS_OVER:
@@ -135,7 +135,7 @@ def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep
 
 
 def _recorded() -> list[Result]:
-    """Record every plan of this process in the returned list, and build constant objects only once."""
+    """Return a list in which every plan of this process is recorded, and cache constant objects."""
     import rdflib.plugins.sparql.processor as sparql
     from rdflib.plugins.sparql.algebra import translateQuery
     from rdflib.plugins.sparql.parser import parseQuery
@@ -167,7 +167,7 @@ def _recorded() -> list[Result]:
 
 
 def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool) -> str:
-    """Draw a case, answer it, and return the fault of its ending; empty if there is none."""
+    """Draw and run a case, and return the fault of its ending; an empty text without a fault."""
     folder = Path(tempfile.mkdtemp(prefix="confab-fuzz-"))
     try:
         draw = random.Random(f"{door} {seed}")
@@ -194,7 +194,7 @@ def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool
 
 
 def _run(call: Arguments, case: Path, out: Path, err: Path, results: list[Result]) -> tuple[int, str]:
-    """Run a command and check its answer; return the exit code and the fault."""
+    """Run a command and check its answer; return the exit code and the fault of the answer."""
     from confab.cli import main
 
     code = 99
@@ -223,7 +223,7 @@ def _run(call: Arguments, case: Path, out: Path, err: Path, results: list[Result
 def _judged(
     call: Arguments, code: int, said: str, printed: str, before: dict[str, bytes], after: dict[str, bytes]
 ) -> str:
-    """Return the fault of a command's ending."""
+    """Return the fault of a command's exit code, output or changed files; an empty text without a fault."""
     if code not in (0, 1, 2, 3):
         return f"exit {code}: {said}"
     if "Traceback" in said + printed:
@@ -250,7 +250,7 @@ def _contents(case: Path) -> dict[str, bytes]:
 
 
 def _check_files(call: Arguments, case: Path) -> None:
-    """Raise an exception if a file that was written can't be read."""
+    """Raise an exception if a file that the command has written can't be read."""
     from confab.memory import Memory
 
     memory = case / "memory.ttl"
@@ -263,7 +263,7 @@ def _check_files(call: Arguments, case: Path) -> None:
 
 
 def _check_plan(result: Result) -> None:
-    """Raise AssertionError if a plan is none, or if there is one where the answer is that there is none."""
+    """Raise `AssertionError` if a plan is invalid, or if a task that was called unsolvable has a plan."""
     from confab.planner.certificate_checks import refusal
     from confab.planner.plan import Status
     from confab.planner.validation import validate
@@ -288,11 +288,11 @@ def _check_plan(result: Result) -> None:
         return
     faults = validate(problem, outcome.plan)
     assert not faults, f"no plan of what was read: {faults[0]}"
-    with suppress(KnowledgeError):  # parts that the task doesn't need may be broken
+    with suppress(KnowledgeError):  # parts that are irrelevant to the task may be broken
         whole = replace(result.scene.reading.problem, goal=problem.goal)
         names = {
             member for members in whole.classes.values() for member in members
-        }  # which may be longer than in a part
+        }  # the plan may be longer than for a part of the scene
         seen = {
             symbol: value for symbol, value in problem.initial.items() if symbol in whole.initial and value in names
         }
@@ -302,7 +302,7 @@ def _check_plan(result: Result) -> None:
 
 
 def quantified_behaviors(problem: Problem) -> int:
-    """Return how many behaviours the lowest level has with all their arguments."""
+    """Return the number of grounded behaviours of the lowest level."""
     return sum(
         functools.reduce(lambda many, p: many * len(problem.classes.get(p.kind, ())), behavior.parameters, 1)
         for behavior in problem.domain.at_level(problem.domain.levels[-1])
@@ -313,7 +313,7 @@ def quantified_behaviors(problem: Problem) -> int:
 
 
 def _import_all() -> None:
-    """Import the modules that the cases need, once for all of them."""
+    """Import the modules that the cases need before the processes are forked."""
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
         "confab.planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
@@ -329,14 +329,14 @@ def _import_all() -> None:
 
 
 def known() -> Iterator[tuple[str, int, str]]:
-    """Yield the kept cases with their causes, if corrected."""
+    """Yield the kept cases with their corrected causes, if any."""
     for line in SEEDS.read_text(encoding="utf-8").splitlines() if SEEDS.is_file() else ():
         if match := re.match(r"(\w+):(\d+)", line):
             yield match[1], int(match[2]), line.partition(" mended: ")[2].strip()
 
 
 def tried() -> dict[str, list[int]]:
-    """Return for each door how many cases were tried and how many of them broke."""
+    """Return for each door the number of cases that were tried and the number of cases that broke."""
     noted = json.loads(TRIED.read_text(encoding="utf-8")) if TRIED.is_file() else {}
     return {door: noted.get(door, [0, 0]) for door in DOORS}
 
@@ -351,7 +351,7 @@ def note(failure: Failure) -> None:
 
 
 def fuzz(cases: int, doors: Sequence[str]) -> int:
-    """Try `cases` inputs, each door by its share; record results as they come. Return the number of faults."""
+    """Run `cases` cases, divided among the doors by their shares, and record the results; return the number of faults."""
     shares = {door: DOORS[door][1] for door in doors}
     begin, done, broke = time.monotonic(), 0, sum(fell for _, fell in tried().values())
     before = broke

@@ -1,8 +1,8 @@
-"""Commands that write files, killed at random moments: acknowledged data have to survive, and every file has to be complete.
+"""Commands that write files are killed at random times; acknowledged data must survive, and every file must be complete.
 
-python -m benchmarks.kills             100 SIGKILLs for each command, as docs/figures/promises.md quotes them
-python -m benchmarks.kills save 20     so many for one
-python -m benchmarks.kills --ctrl-c    SIGINTs in their place: each call ends with 0 or 130, and in no other way
+python -m benchmarks.kills             100 SIGKILLs for each command, as in docs/figures/promises.md
+python -m benchmarks.kills save 20     20 SIGKILLs for one command
+python -m benchmarks.kills --ctrl-c    SIGINTs instead of SIGKILLs; each call must end with 0 or 130
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LEARNING = ("learn", "execute", "run")
 
 
 class Ended(NamedTuple):
-    """How a process ended: its exit code, negative for a signal; its CPU seconds, and its calls where they were counted."""
+    """The end of a process: exit code (negative for a signal), CPU seconds, and number of calls if they were counted."""
 
     code: int
     seconds: float
@@ -59,10 +59,10 @@ class Ended(NamedTuple):
 def killed(
     write: Callable[[], object], after: float = math.inf, call: float = math.inf, sign: int = signal.SIGKILL
 ) -> Ended:
-    """Run a function in a process of its own; send it a signal after a CPU time, or at one of its calls."""
+    """Run a function in a separate process; send a signal to the process after a CPU time, or at one of its calls."""
     made = mmap.mmap(-1, 8)  # shared with the child
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
     if child == 0:
         code = 1
@@ -90,7 +90,7 @@ def killed(
 
 
 def _counting(made: mmap.mmap, last: float, sign: int) -> Callable[[FrameType, str, object], None]:
-    """Return what counts calls, of Python's functions and of C's, and signals the process at the last."""
+    """Return a profiling function that counts calls of Python and C functions, and sends a signal at call number `last`."""
     so_far = 0
 
     def count(frame: FrameType, event: str, argument: object) -> None:
@@ -106,7 +106,7 @@ def _counting(made: mmap.mmap, last: float, sign: int) -> Callable[[FrameType, s
 
 
 def spent(process: int) -> float:
-    """Return the seconds of CPU time that a process has had, finer than the clock ticks of its usage."""
+    """Return the CPU seconds of a process, with a finer resolution than clock ticks."""
     return int(Path(f"/proc/{process}/schedstat").read_text().split()[0]) / 1e9
 
 
@@ -120,7 +120,7 @@ def learn(file: Path, number: int) -> None:
 
 
 def crowd(kills: int, seed: int = 0) -> tuple[int, int]:
-    """Let eight processes learn at a time into one memory, each by a path of its own, and kill one of them; as `trial` returns."""
+    """Let eight processes learn at once into one memory by different paths, and kill one process; return the counts of `trial`."""
     draw, lost, done = random.Random(seed), 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name).resolve()
@@ -150,15 +150,15 @@ def crowd(kills: int, seed: int = 0) -> tuple[int, int]:
 
 
 def forked(write: Callable[[], object], folder: Path) -> int:
-    """Run something in a folder, in a process of its own; return its number."""
+    """Run a function in a folder in a separate process; return the number of the process."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
     if child == 0:
         code = 1
         try:
             os.chdir(folder)
-            logging.disable()  # each prints that it waits
+            logging.disable()  # each process would log that it waits
             write()
             code = 0
         finally:
@@ -167,7 +167,7 @@ def forked(write: Callable[[], object], folder: Path) -> int:
 
 
 def torn(folder: Path) -> list[str]:
-    """Return the unreadable files in a folder; an unfinished file after a kill is hidden and ends in ``.part``."""
+    """Return the unreadable files in a folder; unfinished files are hidden and end in ``.part``."""
     found = []
     for file in (*folder.rglob("*.ttl"), *folder.rglob("*.json")):
         try:
@@ -181,14 +181,14 @@ def torn(folder: Path) -> list[str]:
 
 
 def rename(file: Path) -> str:
-    """Return a rename that the memory can do: there, or back again."""
+    """Return a renaming that is possible in the memory: of Cup to Mug, or back."""
     said = Memory.load(file).experience.said.values()
     classes = {kind for one in said if isinstance(one, GoalKind) for kind in one.classes}
     return "Mug=Cup" if "Mug" in classes else "Cup=Mug"
 
 
 def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -> tuple[int, int]:
-    """Kill a command so many times; return how often it had answered, and how many acknowledged episodes and files were lost.
+    """Kill a command `kills` times; return the number of finished calls, and the number of lost episodes and torn files.
 
     A process that ends after SIGINT with another exit code than 130 also counts as lost.
     """
@@ -200,7 +200,7 @@ def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -
         scene = confab_scene(where)
         memory = Memory.of(scene)
         memory.experience = Experience("me", {"me": 1})
-        memory.teach(scene, result := scene.plan())  # rules, orders and methods, as a memory of today has them
+        memory.teach(scene, result := scene.plan())  # the memory gets rules, orders and methods
         memory.save(file)
         memory.experience = Experience("you", {"you": 7})
         memory.save(other)
@@ -215,13 +215,13 @@ def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -
         }
         learn(file, -1)
         with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), suppress(SystemExit):
-            writes[command](-2)  # imports its modules, once for all
+            writes[command](-2)  # imports the modules before the fork
         code, _, calls = killed(lambda: writes[command](-3))
         assert code == 0, f"{command} doesn't work at all"
         _, seconds, _ = killed(lambda: writes[command](-4), after=1e9)
         acknowledged = Memory.load(file).experience.episodes["me"]
         for number in range(kills):
-            # half of them at any time, half while or after the files are written, which comes last
+            # half of the kills at any time, the other half while or after files are written at the end of the command
             when = draw.choice((draw.uniform(0.0, 1.1), draw.uniform(0.9, 1.05)))
             moment = {"after": seconds * when} if number % 2 else {"call": calls * when}
             code = killed(partial(writes[command], number), **moment, sign=sign).code
@@ -235,7 +235,7 @@ def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print the table; return 1 if anything was lost."""
+    """Print the table; return 1 if data were lost."""
     sign = signal.SIGINT if "--ctrl-c" in arguments else signal.SIGKILL
     words = [word for word in arguments if word != "--ctrl-c"]
     commands = words[:1] or [command for command in COMMANDS if command != "crowd" or sign == signal.SIGKILL]

@@ -1,11 +1,11 @@
-"""Problems to learn from and problems to test on, as the learning track of the IPC has them: with memory, without, and lama-first.
+"""Training and test problems as in the IPC learning track, solved with memory, without memory, and by lama-first.
 
     python -m benchmarks learning                      domains in ../shared/pddl
-    CONFAB_PDDL=FOLDER python -m benchmarks learning   any folder of that form: ``…/domain.pddl``, ``training…``, ``testing…``
-    CONFAB_ALL=1 …                                     every problem to test on, not only four per folder
+    CONFAB_PDDL=FOLDER python -m benchmarks learning   another folder of the form ``…/domain.pddl``, ``training…``, ``testing…``
+    CONFAB_ALL=1 …                                     all test problems instead of four per folder
 
-Lessons are taken from the problems in their order for a minute of CPU time; the memory is one file, which each call
-reads. A call has 30 s of CPU and 4 GB, from the start of its process on. Each plan is checked.
+The memory learns from the training problems in order for a minute of CPU time. Each call reads the memory from one file. A call
+is limited to 30 s of CPU time and 4 GB, including the start of its process. Each plan is checked.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Pat
 
 
 def teach(domain: Path, training: list[Path], target: Path) -> str:
-    """Learn from problems as long as there is time, write the memory, and print its size."""
+    """Learn from problems until the time limit, write the memory, and print its size."""
     from confab.planner.experience.following import rules_in
     from confab.planner.experience.lessons import teach as learn
     from confab.reasoner.memory.experience import Experience
@@ -78,7 +78,7 @@ def teach(domain: Path, training: list[Path], target: Path) -> str:
 
 
 def _said(runs: list[Run], lama: list[Run]) -> str:
-    """Return how many were solved, in what time, and how long their plans are beside lama-first's."""
+    """Return a text with the number of solved problems, their CPU seconds, and the ratio of plan lengths to lama-first."""
     solved = [done for done in runs if done.plan is not None]
     both = [(len(a.plan), len(b.plan)) for a, b in zip(runs, lama, strict=True) if a.plan and b.plan]
     length = f", × {sum(a for a, _ in both) / sum(b for _, b in both):.2f}" if both and runs is not lama else ""
@@ -86,7 +86,7 @@ def _said(runs: list[Run], lama: list[Run]) -> str:
 
 
 def solve(domain: str, problem: str, target: str, memory: str | None = None) -> None:
-    """Solve one problem, and write its plan (run in a benchmarked process)."""
+    """Solve one problem in a benchmarked process, and write its plan."""
     from confab.planner.experience.advice import Memory, plan
     from confab.planner.plan import Limits
     from confab.planner.validation import validate

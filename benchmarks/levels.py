@@ -1,6 +1,6 @@
-"""Random worlds of two and three levels: conformity of each mode to the levels, correctness of its answers, length of its plans.
+"""Random worlds of two and three levels: the levels of plans, correctness of answers and length of plans in each mode.
 
-LEVELS_FROM and LEVELS_COUNT choose other worlds. Seeds below 1,000,000 are for development.
+LEVELS_FROM and LEVELS_COUNT select other worlds. Seeds below 1,000,000 are for development.
 """
 
 from __future__ import annotations
@@ -69,5 +69,5 @@ def main() -> None:
 
 
 def cost(problem: Problem, plan: Plan) -> int:
-    """Return how many primitives a plan has."""
+    """Return the number of primitives of a plan."""
     return len(plan.at_level(problem.domain.levels[-1]))

@@ -1,10 +1,10 @@
-"""Latency of honest requests to `confab serve`, alone and beside slow, abandoned and malformed ones.
+"""Latency of honest requests to `confab serve`, alone and together with slow, abandoned and malformed requests.
 
-    python -m benchmarks.load        1,000 honest ones beside 300, 500 and 200, within a minute (docs/figures/promises.md)
-    python -m benchmarks.load 50     a fiftieth of each
+    python -m benchmarks.load        1,000 honest, 300 slow, 500 abandoned and 200 malformed requests in a minute
+    python -m benchmarks.load 50     a fiftieth of each number
 
-Honest clients ask a short query; slow ones send a byte of it a second; abandoned ones ask for a cross product and leave after
-up to a second; malformed ones send broken lines, headers, lengths, hosts and queries.
+Honest clients send a short query. Slow clients send the same query, one byte per second. Abandoned clients send a query for a
+cross product and disconnect within a second. Malformed requests have broken lines, headers, lengths, hosts or queries.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from urllib.parse import quote
 
 HONEST, SLOW, ABANDONED, MALFORMED, SECONDS = 1_000, 300, 500, 200, 60.0
 CLIENTS = 8
-"""Honest clients; each sends the next query as soon as it has a turn and its response."""
+"""Number of honest clients; each client sends its next query after the response to the last query."""
 SHORT = quote("SELECT ?x WHERE { ?x a :Behavior } ORDER BY ?x")
 LONG = quote("SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i FILTER(?c != ?d) }")
 HOST = "Host: localhost\r\nConnection: close\r\n"
@@ -56,14 +56,14 @@ MALFORMED_REQUESTS = (
 
 @dataclass
 class Load:
-    """The requests sent to a port: the time of each honest answer, and the answers by kind of request."""
+    """Requests to a port, with the duration of each honest request, and the number of answers by kind of request."""
 
     port: int
     seconds: list[float] = field(default_factory=list)
     answers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     async def request(self, kind: str, content: bytes, leave: float | None = None, pause: float = 0.0) -> None:
-        """Send a request, byte by byte if it has pauses, and record the answer; close the connection after a time."""
+        """Send a request, byte by byte with a `pause`, and record the answer; with `leave`, disconnect after this time."""
         begin = perf_counter()
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         try:
@@ -86,18 +86,18 @@ class Load:
             self.seconds.append(perf_counter() - begin)
 
     async def honest(self, times: int, pause: float) -> None:
-        """Send one short query after another."""
+        """Send short queries one after another."""
         for _ in range(times):
             await self.request("honest", get(SHORT))
             await asyncio.sleep(pause)
 
     async def later(self, after: float, kind: str, content: bytes, leave: float | None, pause: float) -> None:
-        """Send a request after some seconds."""
+        """Send a request after `after` seconds."""
         await asyncio.sleep(after)
         await self.request(kind, content, leave, pause)
 
     async def run(self, part: float, beside: bool) -> Load:
-        """Send a part of the honest requests, beside the others or alone."""
+        """Send a share of the honest requests, alone or, with `beside`, together with the other kinds."""
         draw, seconds = random.Random(0), SECONDS * part
         others = [(SLOW, "slow"), (ABANDONED, "abandoned"), (MALFORMED, "malformed")] if beside else []
         tasks = [
@@ -123,12 +123,12 @@ class Load:
 
 
 def get(query: str) -> bytes:
-    """Return a whole request."""
+    """Return an HTTP request with a query."""
     return f"GET /sparql?query={query} HTTP/1.1\r\n{HOST}\r\n".encode()
 
 
 def measured(part: float) -> tuple[Load, Load, str]:
-    """Return the results of honest requests alone and beside the others, and the server's log."""
+    """Return the results of honest requests alone and together with the other kinds, and the server's log."""
     start = "from confab.start import main; main()"
     command = [sys.executable, "-c", start, "serve", "beverage-serving", "--port", "0", "--time-limit", "20"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
@@ -146,7 +146,7 @@ def measured(part: float) -> tuple[Load, Load, str]:
 
 
 def main() -> int:
-    """Print how requests were answered and what honest ones waited; return 1 if one had no answer, or on a traceback."""
+    """Print answers and latencies; return 1 if an honest request had no answer, or if the log has a traceback."""
     part = 1 / float(sys.argv[1]) if len(sys.argv) > 1 else 1.0
     quiet, loaded, said = measured(part)
     print("| requests | times | answered with |\n|---|---|---|")

@@ -1,13 +1,14 @@
-"""What experience is worth: transfer to larger worlds of any kind, flat PDDL, harm, and files.
+"""The benefit of learned experience: transfer to larger worlds, flat PDDL, harm by bad memories, and files.
 
     python -m benchmarks memory
-    CONFAB_MEMORY=transfer,harm …     some of: transfer, worlds, curve, said, pddl, harm, files
-    CONFAB_WORLDS=FOLDER …            worlds from elsewhere beside the shipped ones: pairs ``…-small.ttl`` and ``…-large.ttl``
-    CONFAB_PDDL=FOLDER …              folders with ``domain.pddl``, ``training…`` and ``testing…``
-    CONFAB_ALL=1 …                    every problem of those, not only a few per folder
+    CONFAB_MEMORY=transfer,harm …     sections: transfer, worlds, curve, said, pddl, harm, files (all by default)
+    CONFAB_WORLDS=FOLDER …            a folder of further worlds: pairs ``…-small.ttl`` and ``…-large.ttl``
+    CONFAB_PDDL=FOLDER …              a folder with ``domain.pddl``, ``training…`` and ``testing…``
+    CONFAB_ALL=1 …                    all PDDL test problems instead of a few per folder
 
-Tables: one lesson of 4 and one of 6 objects of six families, seed 100; reported seeds from 5000 on. Expansions are those of the
-most abstract level; seconds are CPU seconds of a whole call. A lesson plans for the goals in several orders.
+For tables, the memory learns from one problem with 4 and one with 6 objects of each of six families, with seed 100. The
+reported problems have seeds from 5000. Expansions are counted on the most abstract level. Seconds are CPU seconds of a whole
+call. A lesson plans for the goals in several orders.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def main() -> None:
 
 
 def measured(call: Callable[[], Outcome], within: Problem) -> tuple[Outcome, float]:
-    """Return how a call ended, and its CPU seconds; a plan that is none ends the benchmark."""
+    """Return the outcome of a call and its CPU seconds; an invalid plan ends the benchmark."""
     begin = process_time()
     outcome = call()
     seconds = process_time() - begin
@@ -70,13 +71,13 @@ def measured(call: Callable[[], Outcome], within: Problem) -> tuple[Outcome, flo
 
 
 def expanded(outcome: Outcome, within: Problem) -> int:
-    """Return the expansions of the most abstract level."""
+    """Return the number of expansions on the most abstract level."""
     first = within.domain.levels[0]
     return outcome.search[first].expanded if first in outcome.search else 0
 
 
 def shown(outcome: Outcome, seconds: float, within: Problem) -> str:
-    """Return steps of the most abstract level, expansions of it and of all levels, and seconds."""
+    """Return table cells: steps of each level, expansions of the most abstract level and of all levels, and CPU seconds."""
     if outcome.plan is None:
         return f"{outcome.status.value} | – | {seconds:.2f}"
     whole = sum(counts.expanded for counts in outcome.search.values())
@@ -85,7 +86,7 @@ def shown(outcome: Outcome, seconds: float, within: Problem) -> str:
 
 
 def beside(name: str, within: Problem, memory: Memory) -> None:
-    """Print a row: a problem without memory and with it, by default."""
+    """Print a row of a problem, planned without memory and with memory in the default mode."""
     limits = Limits(seconds=SECONDS)
     none = measured(lambda: fast.plan(within, limits=limits), within)
     led = measured(lambda: plan(within, memory, limits=limits), within)
@@ -97,7 +98,7 @@ HEAD = """| | steps, none | expansions of level 1 (all) | s | steps, with memory
 
 
 def transfer(sizes: tuple[int, ...] = (20, 40), seeds: int = 3) -> None:
-    """Print expansions for each step on tables five times as large as those of the lessons."""
+    """Print the expansions per step on tables that are about five times as large as the tables of the lessons."""
     print(f"{sum(1 for _ in rules_in(taught(FAMILIES).experience))} rules from 12 lessons\n")
     print("| family | n | none | default | strict | primitives, default ÷ none | CPU, default ÷ none |")
     print("|---|---|---|---|---|---|---|")
@@ -118,7 +119,7 @@ def transfer(sizes: tuple[int, ...] = (20, 40), seeds: int = 3) -> None:
 
 
 def worlds() -> None:
-    """Print the benefit of one lesson in a small world for a large one of its kind, and for itself."""
+    """Print the benefit of one lesson in a small world for the same world and for a large world of its kind."""
     print(HEAD)
     folders = [
         ontology.ROOT / "scenes",
@@ -141,7 +142,7 @@ def worlds() -> None:
 
 
 def curve(world: str = "laboratory", episodes: int = 3) -> None:
-    """Print how the effort in a large world falls: without memory, after a lesson in a small one, after each own episode."""
+    """Print the effort in a large world without memory, after a lesson in a small world, and after episodes in the large world."""
     small, large = (confab.load(f"{world}-{size}").problem for size in ("small", "large"))
     experience = Experience("lesson")
     print(f"| {world}-large | steps | expansions of level 1 (all) | s | rules |\n|---|---|---|---|---|")
@@ -156,7 +157,7 @@ def curve(world: str = "laboratory", episodes: int = 3) -> None:
 
 
 def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None:
-    """Print the rules of a lesson as on the page of advice, those of the most abstract level."""
+    """Print the rules of the most abstract level that a lesson gives, in words."""
     for world in worlds:
         scene = confab.load(f"{world}-small")
         memory = confab.Memory.of(scene)
@@ -169,7 +170,7 @@ def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None
 
 
 def folders() -> Iterator[tuple[Path, list[Path], list[Path]]]:
-    """Yield domain, problems to learn from and problems to test on, some of each size."""
+    """Yield each PDDL domain with training problems and test problems of several sizes."""
     root = Path(os.environ.get("CONFAB_PDDL", SHARED / "pddl"))
     for domain in sorted(root.rglob("domain.pddl")):
         places = sorted(p for p in domain.parent.iterdir() if p.is_dir())
@@ -181,12 +182,12 @@ def folders() -> Iterator[tuple[Path, list[Path], list[Path]]]:
 
 
 def sample(many: int) -> list[int]:
-    """Return a few places, the first and the last included."""
+    """Return a few indices, including the first and the last."""
     return sorted({i * (many - 1) // TESTED for i in range(TESTED + 1)})
 
 
 def pddl() -> None:
-    """Print flat problems without memory and with rules from a few small ones."""
+    """Print results for flat problems without memory, and with rules from a few small problems."""
     print(HEAD)
     for domain, training, testing in folders():
         experience, begin = Experience("lesson"), process_time()
@@ -204,7 +205,7 @@ def pddl() -> None:
 
 @cache
 def bad_memories() -> dict[str, Memory]:
-    """Return memories that are right, wrong and of elsewhere."""
+    """Return memories with right rules, with wrong rules, and with rules of another domain, by name."""
     good = taught(FAMILIES)
     rules = rules_in(good.experience)
     turned = [backwards(rule) for rule in rules]
@@ -225,7 +226,7 @@ def bad_memories() -> dict[str, Memory]:
 
 
 def harm(seeds: int = 1) -> None:
-    """Print the worst ratio to the memoryless expansions, and the worst excess, for good and bad memories."""
+    """Print, for good and bad memories, the worst ratio of expansions to planning without memory, and the worst excess."""
     print("| memory | strict | default | leading |\n|---|---|---|---|")
     cases = [
         problem(f, n, s)
@@ -246,7 +247,7 @@ def harm(seeds: int = 1) -> None:
 
 
 def files(links: int = 100_000) -> None:
-    """Print the times to save and load a memory of so many counters."""
+    """Print the times to save and load a memory with about `links` counters."""
     experience = Experience("robot")
     experience.merge(taught(FAMILIES).experience)
     kinds = [GoalKind("LOCATION", (f"Kind{i}",)) for i in range(100)]

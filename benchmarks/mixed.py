@@ -1,12 +1,12 @@
-"""Small random worlds of everything at once, in every mode, held against a search of all their states.
+"""Small random worlds with all constructs, planned in every mode and compared with a search of all states.
 
-    python -m benchmarks.mixed                                    the next worlds: COUNT of them from FIRST on
+    python -m benchmarks.mixed                    judge COUNT worlds from seed FIRST
     python -m benchmarks.mixed --from 5000000 --count 100000 --workers 2 --into FOLDER
-    python -m benchmarks.mixed --mutants 100                      which share of small faults, so many in each part, they notice
-    python -m benchmarks.mixed --seed 5000123                     one of them, with all checks, and its scene
+    python -m benchmarks.mixed --mutants 100      print the share of 100 small faults per part that the worlds detect
+    python -m benchmarks.mixed --seed 5000123     judge one world with all checks, and print its scene
 
-A run goes on where it was interrupted, if it is given the same folder: there it notes what came of each stretch of worlds, and
-writes the smallest world for each thing that is wrong. The exit code is 1 if something is.
+An interrupted run can be continued with the same folder. The folder has the results of each stretch of worlds, and a small world
+for each fault. The exit code is 1 if a fault was found.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
 CONSTRAINED = 0.3
-"""Share of worlds with a condition on every state."""
+"""Share of worlds with a constraint on every state."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
 SAMPLE = 25
-"""One in so many worlds is examined for the effects of its features."""
+"""Interval of the seeds of worlds that are examined for the effects of their features."""
 
 
 def signature(one: Complaint) -> str:
-    """Return a signature that distinguishes different faults, as far as possible."""
+    """Return a text by which different faults are distinguished as far as possible."""
     detail = one.text.split(":")[0] if one.kind == "crash" else ""
     mode = one.mode.split(" ")[0] if one.mode.startswith("export") else one.mode
     return " | ".join(part for part in (one.kind, mode, detail) if part)
 
 
 def judged(seed: int, folder: Path, every: bool = False) -> Judged:
-    """Return the result of judging the world of a seed."""
+    """Judge the world of a seed, and return the result."""
     return Judge(mixed(seed, constrained=CONSTRAINED), folder, every).judged()
 
 
 def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
-    """Judge some worlds, shrink those with faults, and return the results."""
+    """Judge `count` worlds, shrink worlds with faults, and return the results."""
     begin = time.process_time()
     found: dict[str, Any] = {
         "first": first, "count": count, "wrong": {}, "remarks": {}, "truth": Counter(), "lengths": Counter(),
@@ -73,7 +73,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
 
 
 def note(found: dict[str, Any], seed: int, world: RandomWorld, its: Judged) -> None:
-    """Add the result of a world."""
+    """Add the result of a world to the results of a stretch."""
     for kind, ones in (("wrong", its.complaints), ("remarks", its.remarks)):
         for said in dict.fromkeys(map(signature, ones)):
             found[kind].setdefault(said, []).append(seed)
@@ -92,13 +92,13 @@ def note(found: dict[str, Any], seed: int, world: RandomWorld, its: Judged) -> N
 
 
 def write(world: RandomWorld, one: Complaint, into: Path, folder: Path) -> Path:
-    """Make a world small in which something is wrong, and write its scene."""
+    """Shrink a world with a fault, and write the scene of the small world; return its path."""
     said = signature(one)
 
     def still(smaller: RandomWorld) -> bool:
         try:
             complaints = Judge(smaller, folder, only=one.mode).judged().complaints
-        except Exception:  # it is none that can be judged any more
+        except Exception:  # the smaller world can't be judged
             return False
         return any(signature(other) == said for other in complaints)
 
@@ -118,7 +118,7 @@ def _stretch(job: tuple[int, int, Path | None, dict[str, int]]) -> dict[str, Any
 
 
 def run(first: int, count: int, workers: int, into: Path | None) -> dict[str, Any]:
-    """Judge worlds in stretches, going on where a run into the same folder ended."""
+    """Judge worlds in stretches, continuing an earlier run into the same folder, and return the total results."""
     done: dict[int, dict[str, Any]] = {}
     record = None
     if into is not None:
@@ -165,7 +165,7 @@ def _short(wrong: dict[str, list[int]]) -> str:
 
 
 def add(total: dict[str, Any], one: dict[str, Any]) -> None:
-    """Add the results of a stretch of seeds."""
+    """Add the results of a stretch to the total."""
     for key in ("wrong", "remarks"):
         for said, seeds in one[key].items():
             total.setdefault(key, {}).setdefault(said, []).extend(seeds)
@@ -211,7 +211,7 @@ STATUS = ("solved", "unsolvable", "gave-up", "refused", "crash", "endless", "rea
 
 
 def main(arguments: Sequence[str] = ()) -> int:
-    """Judge the requested worlds."""
+    """Judge the requested worlds, and print the results; return 1 if a fault was found."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mixed")
     parser.add_argument("--from", dest="first", type=int, default=FIRST)
     parser.add_argument("--count", type=int, default=COUNT)
@@ -224,7 +224,7 @@ def main(arguments: Sequence[str] = ()) -> int:
         words = [
             str(asked.mutants),
             str(asked.into or "confab-out"),
-        ]  # a separate process, without the modules that get faults
+        ]  # a separate process, which has not yet imported the faulty modules
         return subprocess.run([sys.executable, "-m", "benchmarks.mixed_mutants", *words], check=False).returncode
     if asked.seed is not None:
         with TemporaryDirectory() as folder:

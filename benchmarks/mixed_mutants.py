@@ -1,7 +1,7 @@
-"""How many small faults in recognition, in proofs and in the checker of plans the random worlds notice.
+"""The share of small faults in recognition, proofs and checkers that random worlds detect.
 
-Each fault (`benchmarks.mutants` draws them) is put into a process of its own, which judges the worlds until something is wrong
-that isn't without the fault. What came of each is noted in a file, with which a later run goes on.
+`benchmarks.mutants` draws the faults. A separate process with one fault judges the worlds until a result is wrong that is right
+without the fault. The results are stored in a file, so that a later run can continue.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ PARTS: dict[str, tuple[tuple[str, ...], str]] = {
 }
 """The modules of each part, and the mode in which worlds are judged.
 
-Proofs are judged in worlds without a plan. To give up in such a world is a fault of a proof.
+Proofs are judged in worlds without a plan. A planner that gives up in such a world counts as a fault of a proof.
 """
 FIRST, WORLDS, SECONDS, WAITING = 8_000_000, 150, 60, 600.0
-"""The worlds; the CPU seconds of all of them, and the seconds of the clock of a call, which matter only on a busy machine."""
+"""First seed and number of worlds, CPU seconds for all worlds, and seconds by the clock for a call on a busy machine."""
 Drawn = tuple[RandomWorld, Interpreter]
 
 
 def kills(many: int, into: Path) -> None:
-    """Try faults in each part, and print which share is noticed."""
+    """Try `many` faults in each part, and print the share of detected faults."""
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, dict[str, str]] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
@@ -83,10 +83,10 @@ def hopeless(meant: Interpreter) -> bool:
 
 
 def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before: set[str]) -> set[str] | None:
-    """Return the faults found with this text of a module: all, or the first new one; None if everything breaks."""
+    """Return the complaints with a changed text of a module: all, or the first new complaint; None if the process fails."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
     if child == 0:
         code = 1
@@ -99,7 +99,7 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
             faulty = Instead(file, text)
             sys.meta_path.insert(0, faulty)
             found = judge(worlds, mode, lambda said: bool(before) and said not in before)
-            if sys.modules[faulty.name].__loader__ is faulty:  # else the worlds were judged without the fault
+            if sys.modules[faulty.name].__loader__ is faulty:  # otherwise the worlds were judged without the fault
                 os.write(writing, json.dumps(sorted(found)).encode())
                 code = 0
         finally:
@@ -114,7 +114,7 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
 
 
 def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
-    """Judge worlds in one mode until a fault suffices; return the faults, and the ending of each call."""
+    """Judge worlds in one mode until `enough` is true for a complaint; return the complaints and call results."""
     from worlds import judging
 
     judging.SECONDS = WAITING

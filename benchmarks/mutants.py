@@ -1,14 +1,14 @@
-"""Mutation testing: how many small faults in a module its own fast tests notice.
+"""Mutation testing: the share of small faults in a module that the module's fast tests detect.
 
-    python -m benchmarks.mutants               60 faults in each module, drawn by seed, going on where the last run ended
-    python -m benchmarks.mutants 20 validation so many in one
-    python -m benchmarks.mutants --again repair what survived in one, after its tests were changed
-    python -m benchmarks.mutants --table       the detected faults, as in docs/figures/promises.md
+    python -m benchmarks.mutants               try 60 faults in each module, continuing the last run
+    python -m benchmarks.mutants 20 validation try 20 faults in one module
+    python -m benchmarks.mutants --again repair try the surviving faults of one module again
+    python -m benchmarks.mutants --table       print the table of docs/figures/promises.md
 
-The faults are cosmic-ray's (`pip install cosmic-ray`; no extra has it). Each is put into the module of a process of its own, which
-runs the module's tests until the first that fails. Faults in annotations and docstrings are none. What came of each stands in
-``mutants.json``, with what the module said when it was tried: if that has changed, a module's record begins anew. Who has read a
-survivor and found that it changes nothing moves it from ``survived`` to ``same``, with the reason.
+The faults are mutations of cosmic-ray (`pip install cosmic-ray`). A separate process runs the module's tests with one fault
+until the first test fails. Mutations of annotations and docstrings are left out. ``mutants.json`` has the results, with a hash
+of the module. After a change of the module, its record begins again. A reader who finds that a survivor changes nothing moves
+its entry from ``survived`` to ``same``, with the reason.
 """
 
 from __future__ import annotations
@@ -36,10 +36,9 @@ ROOT = Path(__file__).resolve().parents[1]
 RECORD = Path(__file__).with_name("mutants.json")
 MANY = 60
 SECONDS, TIMES, WAITING = 10, 5, 6
-"""Tests that take longer than this, and so many times as long as they take without a fault, come to no end;
-by the clock so many times that."""
+"""Limits of the tests with a fault: minimum CPU seconds, factor of the CPU time without a fault, and factor by the clock."""
 LIBRARIES = ("pytest", "hypothesis", "numpy", "networkx", "pyoxigraph", "rdflib", "urllib3")
-"""Modules without injected faults, imported once for all."""
+"""Modules without injected faults, which are imported once."""
 TESTS: dict[str, tuple[str, ...]] = {
     "reasoner/language.py": ("tests/planner/test_language.py", "tests/planner/test_behaviors.py"),
     "reasoner/symbols.py": ("tests/reasoner/test_symbols.py", "tests/planner/test_validation.py"),
@@ -54,11 +53,11 @@ TESTS: dict[str, tuple[str, ...]] = {
     "reasoner/memory/rules_file.py": ("tests/reasoner/test_memory_lines.py", "tests/reasoner/test_remembering.py"),
     "reasoner/memory/links_file.py": ("tests/reasoner/test_memory.py",),
 }
-"""The fast tests of each module, those that detect most faults first."""
+"""The fast tests of each module; tests that detect most faults come first."""
 SAME = ("Eq_Is", "Eq_IsNot")
-"""Changes without effect: names are interned, so that equal ones are mostly identical."""
+"""Mutations without effect, since interned names that are equal are mostly identical."""
 Fault = tuple[str, int]
-"""An operator of cosmic-ray, and at which of the places that it fits."""
+"""An operator of cosmic-ray, and the index of the place to which it is applied."""
 
 
 def faults(source: str, draw: random.Random) -> Iterator[tuple[Fault, str]]:
@@ -72,7 +71,7 @@ def faults(source: str, draw: random.Random) -> Iterator[tuple[Fault, str]]:
     operators = {name: cosmic_ray.plugins.get_operator(name) for name in names}
     places: list[Fault] = []
     for name, operator in operators.items():
-        with contextlib.suppress(TypeError):  # one that needs arguments
+        with contextlib.suppress(TypeError):  # an operator that needs arguments
             many = sum(1 for node in nodes for _ in operator().mutation_positions(node))
             places += [(name, number) for number in range(many)]
     draw.shuffle(places)
@@ -109,15 +108,15 @@ class Record(TypedDict):
 
 
 def noticed(file: str, text: str, seconds: float = 600.0) -> bool:
-    """Return whether a module's tests fail, or don't end, with this text as the module."""
+    """Return whether a module's tests fail, or don't end in time, with a changed text of the module."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
     if child == 0:
         code = 1
         try:
             signal.setitimer(signal.ITIMER_PROF, seconds)
-            signal.alarm(int(WAITING * seconds))  # some wait for ever
+            signal.alarm(int(WAITING * seconds))  # some faults let a test wait for ever
             with open(os.devnull, "w") as nowhere:  # noqa: PTH123
                 os.dup2(nowhere.fileno(), 1)
                 os.dup2(nowhere.fileno(), 2)
@@ -134,21 +133,21 @@ def noticed(file: str, text: str, seconds: float = 600.0) -> bool:
 
 
 class Instead(Loader):
-    """Finds one module, and gives it another text."""
+    """An importer that loads one module with another text."""
 
     def __init__(self, file: str, text: str) -> None:
         within = "" if file.startswith("confab/") else "confab."
         self.name, self.file, self.text = within + file.removesuffix(".py").replace("/", "."), ROOT / file, text
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        """Return how the module is loaded, if it is this one."""
+        """Return the specification of the module if the name is its name."""
         return spec_from_loader(name, self, origin=str(self.file)) if name == self.name else None
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Leave it to Python."""
+        """Return None, so that Python creates the module."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the other text."""
+        """Execute the other text in the module."""
         module.__file__ = str(self.file)
         exec(compile(self.text, str(self.file), "exec"), module.__dict__)
 
@@ -167,7 +166,7 @@ def record(file: str, source: str) -> Record:
 
 
 def try_out(file: str, many: int, again: bool) -> None:
-    """Draw faults of a module, test new ones or survivors, and record each result at once."""
+    """Draw faults of a module, test new faults or survivors, and record each result at once."""
     source = (ROOT / file).read_text("utf-8")
     its, used = record(file, source), os.times()
     wanted = set(its["survived"]) if again else None
@@ -192,7 +191,7 @@ def try_out(file: str, many: int, again: bool) -> None:
 
 
 def table() -> None:
-    """Print the share that was noticed of each module, and what survived."""
+    """Print the share of detected faults of each module, and the lines with survivors."""
     print(
         "| module | faults tried | the same in effect | noticed of the others | | survived |\n|---|---|---|---|---|---|"
     )

@@ -139,7 +139,7 @@ def served(scene: Path) -> None:
 def begun(run: Callable[[], object]) -> int:
     """Run something in a process, and process group, of its own; return its number."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
     if child == 0:
         code = 1

@@ -1,7 +1,7 @@
 """Collision-free motion of a hand, planned in the hand's coordinates and timed within the joints' limits.
 
 A *pose* is (x, y, z, yaw, roll, swivel). The point x, y, z of the hand is in metres. In radians, yaw is the heading of the
-hand's horizontal pointing direction, roll is the rotation about this direction, and swivel is the elbow's.
+hand's horizontal pointing direction, roll is the rotation about this direction, and swivel is the angle of the elbow.
 `confab.sim.kinematics` maps a pose to a posture. A path with roll 0 keeps a cup upright. The path is a straight line if the
 line is free of collisions, otherwise the result of a short RRT-Connect in the same six coordinates.
 

@@ -4,8 +4,8 @@ The plan checker's interpreter (`confab.planner.validation.BehaviorReader`) comp
 for every combination of values of the symbols that it reads. Its results form a decision tree for each grounded behaviour, by
 which arrays of states are processed.
 
-code    a state as one integer, with a field of bits for each symbol tree    maps the values of a symbol to trees; a leaf has
-the assigned values, or is None (not applicable)
+code    a state as one integer, with a field of bits for each symbol
+tree    maps the values of a symbol to trees; a leaf has the assigned values, or is None (not applicable)
 """
 
 from __future__ import annotations
