@@ -385,15 +385,15 @@ def test_a_fact_is_turned_and_a_query_asked_on_the_served_page(browser: Browser,
     browser.open(served.url)
     lengths = "[...document.querySelectorAll('.tile')].map((e) => e.textContent).join(' ')"
     browser.wait(f"{lengths}.includes('4 / 10 / 32')")
-    browser.choose("cup 1 is at: is", "location7")
+    browser.choose("cup 1 is at: initial value", "location7")
     browser.wait(f"{lengths}.includes('3 / 8 / 26')")
     assert browser.run("document.querySelector('.changes del').textContent") == "move cup 1 to location 7"
-    browser.choose("cup 1 is at: is", "location1")
+    browser.choose("cup 1 is at: initial value", "location1")
     assert "the same LOCATION" in browser.wait("document.querySelector('.turning .bad')?.textContent")
     browser.type(".asking textarea", "SELECT ?where WHERE { :cup1 k:location ?where }")
     browser.click(".asking button")
     assert browser.wait("document.querySelector('.answer td')?.textContent") == "location2"
-    browser.choose("ready questions", "1")
+    browser.choose("ready queries", "1")
     browser.wait("document.querySelector('.answer td')?.textContent === 'bottle1'")
     assert browser.faults == []
 
@@ -436,7 +436,7 @@ def test_in_a_notebook_the_page_asks_the_kernel(browser: Browser, scene: confab.
     (tmp_path / "cell.html").write_text(NOTEBOOK % (script().replace("export default", "const board ="), data))
     browser.open((tmp_path / "cell.html").as_uri())
     browser.wait("window.leave !== undefined")
-    browser.choose("cup 1 is at: is", "location7")
+    browser.choose("cup 1 is at: initial value", "location7")
     assert browser.run("model.turned.facts") == FACTS["facts"]
     answer = json.dumps({**sheet.scene_data, **sheet.answer(FACTS)})
     browser.run(f"model.give('data', {answer})")

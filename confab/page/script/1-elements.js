@@ -8,8 +8,8 @@ const GROUPS = {
   levels: "steps by level", actors: "primitives by actor", changes: "facts that change", wanted: "goals about facts that don't change", fixed: "other facts that don't change",
 };
 const TONES = [
-  ["action", "done"], ["planned", "still to be done"], ["failed", "failed"], ["start", "as in the beginning"],
-  ["between", "neither that nor wanted"], ["wanted", "as wanted"],
+  ["action", "step"], ["planned", "step not yet executed"], ["failed", "failed"], ["start", "initial value"],
+  ["between", "other value"], ["wanted", "goal value"],
 ];
 
 const create = (element, attributes, inner) => {

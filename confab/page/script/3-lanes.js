@@ -69,7 +69,7 @@ class Lanes {
     return made("div", { class: `row ${row.group}` },
       made("div", { class: "who", title: row.label }, row.label),
       made("div", { class: "track" }, this.bars(row)),
-      made("div", { class: row.met ? "met ok" : "met bad", title: met && (row.met ? "as wanted in the end" : "not as wanted in the end") }, met));
+      made("div", { class: row.met ? "met ok" : "met bad", title: met && (row.met ? "the goal is met" : "the goal is not met") }, met));
   }
 
   bars(row) {

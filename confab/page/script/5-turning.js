@@ -8,11 +8,11 @@ class Turning {
     this.table = made("tbody", {});
     this.people = made("div", { class: "people" });
     this.state = made("p", { class: "note", role: "status" });
-    const search = made("input", { type: "search", placeholder: "a word of it", "aria-label": "show the facts with this word", oninput: () => { this.word = search.value.toLowerCase(); this.rows(); } });
-    this.again = made("button", { type: "button", onclick: () => { this.turned = { facts: {}, goals: {}, interventions: [] }; this.rows(); this.interventions(); this.send(); } }, "all as in the file");
-    this.element = made("section", { class: "turning" }, made("h2", {}, "Turn a fact or a goal"), made("p", { class: "note" }, "The plan is made anew at once; the file stays as it is."),
+    const search = made("input", { type: "search", placeholder: "filter facts", "aria-label": "show the facts with this word", oninput: () => { this.word = search.value.toLowerCase(); this.rows(); } });
+    this.again = made("button", { type: "button", onclick: () => { this.turned = { facts: {}, goals: {}, interventions: [] }; this.rows(); this.interventions(); this.send(); } }, "reset");
+    this.element = made("section", { class: "turning" }, made("h2", {}, "Change a fact or a goal"), made("p", { class: "note" }, "Each change starts a new plan; the scene's file stays unchanged."),
       made("p", { class: "tools" }, search, " ", this.again), this.state,
-      made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, ["what", "is", "shall be"].map((words) => made("th", { scope: "col" }, words)))), this.table)), this.people);
+      made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, ["situation", "initial value", "goal value"].map((words) => made("th", { scope: "col" }, words)))), this.table)), this.people);
   }
 
   start() {
@@ -43,8 +43,8 @@ class Turning {
       const values = turnable.values[row.values], wanted = row.wanted === null ? "" : row.wanted;
       const fact = this.turned.facts[row.key] ?? row.now, goal = row.key in this.turned.goals ? this.turned.goals[row.key] ?? "" : wanted;
       return made("tr", {}, made("th", { scope: "row" }, row.label),
-        made("td", {}, this.choice(`${row.label}: is`, values, fact, row.now, (value) => this.turn("facts", row.key, value, row.now))),
-        made("td", {}, this.choice(`${row.label}: shall be`, [["", "–"], ...values], goal, wanted, (value) => this.turn("goals", row.key, value === "" ? null : value, row.wanted))));
+        made("td", {}, this.choice(`${row.label}: initial value`, values, fact, row.now, (value) => this.turn("facts", row.key, value, row.now))),
+        made("td", {}, this.choice(`${row.label}: goal value`, [["", "–"], ...values], goal, wanted, (value) => this.turn("goals", row.key, value === "" ? null : value, row.wanted))));
     };
     clear(this.table, lined(shown, line, 3));
     if (turnable.hidden) this.table.append(made("tr", {}, made("td", { colspan: 3, class: "note" }, `${turnable.hidden} without a row; scene.with_fact turns them in Python`)));

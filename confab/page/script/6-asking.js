@@ -17,9 +17,9 @@ const asking = (page) => {
     } catch (error) { clear(out, made("p", { class: "bad", role: "alert" }, `nothing answers: ${error.message}`)); }
   };
   text.addEventListener("keydown", (event) => { if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) { event.preventDefault(); ask(); } });
-  const choose = made("select", { "aria-label": "ready questions", onchange: () => { const one = ready[choose.value]; if (one) { text.value = one.text; ask(); } } },
-    made("option", { value: "" }, "a ready question …"), ready.map((one, number) => made("option", { value: number }, one.question)));
-  return made("section", { class: "asking" }, made("h2", {}, "Ask in SPARQL"),
-    made("p", { class: "note" }, "Asked is the scene as it is in its files, and what was observed while the robot acts; what was turned above isn't in it."),
+  const choose = made("select", { "aria-label": "ready queries", onchange: () => { const one = ready[choose.value]; if (one) { text.value = one.text; ask(); } } },
+    made("option", { value: "" }, "choose a ready query …"), ready.map((one, number) => made("option", { value: number }, one.question)));
+  return made("section", { class: "asking" }, made("h2", {}, "SPARQL query"),
+    made("p", { class: "note" }, "The query sees the scene's files and the facts observed while a robot acts. It doesn't see changes made on this page."),
     made("p", { class: "tools" }, choose), text, made("p", { class: "tools" }, made("button", { type: "button", onclick: ask }, "ask"), made("small", {}, " Ctrl+Enter")), out);
 };

@@ -16,7 +16,7 @@ class Page {
     this.play = made("button", { type: "button", class: "play", onclick: () => this.toggle() }, "▶");
     this.range = made("input", { type: "range", min: 0, step: "any", "aria-label": "the clock", oninput: () => this.seek(Number(this.range.value)) });
     this.said = made("output", {});
-    const find = made("input", { type: "search", class: "find", placeholder: "a word", "aria-label": "show the lanes and steps with this word", oninput: () => { this.word = find.value.trim().toLowerCase(); this.lanes.draw(); this.steps(); } });
+    const find = made("input", { type: "search", class: "find", placeholder: "filter rows", "aria-label": "show the lanes and steps with this word", oninput: () => { this.word = find.value.trim().toLowerCase(); this.lanes.draw(); this.steps(); } });
     const zoom = (factor) => () => this.lanes.zoomed(this.lanes.zoom * factor);
     this.bar = made("div", { class: "clock" }, this.play, this.range,
       made("span", { class: "tools" }, find, made("button", { type: "button", "aria-label": "wider", title: "wider (Ctrl and the wheel)", onclick: zoom(1.6) }, "+"), made("button", { type: "button", "aria-label": "narrower", onclick: zoom(1 / 1.6) }, "−"),
