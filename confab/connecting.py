@@ -1,4 +1,4 @@
-"""External robots, connected to a scene."""
+"""Connection of external robots to a scene."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ FORM = "wanted INTERFACE:ADDRESS, e.g. pyrobosim:world.yaml or rover:http://loca
 
 
 def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[InterfaceWorld, RetryPolicy]:
-    """Return the world of a robot, and the retry policy that its interface states.
+    """Return the world of an external robot, and the retry policy that the robot's interface states.
 
     Parameters
     ----------
     scene : Scene
         The scene whose graph describes the interface.
     problem : Problem
-        The problem whose symbols are perceived.
+        The problem whose symbols the robot perceives.
     on : str
-        ``INTERFACE:ADDRESS``.
+        The robot as ``INTERFACE:ADDRESS``.
     seed : int
         Seed of a simulated robot.
 
     Raises
     ------
     KnowledgeError
-        The text isn't of that form, the scene has no such interface, a primitive has no action, or the robot can't be reached.
+        `on` has another form, the scene has no such interface, the interface has no action for a primitive, or no connection is
+        possible.
     """
     name, where = parts_of(on)
     interface = read_interface(scene.knowledge.store, scene.names.short, name)
@@ -53,7 +54,7 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
 
 
 def parts_of(on: str) -> tuple[str, str]:
-    """Return interface and address of ``INTERFACE:ADDRESS``; raise `KnowledgeError` if the text isn't of that form."""
+    """Return the two parts of ``INTERFACE:ADDRESS``; raise `KnowledgeError` if the text has another form."""
     name, colon, where = on.partition(":")
     if not colon or not name or not where:
         raise KnowledgeError(f"'{on}' names no robot; {FORM}")
@@ -61,7 +62,7 @@ def parts_of(on: str) -> tuple[str, str]:
 
 
 def reached(interface: Interface, where: str, seed: int) -> Transport:
-    """Return the connection to a robot; raise `KnowledgeError` if there is none."""
+    """Return the connection to a robot; raise `KnowledgeError` if the connection fails."""
     if interface.transport not in TRANSPORTS:
         known = ", ".join(TRANSPORTS)
         raise KnowledgeError(f"{interface.name} has the e:transport '{interface.transport}'; wanted one of {known}")

@@ -1,4 +1,4 @@
-"""Learning curves: the number of expansions of planning as a memory grows, episode by episode."""
+"""Learning curves: the number of states that planning expands, episode by episode, while a memory grows."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 KINDS = (".png", ".svg", ".pdf")
 MODES: dict[Mode, str] = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
-"""Time limit in seconds of a planning call; the picture leaves out calls that exceed it."""
+"""Time limit of a planning call in seconds. A call that exceeds the limit has no point in the picture."""
 MANY = 12
-"""Maximum number of episodes that are labelled with their names and counts."""
+"""Maximum number of episodes for which the picture shows names and counts."""
 
 
 def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, curve: Curve | None = None) -> Curve:
-    """Plan in scenes and learn from the plans for some rounds; return the curve of the planning effort.
+    """Plan in all scenes and learn from the plans, `rounds` times; return the learning curve.
 
     Examples
     --------
@@ -49,14 +49,18 @@ def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, c
 
 @dataclass
 class Curve:
-    """Expansions per episode and mode, with the memory before that episode and without memory; None where planning gave up."""
+    """A learning curve: expansions per mode and episode.
+
+    `with_memory` has the expansions with the memory before the episode, `without` has the expansions without memory. A value is
+    None if planning found no plan.
+    """
 
     scenes: list[str] = field(default_factory=list)
     with_memory: dict[Mode, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
     without: dict[Mode, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
 
     def measure(self, name: str, scene: Scene, memory: Memory) -> None:
-        """Add an episode: plan in a scene with the present memory and without memory."""
+        """Add an episode: plan in a scene with the memory and without memory, and count the expansions."""
         seen = self.scenes.index(name) if name in self.scenes else None
         self.scenes.append(name)
         for mode in MODES:
@@ -66,7 +70,7 @@ class Curve:
             self.without[mode].append(alone)
 
     def save(self, path: Path) -> Path:
-        """Draw the curves into a file; return its path."""
+        """Draw the curves into a file, and return the file's path."""
         from confab.picturing import save, words_as_they_are
 
         require_drawable(path)
@@ -74,7 +78,7 @@ class Curve:
             return save(self._figure(), path, dpi=120)
 
     def _repr_png_(self) -> bytes:
-        """Return the picture that a notebook shows."""
+        """Return the picture of the curves for a notebook."""
         from io import BytesIO
 
         from confab.picturing import words_as_they_are
@@ -124,7 +128,7 @@ def require_drawable(path: Path) -> None:
 
 
 def _expansions(scene: Scene, memory: Memory | None, mode: Mode) -> int | None:
-    """Return the number of expansions of planning, or None if it finds no plan in time."""
+    """Return the number of expansions of a planning call, or None if the call finds no plan within `SECONDS`."""
     try:
         outcome = scene.plan(memory=memory, mode=mode, time_limit=SECONDS, engine="none").outcome
     except (KnowledgeError, LimitError):

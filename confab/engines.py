@@ -1,8 +1,9 @@
-"""Planning a level with an external planner through unified-planning: export, plan, read back, order.
+"""Planning on one level by an external planner (an engine) through the library unified-planning.
 
-The result is a plan like those of Confab's own search. Each step directly follows the steps on which it depends. A run of steps
-with exactly the effect of a behaviour of a higher level becomes the refinement of that behaviour. Every plan of an engine must
-be accepted by `confab.planner.validation`.
+The level is exported to PDDL, and the engine's plan is read back. The result has the same form as a plan of Confab's own
+search. Each step is moved directly after the steps on which it depends. Consecutive steps with exactly the effect of a
+behaviour of a higher level become the refinement of that behaviour. Every plan of an engine is validated by
+`confab.planner.validation`.
 """
 
 from __future__ import annotations
@@ -35,15 +36,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
-"""Default limit of an engine in seconds."""
+"""Default time limit of a planning call by an engine in seconds."""
 IMPORTING = 1.0
-"""Seconds for importing unified-planning; with less time left, no engine is started."""
+"""Seconds that the import of unified-planning can take. With less time left, no engine is started."""
 READING = 0.93
-"""Share of the time after which an engine is stopped; the rest is for reading and checking its plan."""
+"""Share of the remaining time after which an engine is stopped. The rest of the time is for reading and validating the engine's
+plan."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines without support for numbers."""
 WITH_DEFINITIONS = {"up_fast_downward"}
-"""Packages of engines that support derived predicates; unified-planning itself doesn't read them."""
+"""Packages of engines that support derived predicates, which unified-planning doesn't support."""
 KNOWN = {
     "aries": "up-aries",
     "enhsp": "up-enhsp",
@@ -54,31 +56,32 @@ KNOWN = {
     "symk": "up-symk",
     "tamer": "up-tamer",
 }
-"""Packages that provide an engine, by the engine's name in unified-planning."""
+"""The package that provides each engine, by the engine's name in unified-planning."""
 Answer = tuple[str, str, list[str]]
-"""The engine's name, its status in the terms of unified-planning, and the steps of its plan as ``action object …``."""
+"""The name of an engine, the status of its result in unified-planning, and the steps of its plan as ``action object …``."""
 
 
 def plan_by_engine(
     problem: Problem, engine: str | None, level: int | None = None, seconds: float | None = None
 ) -> Outcome:
-    """Plan one level of a problem, the lowest if none is given, with an engine of unified-planning.
+    """Plan on one level of a problem with an engine of unified-planning.
 
     Parameters
     ----------
     problem : Problem
     engine : str, optional
-        Its name in unified-planning, e.g. ``fast-downward``; if left out, any installed engine that supports the problem.
+        The engine's name in unified-planning, e.g. ``fast-downward``; by default any installed engine that supports the
+        problem.
     level : int, optional
     seconds : float, optional
-        Time limit of the whole call; `ENGINE_SECONDS` if left out. A plan that the engine writes within the limit counts.
+        Time limit of the whole call; by default `ENGINE_SECONDS`. The engine may be stopped as soon as a plan file is complete.
 
     Raises
     ------
     KnowledgeError
-        There is no such engine or level, or the engine doesn't support the definitions or amounts of the problem.
+        The engine or the level doesn't exist, or the engine doesn't support derived predicates or amounts that the problem has.
     """
-    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:  # exporting and importing are slow, too
+    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:  # includes export and imports
         return _planned(problem, engine, level, deadline)
 
 
@@ -113,12 +116,12 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
 
 
 def unified(domain: str, problem: str) -> unified_planning.model.Problem:
-    """Return a PDDL domain and problem as unified-planning reads them.
+    """Return a PDDL domain and problem as a problem of unified-planning.
 
     Raises
     ------
     KnowledgeError
-        unified-planning isn't installed, or doesn't read them.
+        unified-planning isn't installed, or can't read the domain or the problem.
     """
     try:
         from unified_planning.io import PDDLReader
@@ -126,16 +129,16 @@ def unified(domain: str, problem: str) -> unified_planning.model.Problem:
         raise KnowledgeError("this needs unified-planning: pip install unified-planning") from None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it uses outdated names of pyparsing
+            warnings.simplefilter("ignore")  # unified-planning uses deprecated names of pyparsing
             return PDDLReader().parse_problem_string(domain, problem)
-    except Exception as error:  # of many kinds, for unsupported features
+    except Exception as error:  # unsupported features cause errors of many classes
         raise KnowledgeError(f"unified-planning can't read this level: {error}") from error
 
 
 def some_installed(problem: Problem) -> bool:
-    """Whether unified-planning and an engine for such a problem seem to be installed.
+    """Return whether unified-planning and an engine that supports a problem seem to be installed.
 
-    Only names are checked: importing the packages takes longer than most plans.
+    Only the names of the installed packages are read, since their import takes longer than most planning calls.
     """
     if find_spec("unified_planning") is None:
         return False
@@ -148,18 +151,18 @@ def some_installed(problem: Problem) -> bool:
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
-    """Return the initial rest values that only lower levels see: a plan has to restore them."""
+    """Return the initial rest values of symbols that the first level doesn't see; the plan must restore these values."""
     first = problem.domain.levels[0]
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
 
 def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
-    """Plan with unified-planning.
+    """Plan a PDDL problem with an engine of unified-planning.
 
     Raises
     ------
     KnowledgeError
-        unified-planning isn't installed, has no such engine, or has none for such a problem.
+        unified-planning isn't installed, the engine isn't installed, or no installed engine supports the problem.
     """
     try:
         from unified_planning.engines import PDDLPlanner
@@ -196,21 +199,26 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return unified-planning's answer for a level that it reads itself; runs in the process of `confab.reasoner.workers.call`."""
+    """Return the answer of unified-planning to a PDDL problem. The function runs in a process of `confab.reasoner.workers.call`."""
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException
     from unified_planning.io import PDDLReader
 
     environment = Environment()
-    environment.error_used_name, environment.credits_stream = False, None  # a type may be called as a predicate is
-    environments.GLOBAL_ENVIRONMENT = environment  # where its reader makes metrics
+    environment.error_used_name, environment.credits_stream = (
+        False,
+        None,
+    )  # a type and a predicate may have the same name
+    environments.GLOBAL_ENVIRONMENT = (
+        environment  # the reader of unified-planning makes metrics in the global environment
+    )
     factory = environment.factory
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             task = PDDLReader(environment).parse_problem_string(domain, problem)
-        except Exception as error:  # its reader's asserts and pyparsing's errors among them: ours goes on without it
+        except Exception as error:  # such as assertion errors of the reader, and errors of pyparsing
             said = " ".join(str(error).split())[:200]
             raise KnowledgeError(f"unified-planning can't read this level: {type(error).__name__}: {said}") from None
         if engine and not {"INT_FLUENTS", "REAL_FLUENTS"}.isdisjoint(
@@ -220,7 +228,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
-                planner.skip_checks = True  # some reject action costs although they accept them
+                planner.skip_checks = True  # some engines support action costs but declare that they don't
                 result = planner.solve(task, timeout=seconds)
                 name = engine or planner.name
         except UPException as error:
@@ -231,16 +239,15 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
 
 
 def _tell(engine: str, deadline: Deadline) -> None:
-    """Report the engine and its time limit."""
+    """Log the name of the engine and its time limit."""
     limit = "" if deadline.left is None else f", for up to {deadline.left:.3g} s (--time-limit)"
     log.warning("confab: the engine %s is asked for a plan%s; --engine none asks none", engine, limit)
 
 
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
-    """Give the files to an engine that reads PDDL itself; return its status and the steps.
+    """Run an engine that reads PDDL on the exported files; return its status and the steps of its plan.
 
-    unified-planning would first read and write them again, which takes minutes for large relations, and it doesn't support derived
-    predicates.
+    The files bypass unified-planning, whose reader takes minutes for large relations and doesn't support derived predicates.
     """
     from unified_planning.model import Problem as Nothing
 
@@ -262,6 +269,6 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         written = [file for file in Path(folder).iterdir() if re.fullmatch(r"plan(\.\d+)?", file.name)]
         for file in sorted(written, key=lambda file: file.stat().st_mtime_ns, reverse=True):
             text = file.read_text()
-            if code is not None or text.endswith("\n"):  # else it was being written
+            if code is not None or text.endswith("\n"):  # otherwise the engine was still writing the file
                 return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", text, re.MULTILINE)
         return "TIMEOUT" if code is None else planner._result_status(Nothing(), None, code, []).name, []

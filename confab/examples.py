@@ -1,4 +1,4 @@
-"""Examples for the help of every command; they run in an empty folder, one after another."""
+"""Examples in the help of each command. The examples of a command can be run in an empty folder, in their order."""
 
 from __future__ import annotations
 
@@ -92,5 +92,5 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 
 def examples(command: str) -> str:
-    """Return the text below the help of a command."""
+    """Return the examples of a command as text for the end of its help."""
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[command])

@@ -1,4 +1,4 @@
-"""Execution for users: interventions in the notation of the command line, and episodes as JSON."""
+"""Execution of a task in a scene, with interventions in the notation of the command line, and episodes as JSON."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ FORMS = (
 
 
 def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
-    """Return interventions from texts. A text may also name a file with one intervention per line (``#`` begins a comment).
+    """Return the interventions in texts. A text may also name a file with one intervention per line (``#`` begins a comment).
 
     Raises
     ------
@@ -73,7 +73,7 @@ def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Interven
 
 
 def parse_intervention(problem: Problem, text: str) -> Intervention:
-    """Return one intervention.
+    """Return the intervention that a text describes.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         if match[1] == "at":
             when["at"] = _seconds(match[2])
         else:
-            # The path of a step of the first level is its number.
+            # L1#2 names a step of the first level, whose path is (2,)
             named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")
             path = named.split(".") if named == match[2] else [named]
             when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, path))
@@ -123,14 +123,14 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
 
 
 def _position(text: str) -> int:
-    """Return a text as a position in a path; raise ValueError if the text is no position."""
+    """Return the position in a path that a text denotes; raise ValueError if the text isn't a natural number."""
     if not text.isdigit():
         raise ValueError(text)
     return int(text)
 
 
 def _seconds(text: str) -> float:
-    """Return a time on the world's clock; raise ValueError if there is no such time."""
+    """Return the time in seconds that a text denotes; raise ValueError if the time is negative or infinite."""
     seconds = float(text)
     if not 0 <= seconds < math.inf:
         raise ValueError(text)
@@ -155,7 +155,7 @@ def _known(problem: Problem, individual: str, text: str) -> str:
 
 
 def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
-    """Return an object that can be knocked over or pushed: one whose place is perceived."""
+    """Return the name of an object; raise `KnowledgeError` if no fact states the place of an object to be knocked or pushed."""
     _known(problem, individual, text)
     if verb != "remove" and not any(symbol in problem.initial for symbol in place_symbols(problem, individual)):
         raise KnowledgeError(f"'{text}': {individual} is no object that stands at a place which physics perceives")
@@ -163,7 +163,7 @@ def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
 
 
 def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Read ``OBJECT X Y``, centimetres away from the robot and to its left."""
+    """Return the push of an object from ``OBJECT X Y``, in centimetres away from the robot and to the robot's left."""
     try:
         individual, *by = words
         numbers = tuple(float(number) / 100 for number in by)
@@ -177,7 +177,7 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Read ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres: a box that no fact mentions."""
+    """Return the addition of a box at a place from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres; no fact mentions the box."""
     place, size = (*words, "6x6x12")[:2] if words else ("", "")
     try:
         numbers = tuple(float(number) / 100 for number in size.split("x"))
@@ -201,7 +201,7 @@ def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Read ``KIND NAME`` and facts about it without its name: ``LOCATION location5 BEVERAGE no_beverage``."""
+    """Return the addition of an individual from a class, a name, and facts without the name: ``Cup cup9 LOCATION location5``."""
     from confab.planner.acting.symbolic_world import with_individual
 
     if len(words) < 4 or len(words) % 2:
@@ -283,7 +283,7 @@ def episode_json(episode: Episode) -> EpisodeJson:
 
 
 def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
-    """Return a symbol's value and the time since which the symbol has had this value."""
+    """Return the value of a symbol, and the time at which the symbol got this value, as JSON data."""
     return {
         "seconds": round(seconds, 4),
         "situation": symbol.situation,
@@ -305,12 +305,12 @@ class Execution:
 
     @property
     def plan(self) -> Plan:
-        """The plan as it was executed."""
+        """The executed part of the plan."""
         return self.episode.done
 
     @property
     def reached(self) -> bool:
-        """Whether all goals were reached."""
+        """Whether the execution reached all goals."""
         return self.episode.status is End.REACHED
 
     def json(self) -> EpisodeJson:
@@ -318,7 +318,7 @@ class Execution:
         return episode_json(self.episode)
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return remarks on each step of `plan`, by its path: failures, surprises, and changes of the plan."""
+        """Return remarks on steps by the step's path: failures, unexpected values, and changes of the plan."""
         same = {step.path: (step.behavior, step.arguments) for step in self.plan.walk()}
         notes = {
             event.step.path: "✗ " + (event.code or "; ".join(str(s.symbol) for s in event.surprises))
@@ -349,16 +349,16 @@ class Execution:
         return text + (f"; didn't take place: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
-        """Return the partial order of the executed primitives, with an edge from each primitive to those that depend on it."""
+        """Return the partial order of the executed primitives; an edge leads to a primitive that depends on its predecessor."""
         from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
-        """Write the episode atomically and return the path.
+        """Write the episode into a file atomically, and return the path.
 
-        A file that ends in ``.json`` gets JSON, any other file Turtle (PROV-O).
+        The format is JSON if the file's name ends in ``.json``, otherwise Turtle (PROV-O).
         """
         from confab.reasoner.memory.episodes import save_episode
 
@@ -374,13 +374,13 @@ class Execution:
         return Path(path)
 
     def __rich__(self) -> PlanTree:
-        """Return the executed plan, for rich."""
+        """Return the executed plan as a tree for rich."""
         from confab.show import plan_tree
 
         return plan_tree(self.episode.done, self.summary(), self.notes())
 
     def __repr__(self) -> str:
-        """Return the summary."""
+        """Return the summary of the episode."""
         return self.summary()
 
     def report(self, path: str | Path) -> Path:
@@ -448,21 +448,21 @@ def carry_out(
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
-    """Return the problem of the whole scene, with the goals of a result.
+    """Return the problem of the whole scene with the given goals or, if `plan` is a result, with the goals of the result.
 
-    A plan that is made during execution may need an individual that the first plan didn't need.
+    The part of the scene that suffices for the first plan may not suffice for plans that are made during execution.
     """
     whole = getattr(plan, "in_whole_scene", None)
     return with_goals(scene.reading.problem, goals) if whole is None else whole().problem
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
-    """Return the planner for planning from scratch in a mode; None denotes the default planner.
+    """Return the planner of a mode for new plans during execution; None denotes the default planner.
 
     Raises
     ------
     KnowledgeError
-        There is no such mode.
+        The mode is unknown.
     """
     from confab.planner.solve import MODES
 
@@ -485,13 +485,13 @@ def execute(
     seed: int = 0,
     observer: Callable[[Event], None] | None = None,
     prepare: Callable[[PhysicsWorld], None] | None = None,
-    retry_policy: RetryPolicy = RetryPolicy(),  # noqa: B008 - frozen
+    retry_policy: RetryPolicy = RetryPolicy(),  # noqa: B008 - the default is immutable
     caution: Caution | None = None,
     perturb: bool = False,
     noise: float = 0.0,
     both_hands: bool = False,
 ) -> Execution:
-    """Carry a task out in a closed loop.
+    """Execute a task in a closed loop of action and observation.
 
     Parameters
     ----------
@@ -501,31 +501,33 @@ def execute(
     plan : Plan, optional
         The first plan.
     interventions : iterable of str or Intervention
-        Each like ``after=28 cup2 LOCATION location8``.
+        Texts like ``after=28 cup2 LOCATION location8``, or interventions.
     world : {'symbolic', 'pybullet'}, World, or str
-        A text like ``pyrobosim:world.yaml`` names an interface of the scene and where its robot is found.
+        The world that executes the task. A text like ``pyrobosim:world.yaml`` names an interface in the scene and the address
+        of a robot.
     planner : callable, optional
-        Function that plans from scratch; by default the fast planner.
+        The function that makes a new plan; by default the hierarchical planner.
     seed : int
         Seed of all random numbers in physics.
     observer : callable, optional
         Called with every event.
     prepare : callable, optional
-        Called with the PyBullet world before it begins, for instance to inject a fault.
+        Called with the PyBullet world before the execution, for instance to inject a fault.
     retry_policy : RetryPolicy
     caution : Caution, optional
-        Failures in earlier episodes.
+        Knowledge from failures in earlier episodes.
     perturb : bool
-        Vary poses, friction, masses and fill in PyBullet, by `seed`.
+        Vary poses, friction, masses and filled amounts in PyBullet at random, with `seed`.
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
-        In PyBullet: execute the plan with all hands at once, and the rest one hand after the other, without interventions.
+        In PyBullet, execute the plan with all hands at once, and steps that remain one after another. Interventions aren't
+        allowed.
 
     Raises
     ------
     KnowledgeError
-        An intervention has no known form, or can't take place; the scene has no geometry; there is no such world.
+        An intervention has an unknown form or is impossible in the world, the scene has no geometry, or the world is unknown.
     """
     texts = list(interventions)
     wanted = [i for i in texts if isinstance(i, Intervention)]
@@ -573,7 +575,7 @@ def execute(
 
 
 def _reach_of(scene: Known) -> str:
-    """Return the name of the scene's relation of reach facts; an empty string if it has none."""
+    """Return the name of the relation of the scene's reach facts; an empty text if the scene has no such relation."""
     from confab.reasoner.embodiment.reach import reach_relation
 
     try:
@@ -591,7 +593,7 @@ def _with_both_hands(
     observer: Callable[[Event], None] | None,
     caution: Caution | None,
 ) -> Episode:
-    """Execute a plan with all hands at once as far as possible, and the remaining steps in a closed loop."""
+    """Execute a plan with all hands at once until it ends or fails, and reach the goals that remain in a closed loop."""
     from confab.planner.acting.episode import ExecutedPrimitive, Failure
     from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together
@@ -628,6 +630,6 @@ def _with_both_hands(
 
 
 def _only(steps: Iterable[Step], paths: set[tuple[int, ...]]) -> tuple[Step, ...]:
-    """Return the steps, reduced to the primitives at the given paths and the steps above them."""
+    """Return the trees of steps, reduced to the primitives at the given paths and the steps above these primitives."""
     kept = [replace(step, steps=_only(step.steps, paths)) if step.steps else step for step in steps]
     return tuple(step for step in kept if step.steps or step.path in paths)

@@ -1,4 +1,4 @@
-"""Why memory prefers one behaviour to another: the rule, the episodes behind it, and the summands of cogency."""
+"""Explanation of a memory's preference for a behaviour: its rule, the episodes with the rule, and the summands of its cogency."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Why:
-    """One fact: its value for the chosen behaviour and for the alternative, and its weight in favour of the choice."""
+    """A fact with its values for the chosen behaviour and the alternative, and its weight in favour of the chosen behaviour."""
 
     fact: str
     chosen: str
@@ -42,9 +42,10 @@ class Why:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why `chosen` was preferred to `other`; weights are differences of ln odds, and `lead` is their sum.
+    """An explanation of the preference for the behaviour `chosen` over the behaviour `other`.
 
-    `rule` is the learned rule as a sentence, `behind` the episodes behind it, `note` a remark if memory has no advice.
+    Each of the `reasons` has a weight, which is a difference of ln odds. `lead` is the sum of the weights. `rule` is the
+    learned rule as a sentence, and `behind` names the episodes with the rule. `note` is a remark if memory has no advice.
     """
 
     chosen: str
@@ -88,7 +89,7 @@ class Explanation:
         return "\n".join([*lines, *([f"  ({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the weights for the choice (right) and against it (left), and save the picture if a file is given."""
+        """Draw the weights for (right) and against (left) the chosen behaviour as bars, and save the chart if a file is given."""
         from confab.picturing import save, words_as_they_are
 
         with words_as_they_are():
@@ -122,18 +123,18 @@ def explain(
     against: Ground | None = None,
     labels: Labels | None = None,
 ) -> Explanation:
-    """Explain one step of a plan.
+    """Explain by memory why a step of a plan is preferred to an alternative.
 
     Parameters
     ----------
     problem : Problem
     memory : Memory
     steps : sequence of behaviour and arguments
-        The plan's steps on one level, from the problem's initial state.
+        All steps of the plan on one level.
     number : int
-        The step to be explained.
+        The index in `steps` of the step to be explained.
     against : behaviour and arguments, optional
-        The alternative; if left out, the next advice of the rules in the same situation.
+        The alternative; by default the most cogent other behaviour that the rules advise in the same state.
     labels : Labels, optional
         The labels for the text.
 
@@ -189,7 +190,7 @@ def explain(
 
 
 def behind(memory: Memory, name: str) -> str:
-    """Return in words the counts of a rule (chosen, passed over, failed) and the episodes that they come from."""
+    """Return the counts of a rule (chosen, passed over, failed) and the numbers of episodes of each replica, as text."""
     tally = memory.experience.totals().get(name, {}).get(ITSELF, Tally())
     those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
     lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))
@@ -198,7 +199,7 @@ def behind(memory: Memory, name: str) -> str:
 
 
 def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:
-    """Return the most cogent instance of a rule."""
+    """Return the most cogent of several instances of rules; None if there is no instance."""
 
     def key(c: RuleInstance) -> float:
         facts, individual = reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles)
@@ -210,7 +211,7 @@ def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactRe
 def _differences(
     chosen: RuleInstance, other: RuleInstance, advisor: Advisor, reader: FactReader, say: Sayings
 ) -> tuple[Why, ...]:
-    """Return the summands in which two cogencies differ, the greatest first."""
+    """Return the differences between the summands of two cogencies, the greatest difference first."""
     facts: list[dict[str, tuple[Fact, float]]] = []
     for c in (chosen, other):
         factors = advisor.scorer.factors(c.rule, reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles))

@@ -1,4 +1,4 @@
-"""Facts that follow from definitions in a scene's initial state, written into the graph for queries that name them."""
+"""Derivation of the defined situation types (derived predicates) that a query names, in a scene's initial state."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Query for definitions. It is asked first, since a scene without definitions needn't be read to answer a query."""
+"""Query that asks whether a scene has definitions. A scene without definitions needn't be read as a problem before a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write the initial facts of the defined situation types in a query into the graph `DERIVED`."""
+    """Write the initial facts of each defined situation type that a query names into the named graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):
@@ -53,7 +53,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
 
 
 def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
-    """Yield the initial facts of some defined situation types."""
+    """Yield the symbols of given defined situation types that are true in the initial state."""
     if not situations:
         return
     table = Table(problem.domain.situations, problem.initial)

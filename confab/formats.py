@@ -1,4 +1,4 @@
-"""The forms of the JSON data that results return and commands print (docs/command-line.md, docs/execution.md)."""
+"""The types of the JSON data that results return and commands print (docs/command-line.md, docs/execution.md)."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ class _Step(TypedDict):
 
 
 class StepJson(_Step, total=False):
-    """A step with all steps below it; `rank` is given by the memory."""
+    """A step with its sub-steps, and in paper mode its cogency rank `rank`."""
 
     rank: float
 
 
 class ReasonJson(TypedDict):
-    """Why there is no plan, and the terms that the reason mentions."""
+    """The reason why there is no plan, and the terms that the reason mentions."""
 
     text: str
     terms: list[str]
 
 
 class CountsJson(TypedDict):
-    """The effort of the search on a level, in states."""
+    """The numbers of states that the search on a level generated, evaluated and expanded."""
 
     generated: int
     evaluated: int
@@ -39,14 +39,15 @@ class CountsJson(TypedDict):
 
 
 class BrokenJson(TypedDict):
-    """A violated condition of a level, and the path of its step."""
+    """A violated condition of a level, and the path of the step that violates it."""
 
     step: list[int]
     text: str
 
 
 LeftJson = TypedDict("LeftJson", {"level": int, "from": list[int], "to": list[int], "breaks": list[BrokenJson]})
-"""A level that the plan leaves between two paths, and the conditions of the level that it violates there."""
+"""A part of a plan, between two paths, that has no steps of a level. `breaks` has the conditions of this level that the part
+violates."""
 
 
 class CacheJson(TypedDict):
@@ -63,14 +64,14 @@ class _ScheduledStep(TypedDict):
 
 
 class ScheduledStepJson(_ScheduledStep, total=False):
-    """A step in time, in seconds; primitives have actors and slack."""
+    """A scheduled step, with times in seconds. Only primitives have actors and slack."""
 
     actors: list[str]
     slack: float
 
 
 class ScheduleJson(TypedDict):
-    """A plan in time, in seconds."""
+    """A scheduled plan, with times in seconds."""
 
     makespan: float
     serial: float
@@ -81,7 +82,7 @@ class ScheduleJson(TypedDict):
 
 
 class ForgoneJson(TypedDict):
-    """A soft goal that a plan leaves unmet; `price` is the additional cost of a plan that meets it, null if none was found."""
+    """A soft goal that a plan leaves unmet. `price` is the additional cost of a plan that meets the goal, or null if unknown."""
 
     goal: str
     weight: float
@@ -100,9 +101,9 @@ class _Outcome(TypedDict):
 
 
 class OutcomeJson(_Outcome, total=False):
-    """The result of planning: the steps and the length of a plan.
+    """The result of planning. A solved task has the steps and the length of a plan.
 
-    The result for an unsolvable task has a reason and, if available, a certificate.
+    An unsolved task has a reason. An unsolvable task may also have a certificate.
     """
 
     length: dict[str, int]
@@ -123,7 +124,7 @@ class ResultJson(OutcomeJson, total=False):
 
 
 class SurpriseJson(TypedDict):
-    """A symbol with an unexpected value."""
+    """A symbol with its expected value and the different observed value."""
 
     symbol: str
     expected: str | None
@@ -145,14 +146,14 @@ class EventJson(TypedDict):
 
 
 class InterventionJson(TypedDict):
-    """An intervention as it was written, and when it took place."""
+    """The text of an intervention, and the time at which the intervention took place."""
 
     text: str
     seconds: float
 
 
 class ReplanJson(TypedDict):
-    """A change of the plan."""
+    """A change of the plan during execution."""
 
     after: list[int]
     kind: str
@@ -175,7 +176,7 @@ class FailureJson(TypedDict):
 
 
 class DiscoveryJson(TypedDict):
-    """An individual that was discovered, and when."""
+    """An individual that the robot discovered, and the time of the discovery."""
 
     individual: str
     classes: list[str]
@@ -184,7 +185,7 @@ class DiscoveryJson(TypedDict):
 
 
 class SeenJson(TypedDict):
-    """A value of a symbol, with the time from which on the symbol had it; None if it could no longer be observed."""
+    """A value of a symbol, and the time at which the symbol got the value. The value is None if the symbol is unobservable."""
 
     seconds: float
     situation: str
@@ -193,7 +194,7 @@ class SeenJson(TypedDict):
 
 
 class EpisodeJson(TypedDict):
-    """The execution of a task."""
+    """The record of the execution of a task."""
 
     scene: str
     status: str
@@ -214,7 +215,7 @@ class EpisodeJson(TypedDict):
 
 
 class BecauseJson(TypedDict):
-    """Why a step is in a plan."""
+    """The reasons why a step is in a plan."""
 
     number: str
     path: list[int]
@@ -226,7 +227,7 @@ class BecauseJson(TypedDict):
 
 
 class WhyNotJson(TypedDict):
-    """Why an alternative isn't in the plan; `steps` is the plan with it."""
+    """The reasons why an alternative isn't in the plan. `steps` is the plan with the alternative."""
 
     asked: str
     answer: str
@@ -237,7 +238,7 @@ class WhyNotJson(TypedDict):
 
 
 class AccountJson(TypedDict):
-    """An explanation of a plan, or of why there is none."""
+    """An explanation of a plan, or the reason why there is no plan."""
 
     headline: str
     steps: list[BecauseJson]

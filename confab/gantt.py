@@ -1,4 +1,4 @@
-"""A schedule as a Gantt chart: a row per hand, a bar per primitive."""
+"""A schedule as a Gantt chart, with a row for each hand and a bar for each primitive."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 TALL, LINES = 21, 2.8
-"""Number of characters in a line of a bar's text, and number of lines per second of the bar's width."""
+"""Maximum number of characters in a line of a bar's text, and number of lines per second of a bar."""
 
 
 def save_gantt(
     slots: Sequence[Slot], path: str | Path, serial: float | None = None, labels: Labels | None = None
 ) -> Path:
-    """Draw a schedule with labelled bars, and optionally the serial duration, into a picture file; return its path."""
+    """Draw a schedule as a Gantt chart into a picture file, with the serial duration `serial` if given; return the path."""
     from confab.picturing import save, words_as_they_are
 
     with words_as_they_are():

@@ -1,4 +1,4 @@
-"""Stored runs: each is a folder with a record (``run.json``). A folder of runs can be listed, compared and shown on the page."""
+"""Stored runs of ``confab run`` as a list, a comparison or a page. Each run has a folder with a record ``run.json``."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from confab.page.schema import PageData
 
 RECORD = "run.json"
-"""The file that marks the folder of a run."""
+"""Name of the file with the record of a run."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A stored run: its folder's name, date, options, the state of memory, and the data of its page.
+    """A stored run: the name of its folder, its date, its options, the content of memory as text, and the data of its page.
 
     Examples
     --------
@@ -38,19 +38,19 @@ class Run:
     page: PageData
 
     def figures(self) -> dict[str, str]:
-        """Return the outcome of the run and its figures as texts, by name."""
+        """Return the verdict, the figures, the options and the memory of the run as texts, by name."""
         sign = {True: "✓ ", False: "✗ ", None: ""}[self.page.get("good")]
         figures = {"verdict": sign + self.page["status"]}
         figures |= {tile["name"]: tile["text"] for tile in self.page["tiles"]}
         return {**figures, **{name: _text(value) for name, value in self.how.items()}, "memory": self.memory}
 
     def steps(self) -> list[str]:
-        """Return the steps of the first level, in words."""
+        """Return the steps of the first level as sentences."""
         return [step["what"] for step in self.page["steps"] if "." not in step["id"]]
 
 
 def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str) -> Path:
-    """Write the record of a run, without the film, into its folder, and return its path."""
+    """Write the record of a run, without the film, into the run's folder, and return the path of the record."""
     shown = {key: value for key, value in page.items() if key != "film"}
     when = datetime.now().astimezone().isoformat(timespec="seconds")
     data = {"run": folder.resolve().name, "when": when, "how": dict(how), "memory": memory, "page": shown}
@@ -59,26 +59,26 @@ def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str)
 
 
 def new_folder(runs: Path) -> Path:
-    """Create the folder of the next run (001, or the last number plus one), and return its path."""
+    """Create a folder for the next run in `runs` (001, or the greatest number plus one), and return its path."""
     runs.mkdir(parents=True, exist_ok=True)
     last = max((int(one.name) for one in runs.iterdir() if one.name.isdecimal() and one.name.isascii()), default=0)
     while True:
         last += 1
         folder = runs / f"{last:03}"
         try:
-            folder.mkdir()  # fails if another process has created the folder meanwhile
+            folder.mkdir()  # fails if another process has just created the folder
         except FileExistsError:
             continue
         return folder
 
 
 def runs(folder: str | Path) -> list[Run]:
-    """Return the runs in a folder, in the order in which they were made.
+    """Return the runs in a folder in the order of their dates.
 
     Raises
     ------
     KnowledgeError
-        There is no such folder, it has no run, or a record can't be read.
+        The folder doesn't exist or contains no run, or a record can't be read.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -109,7 +109,7 @@ def _is_page(page: Mapping[str, object]) -> bool:
 
 
 def listed(those: Sequence[Run]) -> Table:
-    """Return the runs as a table: a row each, and a column for each figure."""
+    """Return a table with a row for each run and a column for each figure."""
     figures = [run.figures() for run in those]
     names = tuple(dict.fromkeys(name for one in figures for name in one))
     rows = tuple(
@@ -120,7 +120,7 @@ def listed(those: Sequence[Run]) -> Table:
 
 
 def compared(those: Sequence[Run], one: str, other: str) -> Table:
-    """Return the differences of two runs: a row for each figure, first-level step and goal that differs.
+    """Return a table of the differences between two runs in figures, first-level steps and final values of goals.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
 
 
 def _by_name(those: Sequence[Run], wanted: Sequence[str]) -> dict[str, Run]:
-    """Return the runs by name; raise `KnowledgeError` if a wanted run is missing."""
+    """Return all runs by name; raise `KnowledgeError` if a run of `wanted` is missing."""
     by_name = {run.name: run for run in those}
     for name in wanted:
         if name not in by_name:
@@ -157,7 +157,7 @@ def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
 
 
 def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) -> str:
-    """Return the page that shows and compares runs. It begins with the runs in `names`, or with the last one.
+    """Return the HTML page that shows and compares runs. The page first shows the runs in `names`, by default the last run.
 
     Raises
     ------

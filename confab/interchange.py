@@ -1,4 +1,4 @@
-"""Plans as JSON, the format that the command line writes and reads (docs/command-line.md)."""
+"""Conversion of plans to and from JSON, the format that the command line writes and reads (docs/command-line.md)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEEPEST = 50
 
 
 def step_json(step: Step) -> StepJson:
-    """Return a step with all below it as JSON data."""
+    """Return a step with its sub-steps as JSON data."""
     data: StepJson = {
         "path": list(step.path),
         "id": step.id,
@@ -36,7 +36,7 @@ def step_json(step: Step) -> StepJson:
 
 
 def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:
-    """Return the outcome of a planning call as JSON data; `seconds` has the times before the search."""
+    """Return the outcome of a planning call as JSON data. `seconds` has the durations of the stages before the search."""
     data: OutcomeJson = {
         "scene": scene,
         "status": outcome.status.value,
@@ -84,12 +84,12 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
 
 
 def read_plan(path: Path, problem: Problem) -> Plan:
-    """Read a plan from a JSON file: the output of `confab plan --json`, or any object with such ``steps``.
+    """Read a plan from a JSON file: the output of `confab plan --json`, or any object with ``steps`` of the same form.
 
     Raises
     ------
     KnowledgeError
-        The file isn't JSON of that form, or a step mentions terms that the scene doesn't have; the message has the position.
+        The file contains no such JSON, or a step mentions terms that the scene doesn't have. The message states the position.
     """
     data = _json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
@@ -107,7 +107,7 @@ def read_certificate(path: Path) -> Certificate:
     Raises
     ------
     KnowledgeError
-        The file isn't JSON of that form; the message says what was expected.
+        The file contains no such JSON. The message states the expected form.
     """
     data = _json(path, "certificate")
     try:
@@ -117,24 +117,24 @@ def read_certificate(path: Path) -> Certificate:
 
 
 def _json(path: Path, what: str) -> Any:
-    """Return the content of a JSON file that should be a plan or a certificate."""
+    """Return the content of a JSON file; `what` names the expected content (a plan or a certificate) in error messages."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
     except RecursionError as error:
         raise KnowledgeError(f"{path}: no {what}: brackets are nested too deeply") from error
-    except ValueError as error:  # of JSON, of UTF-8, and of numbers with thousands of digits
+    except ValueError as error:  # invalid JSON, invalid UTF-8, or a number with thousands of digits
         raise KnowledgeError(f"{path}: not JSON: {error}") from error
 
 
 def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
-    """Return a quantified behaviour written like ``B2_PICK right_hand cup1``.
+    """Return the quantified behaviour that a text like ``B2_PICK right_hand cup1`` denotes.
 
     Raises
     ------
     KnowledgeError
-        There is no such behaviour, or it doesn't take these arguments.
+        The behaviour doesn't exist or doesn't accept these arguments.
     """
     name, *arguments = text.split() or [""]
     behavior = problem.domain.behaviors.get(name)
@@ -145,7 +145,7 @@ def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
 
 
 def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, ...], where: str) -> None:
-    """Raise `KnowledgeError` if a behaviour doesn't accept some arguments; the message begins with `where`."""
+    """Raise `KnowledgeError` if a behaviour doesn't accept the arguments; the message begins with `where`."""
     if len(arguments) != len(behavior.parameters):
         raise KnowledgeError(
             f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}"
@@ -162,7 +162,7 @@ def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem
     Raises
     ------
     KnowledgeError
-        The data are no step, or mention terms that the scene doesn't have; the message has the position.
+        The data are no step, or mention terms that the scene doesn't have. The message states the position.
     """
     where = f"{path}: step {'.'.join(map(str, position))}"
     if not isinstance(data, dict) or not isinstance(data.get("behavior"), str):
