@@ -3,7 +3,6 @@
 import re
 import shlex
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ import pytest
 import confab
 from confab import ontology
 from confab.authoring import new_domain
+from confab.cli import main
 from confab.reaching import with_current_reach
 from confab.reasoner.graph.knowledge import load, text
 from confab.reasoner.names import local_name
@@ -24,8 +24,11 @@ BLOCK = re.compile(r'^```(turtle title=|console$)(?:"(add to )?([^"\n]+\.ttl)")?
 
 
 @pytest.mark.slow
-def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
+def test_the_authoring_guide_works_as_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     said = []
+    monkeypatch.chdir(tmp_path)
     for _, added, name, content in BLOCK.findall(AUTHORING.read_text("utf-8") + BODIES.read_text("utf-8")):
         if name:
             file = tmp_path / name
@@ -34,12 +37,12 @@ def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
         for line in content.splitlines():
             command, *arguments = shlex.split(line.removeprefix("$ "))
             assert command == "confab"
-            call = [sys.executable, "-c", "from confab.cli import main; main()", *arguments]
-            done = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path)
-            said.append(f"$ confab {' '.join(arguments)}\n{done.stdout}")
-            assert done.returncode == 0, done.stdout + done.stderr
+            with pytest.raises(SystemExit) as end:
+                main(arguments)
+            printed = capsys.readouterr()
+            said.append(f"$ confab {' '.join(arguments)}\n{printed.out}")
+            assert not end.value.code, said[-1] + printed.err
     story = "\n".join(said)
-    print(story)
     assert story.count("nothing is wrong") == 5
     assert story.count("verified: ") == 2
     assert "B3_TIP left_hand" in story
