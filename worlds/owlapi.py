@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from confab import ontology
+from confab.reasoner.validation.hermit import QUICK_START
 
 
 def jars() -> list[str]:
@@ -58,19 +59,29 @@ def ontology_iri(file: Path) -> str:
     return next((quad.subject.value for quad in quads if quad.object == kind), str(file))
 
 
-def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
-    """Load a file with its imports, save the file in Turtle, and return its violations of OWL 2 DL."""
+def managing(mapped: dict[str, Path]) -> Any:
+    """Return a manager of ontologies that reads each import once."""
     from java.io import File
     from org.semanticweb.owlapi.apibinding import OWLManager
-    from org.semanticweb.owlapi.formats import TurtleDocumentFormat
     from org.semanticweb.owlapi.model import IRI
-    from org.semanticweb.owlapi.profiles import OWL2DLProfile
     from org.semanticweb.owlapi.util import SimpleIRIMapper
 
     manager: Any = OWLManager.createOWLOntologyManager()
     for iri, place in mapped.items():
         manager.getIRIMappers().add(SimpleIRIMapper(IRI.create(iri), IRI.create(File(str(place)))))
-    loaded = manager.loadOntologyFromOntologyDocument(File(str(file)))
+    return manager
+
+
+def round_trip(file: Path, target: Path, manager: Any) -> list[str]:
+    """Load a file with its imports, save the file in Turtle, and return its violations of OWL 2 DL."""
+    from java.io import File
+    from org.semanticweb.owlapi.formats import TurtleDocumentFormat
+    from org.semanticweb.owlapi.model import IRI
+    from org.semanticweb.owlapi.profiles import OWL2DLProfile
+
+    loaded = manager.getOntology(IRI.create(ontology_iri(file))) or manager.loadOntologyFromOntologyDocument(
+        File(str(file))
+    )
     manager.saveOntology(loaded, TurtleDocumentFormat(), IRI.create(File(str(target / file.name))))
     return [str(violation) for violation in OWL2DLProfile().checkOntology(loaded).getViolations()]
 
@@ -81,9 +92,12 @@ def main() -> None:
     import jpype.imports
 
     target, *files = map(Path, sys.argv[1:])
-    jpype.startJVM(jvm(), "-Xss16m", "-Dorg.slf4j.simpleLogger.defaultLogLevel=off", classpath=jars())
+    silent = "-Dorg.slf4j.simpleLogger.defaultLogLevel=off"
+    jpype.startJVM(jvm(), "-Xss16m", *QUICK_START, silent, classpath=jars())
     mapped = places(files)
-    print(json.dumps({str(file): round_trip(file, target, mapped) for file in files}))
+    shared = managing(mapped)
+    managers = {file: shared if mapped[ontology_iri(file)] == file else managing(mapped) for file in files}
+    print(json.dumps({str(file): round_trip(file, target, manager) for file, manager in managers.items()}))
 
 
 if __name__ == "__main__":

@@ -26,6 +26,8 @@ pytestmark = [
 ]
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+WORKED_OUT = {"defined.ttl": domain(), "priced.ttl": DELIVERY}
+"""Texts with definitions of every kind, and SWRL; and with a price that is worked out."""
 
 
 def canonical(file: Path) -> ox.Dataset:
@@ -61,27 +63,38 @@ def everything(folder: Path) -> list[Path]:
     return sorted([*shipped, *EXAMPLES.rglob("*.ttl"), *folder.glob("*.ttl")])
 
 
-def test_every_file_comes_back_equal_and_inside_owl_2_dl(tmp_path: Path) -> None:
-    files = everything(tmp_path)
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Path, dict[str, list[str]]]:
+    """Return all files, the folder to which the OWL API saved them, and their violations; one JVM does it all."""
+    folder = tmp_path_factory.mktemp("sent")
+    files = everything(folder)
+    for name, text in WORKED_OUT.items():
+        (folder / name).write_text(text)
+    back = folder / "back"
+    return files, back, through_the_owl_api([*files, *(folder / name for name in WORKED_OUT)], back)
+
+
+def test_every_file_comes_back_equal_and_inside_owl_2_dl(sent: tuple[list[Path], Path, dict[str, list[str]]]) -> None:
+    files, back, violations = sent
     names = [file.name for file in files]
     assert {"soma-alignment.ttl", "cereal-serving.reach.ttl", "ferry.ttl", "watering-bodies.ttl", "memory.ttl"} <= {
         *names
     }
-    assert len(names) == len({*names}), "two files of one name would overwrite each other"
-    violations = through_the_owl_api(files, tmp_path / "back")
+    assert len({*names, *WORKED_OUT}) == len(names) + len(WORKED_OUT), "files of one name would overwrite each other"
     assert {file: found for file, found in violations.items() if found} == {}
-    assert [file.name for file in files if canonical(file) != canonical(tmp_path / "back" / file.name)] == []
+    assert [file.name for file in files if canonical(file) != canonical(back / file.name)] == []
 
 
-@pytest.mark.parametrize("written", [domain(), DELIVERY], ids=["definitions of every kind, SWRL too", "a price"])
-def test_what_is_defined_or_worked_out_is_inside_owl_2_dl_and_loses_nothing(tmp_path: Path, written: str) -> None:
+@pytest.mark.parametrize("name", WORKED_OUT)
+def test_what_is_defined_or_worked_out_is_inside_owl_2_dl_and_loses_nothing(
+    sent: tuple[list[Path], Path, dict[str, list[str]]], name: str
+) -> None:
     """The OWL API declares what the text leaves undeclared; each triple that was written comes back."""
-    file = tmp_path / "world.ttl"
-    file.write_text(written)
-    assert through_the_owl_api([file], tmp_path / "back") == {str(file): []}
+    _, back, violations = sent
+    file = back.parent / name
+    assert violations[str(file)] == []
     before, after = (
-        Counter(re.sub(r"_:\w+", "_:", str(quad)) for quad in canonical(one))
-        for one in (file, tmp_path / "back" / file.name)
+        Counter(re.sub(r"_:\w+", "_:", str(quad)) for quad in canonical(one)) for one in (file, back / name)
     )
     assert before - after == Counter()
 
