@@ -344,7 +344,7 @@ def interventions(draw: st.DrawFn) -> Intervention:
     return draw(st.sampled_from(choices))
 
 
-@settings(max_examples=120)
+@settings(max_examples=40)
 @given(st.lists(interventions(), min_size=1, max_size=2))
 def test_whatever_people_do_the_goal_is_reached_or_proved_impossible(happenings: list[Intervention]) -> None:
     episode = acted(*happenings)

@@ -143,11 +143,11 @@ def test_always_of_pddl_becomes_a_constraint_and_other_trajectory_constraints_ar
 
 def test_random_worlds_with_constraints_are_answered_as_exhaustive_search_answers(tmp_path: Path) -> None:
     judged = 0
-    for seed in range(430_000_000, 430_000_060):
+    for seed in range(430_000_000, 430_000_020):
         world = mixed(seed, constrained=1.0)
         judged += bool(world.problem.domain.constraints)
         assert not Judge(world, tmp_path).judged().complaints, seed
-    assert judged > 30
+    assert judged > 10
 
 
 @pytest.mark.parametrize("seed", [410_000_044, 410_000_270, 410_000_048])

@@ -142,7 +142,7 @@ def grounded(problem: Problem, apart: bool = False) -> Task | Reason | None:
 
 
 @given(problems(), flags)
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem, apart: bool) -> None:
     task = grounded(problem, apart)
     if task is None:

@@ -15,6 +15,7 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.reading.problem import read
 from confab.scene import load
 from tests.planner.naive import complete, results
+from worlds import judging
 from worlds.interpreter import Interpreter
 from worlds.judging import Judge
 from worlds.mixed import drawn, mixed
@@ -73,11 +74,14 @@ def test_a_step_that_is_left_out_is_noticed() -> None:
     assert faults(Interpreter(world.problem), nonsense)
 
 
-@pytest.mark.parametrize("first", [5_050, 5_130, 5_210])
-def test_nothing_is_wrong_in_small_worlds_of_everything(first: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", [5_050, 5_100, 5_150, 5_200])
+def test_nothing_is_wrong_in_small_worlds_of_everything(
+    first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every mode, the checker, exports and execution agree with all that can happen."""
+    monkeypatch.setattr(judging, "SECONDS", 1.0)
     wrong = []
-    for seed in range(first, first + 80):
+    for seed in range(first, first + 50):
         world, meant = drawn(seed)
         its = Judge(world, tmp_path, meant=meant).judged()
         wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
