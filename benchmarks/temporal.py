@@ -48,7 +48,8 @@ def main() -> None:
     if "problems" in kinds:
         _problems()
     if "worlds" in kinds:
-        _worlds()
+        _worlds(limited=False)
+        _worlds(limited=True)
 
 
 def _problems() -> None:
@@ -151,12 +152,12 @@ def validated(domain: Path, problem: Path, lines: Sequence[str]) -> bool:
     return bool(TimeTriggeredPlanValidator().validate(read, plan))
 
 
-def _worlds() -> None:
-    """Print how plans of random timed worlds compare with an exhaustive search over schedules."""
+def _worlds(limited: bool) -> None:
+    """Print how plans of random timed worlds, with deadlines and windows if `limited`, compare with an exhaustive search."""
     from confab.planner.plan import Limits, Status
     from confab.planner.solve import Request, solve
     from confab.planner.timed import concurrent
-    from confab.planner.timed.call import in_time
+    from confab.planner.timed.call import best_in_time
     from confab.reasoner.timing import only_during
     from worlds.timed import least_makespan, problem_of, rejected, timed_world
 
@@ -166,14 +167,14 @@ def _worlds() -> None:
     wrong: list[int] = []
     began = process_time()
     for seed in range(first, first + count):
-        world = timed_world(seed)
+        world = timed_world(seed, limited=limited)
         problem, plan, timed = problem_of(world), None, None
         said = "none"
         if not only_during(problem):
             outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
             plan, said = outcome.plan, outcome.status.value
         if plan is not None:
-            timed = in_time(problem, plan, 1.0).plan
+            timed = best_in_time(problem, plan, 1.0).plan
         elif said in ("none", Status.UNSOLVABLE.value):
             timed = concurrent.plan(problem, Limits(seconds=20.0))[1].plan
         try:
@@ -189,11 +190,10 @@ def _worlds() -> None:
             found["solved"] += 1
             found["of these with the least makespan"] += timed.makespan == least
             ratios.append(float(timed.makespan / least))
-    print(
-        f"\nRandom timed worlds {first} to {first + count - 1}, {process_time() - began:.0f} CPU s:\n\n| | |\n|---|---|"
-    )
-    for what, many in sorted(found.items()):
-        print(f"| {what} | {many} |")
+    what = "Random timed worlds with deadlines and windows" if limited else "Random timed worlds"
+    print(f"\n{what} {first} to {first + count - 1}, {process_time() - began:.0f} CPU s:\n\n| | |\n|---|---|")
+    for name, many in sorted(found.items()):
+        print(f"| {name} | {many} |")
     print(f"| makespan ÷ least, mean | {sum(ratios) / max(len(ratios), 1):.3f} |")
     print(f"| wrong: no plan, or shorter than the least | {len(wrong)} {wrong[:5] or ''} |")
 

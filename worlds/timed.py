@@ -30,6 +30,7 @@ from confab.reasoner.symbols import (
     SituationType,
     Span,
     Symbol,
+    Times,
     Timing,
     ValueCondition,
     ValueEffect,
@@ -59,13 +60,34 @@ class Action:
 
 @dataclass(frozen=True)
 class TimedWorld:
-    """Actions, initial facts, goal literals, and literals that may never hold together."""
+    """Actions, initial facts, goal literals, literals that may never hold together, deadlines of goals, and windows of actors.
+
+    A deadline is a goal's fact and a time; a window is an actor and two times.
+    """
 
     facts: int
     actions: tuple[Action, ...]
     initial: frozenset[int]
     goal: tuple[Literal, ...]
     never: tuple[Literal, ...] = ()
+    deadlines: tuple[tuple[int, int], ...] = ()
+    windows: tuple[tuple[int, int, int], ...] = ()
+
+    @property
+    def last(self) -> int:
+        """The latest of all times that the world states."""
+        return max([0, *(by for _, by in self.deadlines), *(high for *_, high in self.windows)])
+
+    def kept(self, facts: frozenset[int], time: int) -> bool:
+        """Return whether the goals whose deadlines are over hold."""
+        over = {fact for fact, by in self.deadlines if by <= time}
+        return all((fact in facts) is value for fact, value in self.goal if fact in over)
+
+    def available(self, action: Action, time: int) -> bool:
+        """Return whether the actor of an action is available from a time to the action's end."""
+        return all(
+            low <= time and time + action.seconds <= high for actor, low, high in self.windows if actor == action.actor
+        )
 
 
 Running = tuple[int, int]
@@ -73,14 +95,22 @@ Running = tuple[int, int]
 State = tuple[frozenset[int], frozenset[Running]]
 
 
-def timed_world(seed: int, constrained: bool = False) -> TimedWorld:
-    """Return the random world of a seed; with `constrained`, two literals may never hold together."""
+def timed_world(seed: int, constrained: bool = False, limited: bool = False) -> TimedWorld:
+    """Return the random world of a seed.
+
+    With `constrained`, two literals may never hold together; with `limited`, it has deadlines and windows.
+    """
     rng = Random(seed)
     while True:
         world = _drawn(rng)
         if constrained:
             never = tuple((fact, rng.random() < 0.6) for fact in sorted(rng.sample(range(world.facts), 2)))
             world = replace(world, never=never)
+        if limited:
+            deadlines = tuple((fact, rng.randint(2, 9)) for fact, _ in world.goal if rng.random() < 0.7)
+            lows = [(actor, rng.randint(0, 3)) for actor in (0, 1) if rng.random() < 0.6]
+            windows = tuple((actor, low, low + rng.randint(2, 8)) for actor, low in lows)
+            world = replace(world, deadlines=deadlines, windows=windows)
         if not _hold(world.initial, list(world.goal)) and not _violated(world, world.initial):
             return world
 
@@ -128,34 +158,34 @@ def least_makespan(world: TimedWorld) -> int | None:
         The world has too many states.
     """
     start: State = world.initial, frozenset()
-    seen: set[State] = set()
+    seen: set[tuple[State, int]] = set()
     queue: list[tuple[int, int, State]] = [(0, 0, start)]
     number = 0
     while queue:
         time, _, state = heapq.heappop(queue)
-        if state in seen:
+        if (state, min(time, world.last)) in seen:
             continue
-        seen.add(state)
+        seen.add((state, min(time, world.last)))
         if len(seen) > MOST_STATES:
             raise MemoryError
         facts, running = state
         if not running and all((fact in facts) is value for fact, value in world.goal):
             return time
-        for seconds, after in _next(world, state):
-            if after not in seen:
+        for seconds, after in _next(world, state, time):
+            if (after, min(time + seconds, world.last)) not in seen:
                 number += 1
                 heapq.heappush(queue, (time + seconds, number, after))
     return None
 
 
-def _next(world: TimedWorld, state: State) -> Iterator[tuple[int, State]]:
+def _next(world: TimedWorld, state: State, time: int) -> Iterator[tuple[int, State]]:
     """Yield each successor with the seconds until it holds: an action begins (0), or a second passes (1)."""
     facts, running = state
     for number in range(len(world.actions)):
         after = _begun(world, facts, running, number)
-        if after is not None:
+        if after is not None and world.available(world.actions[number], time):
             yield 0, after
-    if running:
+    if (running or time < world.last) and world.kept(facts, time):
         for order in permutations(sorted(number for number, left in running if left == 1)):
             passed = _passed(world, facts, running, order)
             if passed is not None:
@@ -254,13 +284,19 @@ def problem_of(world: TimedWorld) -> Problem:
         situations["E"] = SituationType("E", (), "E", quantity=Quantity(whole=True, most=Fraction(0)))
         domain = compiled(replace(domain, aggregates={"E": count}, constraints={"E": Constraint("F0")}), classes)
         initial = with_totals(domain, classes, {}, initial)
-    return Problem("urn:timed", domain, classes, {}, initial, goal)
+    deadlines = {Symbol(f"F{fact}", ("it",)): Fraction(by) for fact, by in world.deadlines}
+    windows = {f"actor{actor}": ((Fraction(low), Fraction(high)),) for actor, low, high in world.windows}
+    times = Times(deadlines, windows) if deadlines or windows else None
+    return Problem("urn:timed", domain, classes, {}, initial, goal, times=times)
 
 
 def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
     """Return the fault of a timed plan in a world, found without the code of the plan checkers; None if the plan is valid."""
     if any(slot.begin.denominator != 1 for slot in timed.slots):
         return "a step begins between two seconds"
+    for slot in timed.slots:
+        if not world.available(world.actions[int(slot.step.behavior[1:])], int(slot.begin)):
+            return f"the actor of {slot.step} isn't available at {slot.begin} s"
     facts, running = world.initial, frozenset[Running]()
     begins: dict[int, list[int]] = {}
     for slot in timed.slots:
@@ -276,8 +312,9 @@ def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
             }
         ways = list(permutations(begins.get(second, [])))
         states = {end for state in states for way in ways if (end := _all_begun(world, state, way)) is not None}
+        states = {state for state in states if world.kept(state[0], second)}
         if not states:
-            return f"what begins or ends at {second} s can't"
+            return f"what begins or ends at {second} s can't, or a deadline is missed"
     if not any(not running and _hold(facts, list(world.goal)) for facts, running in states):
         return "the goal isn't reached"
     return None

@@ -14,7 +14,7 @@ from confab.planner.plan import Plan, Reason, Step, renumbered
 from confab.planner.timed.activities import Activity, InapplicableError, StepEvent, activities, in_sequence
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
-from confab.planner.timed.order import Order, order_of
+from confab.planner.timed.order import BEGIN, END, Order, order_of
 from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
     CandidateSchedule,
@@ -139,15 +139,10 @@ def _late(problem: Problem, order: Order, network: Network, choices: Choices, fo
         windows = times.windows.get(individual)
         if windows is not None and not any(low <= begin and (high is None or end <= high) for low, high in windows):
             missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
-    if i in order.latest and end > order.latest[i]:
-        goals = [
-            str(Fact(symbol, problem.goal[symbol]))
-            for symbol, by in times.deadlines.items()
-            if by == order.latest[i]
-            and symbol in problem.goal
-            and (symbol.situation, symbol.arguments) in _changed(one)
-        ]
-        missed.append(f"{' and '.join(goals)} is a goal by {float(order.latest[i]):g} s")
+    for symbol, by in times.deadlines.items():
+        late = any((end if which == END else begin) > order.latest.get((i, which), end) for which in (BEGIN, END))
+        if late and symbol in problem.goal and (symbol.situation, symbol.arguments) in _changed(one):
+            missed.append(f"{Fact(symbol, problem.goal[symbol])} is a goal by {float(by):g} s")
     if one.at is not None and begin > one.at:
         missed.append(f"it happens at {float(one.at):g} s")
     return Reason(

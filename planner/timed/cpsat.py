@@ -106,8 +106,8 @@ class _Model:
         for i, (at, latest, windows) in enumerate(zip(network.at, network.latest, network.windows, strict=True)):
             if at is not None:
                 model.Add(self.begins[i] == at)
-            if latest is not None:
-                model.Add(self.begins[i] + self.lasts[i] <= latest)
+            for which, by in latest:
+                model.Add(self.begins[i] + (self.lasts[i] if which == END else 0) <= by)
             inside = [model.NewBoolVar("") for _ in windows] if windows is not ALWAYS else []
             if windows is not ALWAYS:
                 model.AddExactlyOne(inside)

@@ -35,8 +35,10 @@ class Network:
         come first, in the order of the activities.)
     durations : list of int
     edges : tuple of Edge
-    at, latest : list of int or None
-        The fixed begin of an activity; the latest end.
+    at : list of int or None
+        The fixed begin of an activity.
+    latest : list of tuple of pairs
+        The latest times of the begin (0) or the end (1) of each activity.
     windows : list of tuple of pairs
         Windows of each activity, sorted by their begins; without windows it can never take place.
     """
@@ -47,7 +49,7 @@ class Network:
     durations: list[int]
     edges: tuple[Edge, ...]
     at: list[int | None]
-    latest: list[int | None]
+    latest: list[tuple[tuple[int, int], ...]]
     windows: list[tuple[Window, ...]]
 
     def least(self, i: int, high: int, j: int, low: int) -> int:
@@ -75,8 +77,8 @@ class Begins:
     begins, waits_for : list of int
     makespan : int
     late : int
-        The sum of the times by which activities are late: they end after their latest end or their last window, or begin after
-        their fixed time. If it is 0, the begins satisfy the network.
+        The sum of the times by which activities are late: after a latest time, their last window, or their fixed time. If it is 0,
+        the begins satisfy the network.
     latest : int
         The activity that is late by the most; -1 if none is late.
     """
@@ -111,7 +113,7 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
         [whole(one.duration) for one in order.activities],
         order.edges,
         [None if time is None else whole(time) for time in fixed],
-        [whole(order.latest[i]) if i in order.latest else None for i in count],
+        [tuple((w, whole(order.latest[i, w])) for w in (BEGIN, END) if (i, w) in order.latest) for i in count],
         [
             tuple((whole(low), None if high is None else whole(high)) for low, high in order.windows[i])
             if i in order.windows
@@ -161,9 +163,9 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
     """Return the time by which an activity is late."""
-    late, end, latest, fixed = 0, begin + lasts, network.latest[i], network.at[i]
-    if latest is not None:
-        late = max(end - latest, 0)
+    late, end, fixed = 0, begin + lasts, network.at[i]
+    for which, by in network.latest[i]:
+        late = max(late, (end if which == END else begin) - by)
     if fixed is not None:
         late = max(late, begin - fixed)
     windows = network.windows[i]

@@ -58,8 +58,8 @@ class Order:
     activities : tuple of Activity
     edges : tuple of Edge
     resources : tuple of Resource
-    latest : mapping of activity to seconds
-        The latest end.
+    latest : mapping of (activity, begin or end) to seconds
+        The latest time of an event that achieves a goal with a deadline.
     windows : mapping of activity to pairs of seconds
         The time windows: begin and end lie within one of them.
     """
@@ -67,7 +67,7 @@ class Order:
     activities: tuple[Activity, ...]
     edges: tuple[Edge, ...]
     resources: tuple[Resource, ...]
-    latest: Mapping[int, Fraction] = field(default_factory=dict)
+    latest: Mapping[tuple[int, int], Fraction] = field(default_factory=dict)
     windows: Mapping[int, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
 
 
@@ -274,13 +274,16 @@ def _touching(
                 yield one.activity, one.high, other.activity, other.low
 
 
-def _latest(problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]) -> dict[int, Fraction]:
-    """Return the latest ends of the activities that change goals with a deadline last."""
-    found: dict[int, Fraction] = {}
+def _latest(
+    problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]
+) -> dict[tuple[int, int], Fraction]:
+    """Return the latest times of the events that change goals with a deadline last."""
+    found: dict[tuple[int, int], Fraction] = {}
     for symbol, seconds in times.deadlines.items():
-        its = [r for r in records.get((symbol.situation, symbol.arguments), ()) if r.written is not None]
-        if symbol in problem.goal and its:
-            found[its[-1].activity] = min(seconds, found.get(its[-1].activity, seconds))
+        its = records.get((symbol.situation, symbol.arguments), ())
+        changing = [(r.activity, r.high) for r in its if r.written is not None and r.written[0] != r.written[1]]
+        if symbol in problem.goal and changing:
+            found[changing[-1]] = min(seconds, found.get(changing[-1], seconds))
     return found
 
 

@@ -239,7 +239,7 @@ def least(order: Order, network: Network, choices: Choices) -> int:
     edges = network.edges
     if lasts != network.durations:  # a shorter activity could begin later and still end in order
         edges = tuple(edge for edge in edges if edge[3] == BEGIN)
-    free = replace(network, edges=edges, tick=network.separation, latest=[None] * len(lasts))
+    free = replace(network, edges=edges, tick=network.separation, latest=[()] * len(lasts))
     chain = earliest(free, (), lasts)
     bound = chain.makespan if chain is not None else 0
     groups: dict[tuple[int, ...], list[TurnId]] = {}

@@ -1,13 +1,13 @@
 """Who does what: the goals are achieved again one after another, in another order and by other actors, for a better schedule.
 
-crew      the chosen individual for each class of actors, and the individuals with windows that are avoided; steps towards a goal
-          name no others. The empty crew allows all.
+crew      the chosen individual for each class of actors, and barred steps; steps towards a goal name no other actors. The empty
+          crew allows all.
 task      a goal with its crew
 stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
 
 A first sequence of tasks is built greedily: each goal is given to the crew that achieves it first. Then the crew or position of
-one task is changed at a time, preferably of a task on the critical path. The work is bounded by numbers of stretches, so the
-result is the same on every machine unless the time is over.
+one task is changed at a time, or one of its steps is barred, preferably on the critical path. The work is bounded by numbers of
+stretches and changes, so the result is the same on every machine unless the time is over.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, Facts, validate
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import Behavior, EqualityCondition, Problem, Symbol
+from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol
 from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64
@@ -46,6 +46,10 @@ BARREN = 150
 """Maximum number of changes that are tried without a better schedule."""
 MOST_KNOWN = 4
 """Maximum number of known steps that are tried for a stretch."""
+MOST_COMPILED = 200
+"""Maximum number of crews for which behaviours are compiled; then no more steps are barred."""
+PREFERRED = 0.8
+"""Share of the changes that concern a task on the critical path."""
 EXPANSIONS = 500
 """Maximum number of expansions for a stretch."""
 
@@ -55,10 +59,10 @@ Task: TypeAlias = "tuple[Symbol, Crew]"
 
 @dataclass(frozen=True)
 class Crew:
-    """The chosen individual for each class of actors, and the individuals that are avoided."""
+    """The chosen individual for each class of actors, and the barred steps, each a behaviour with its arguments."""
 
     chosen: tuple[tuple[str, str], ...] = ()
-    avoided: tuple[str, ...] = ()
+    barred: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,8 @@ class _Sequence:
     """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
     end: Fraction
     """The end of the last stretch."""
-    critical: list[int]
-    """The tasks on the critical path, or on the path to the activity that is latest."""
+    critical: list[tuple[int, Step]]
+    """The steps on the critical path, or on the path to the activity that is latest, each with the number of its task."""
 
 
 def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> Plan | None:
@@ -95,8 +99,6 @@ def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> 
         Whether the search continues after a schedule has been found that keeps all windows and deadlines.
     """
     search = _Search(problem, plan, until, shorten)
-    if len(search.crews) * len(search.goals) < 2:
-        return None
     with suppress(LimitError):
         search.run()
     best = search.best
@@ -115,12 +117,9 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
     )
     classes = {kind: problem.classes.get(kind, ()) for kind in kinds}
     several = {kind: its for kind, its in classes.items() if len(its) > 1}
-    windows = (problem.times.windows if problem.times else {}).keys()
-    acting = {one for its in classes.values() for one in its}
-    avoidable = [(), *((one,) for one in sorted(windows - acting))]
-    choices = [(), *(tuple(zip(several, its, strict=True)) for its in product(*several.values()) if several)]
-    for avoided, chosen in product(avoidable, choices):
-        yield Crew(chosen, avoided)
+    yield Crew()
+    for its in product(*several.values()) if several else ():
+        yield Crew(tuple(zip(several, its, strict=True)))
 
 
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
@@ -133,18 +132,18 @@ def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) 
 
 
 def with_crew(problem: Problem, crew: Crew) -> Problem:
-    """Return a problem whose behaviours ask for the individuals of a crew."""
+    """Return a problem in which only the steps of a crew are possible."""
     lowest, resting, chosen = problem.domain.levels[-1], default_actors(problem), dict(crew.chosen)
 
     def asked(behavior: Behavior) -> Behavior:
         acting = _actor_terms(problem, behavior, resting) if behavior.level == lowest else tuple(behavior.kinds)
         own = [EqualityCondition(t, chosen[k]) for t in acting if (k := behavior.kinds[t]) in chosen]
-        others = [
-            EqualityCondition(term, one, negated=True)
-            for one in crew.avoided
-            for term, kind in behavior.kinds.items()
-            if one in problem.members(kind)
-        ]
+        barred = tuple(
+            tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=True))
+            for name, arguments in crew.barred
+            if name == behavior.name
+        )
+        others = [AnyOf(barred, negated=True)] if barred else []
         return replace(behavior, preconditions=(*behavior.preconditions, *own, *others))
 
     behaviors = {name: asked(behavior) for name, behavior in problem.domain.behaviors.items()}
@@ -199,7 +198,7 @@ class _Search:
             return
         random, barren = Random(0), 0
         for _ in range(MOST_CHANGES):
-            if barren >= BARREN or not (self.shorten or now.cost[0]):
+            if barren >= BARREN or not now.critical or not (self.shorten or now.cost[0]):
                 break
             other = self.built(self.changed(now, random), now)
             barren += 1
@@ -230,15 +229,22 @@ class _Search:
         return now
 
     def changed(self, now: _Sequence, random: Random) -> list[Task]:
-        """Return the tasks of a sequence with a change: another crew for one, exchanged crews of two, or another position."""
+        """Return the tasks of a sequence with a change.
+
+        One task gets another crew, two exchange their crews, a step of one is barred, or one gets another position.
+        """
         tasks = list(now.tasks)
-        i = random.choice(now.critical) if now.critical and random.random() < 0.8 else random.randrange(len(tasks))
-        j = random.randrange(len(tasks))
-        kind = random.randrange(3)
+        i, step = random.choice(now.critical)
+        i = i if random.random() < PREFERRED else random.randrange(len(tasks))
+        j, kind = random.randrange(len(tasks)), random.randrange(4)
+        goal, crew = tasks[i]
         if kind == 0 and len(self.crews) > 1:
-            tasks[i] = tasks[i][0], random.choice([crew for crew in self.crews if crew != tasks[i][1]])
-        elif kind == 1 and tasks[i][1] != tasks[j][1]:
-            tasks[i], tasks[j] = (tasks[i][0], tasks[j][1]), (tasks[j][0], tasks[i][1])
+            tasks[i] = goal, random.choice([one for one in self.crews if one != crew])
+        elif kind == 1 and crew != tasks[j][1]:
+            tasks[i], tasks[j] = (goal, tasks[j][1]), (tasks[j][0], crew)
+        elif kind == 2 and len(self.compiled) < MOST_COMPILED:
+            barred = tuple(sorted({*crew.barred, (step.behavior, step.arguments)}))
+            tasks[i] = goal, replace(crew, barred=barred)
         else:
             tasks.insert(j, tasks.pop(i))
         return tasks
@@ -324,15 +330,17 @@ class _Search:
         begins = earliest(network, turn_edges(order, own))
         if begins is None:
             return None
+        if not steps:
+            return _Sequence(tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), [])
         of = [k for k, one in enumerate(stretches) for _ in Plan(one.steps).primitives]
         ends = [begin + lasts for begin, lasts in zip(begins.begins, network.durations, strict=True)]
-        critical, at = dict[int, None](), begins.latest
-        if at < 0 and of:
+        critical, at = list[tuple[int, Step]](), begins.latest
+        if at < 0:
             at = max(range(len(of)), key=ends.__getitem__)
         passed = set[int]()
         while at >= 0 and at not in passed:
             passed.add(at)
-            critical[of[at]] = None
+            critical.append((of[at], steps[at]))
             at = begins.waits_for[at]
         work: dict[str, Fraction] = defaultdict(Fraction)
         for one in order.activities:
@@ -341,5 +349,5 @@ class _Search:
         late, makespan = (cost * network.unit for cost in begins.cost)
         end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
         return _Sequence(
-            tasks, stretches, (late, makespan, sum((its**2 for its in work.values()), Fraction(0))), end, list(critical)
+            tasks, stretches, (late, makespan, sum((its**2 for its in work.values()), Fraction(0))), end, critical
         )

@@ -111,7 +111,8 @@ class _Clock:
         self.pieces: dict[str, Pieces] = {}
         self.made: dict[int, dict[Cell, str]] = {}
         self.last: dict[Cell, int] = {}
-        self.since: dict[Cell, Fraction] = {}  # time of the last change of a cell
+        self.since: dict[Cell, Fraction] = {}  # time at which a cell was set last
+        self.changed: dict[Cell, Fraction] = {}  # time at which a cell got another value last
         self.asked: dict[
             Cell, Fraction
         ] = {}  # time of the last read of a cell by another step than the one that changes it
@@ -218,6 +219,8 @@ class _Clock:
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
         """Set the value of a cell."""
+        if Facts.value(self.facts, *cell) != value:
+            self.changed[cell] = time
         self.facts.put(*cell, value)
         self.made[one.number][cell] = value
         self.last[cell] = one.number
@@ -262,7 +265,7 @@ class _Clock:
             if not meets(got, wanted):
                 yield Fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
             latest = self.times.deadlines.get(symbol)
-            since = self.since.get((symbol.situation, symbol.arguments), Fraction(0))
+            since = self.changed.get((symbol.situation, symbol.arguments), Fraction(0))
             if latest is not None and since > latest:
                 yield Fault((), f"the goal {symbol} = {wanted} is reached at {since} s; it has to be by {latest} s")
         if self.sequence is not None:

@@ -12,7 +12,7 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
-from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
@@ -20,7 +20,7 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, Symbol, Times
 from confab.reasoner.timing import only_during
-from worlds.timed import TimedWorld, least_makespan, problem_of, rejected, timed_world
+from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
 
 @cache
@@ -87,7 +87,7 @@ def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
     if not only_during(problem):
         outcome = solve(Request(problem, limits=Limits(seconds=5.0)))
         if outcome.status is not Status.UNSOLVABLE:
-            return outcome, None if outcome.plan is None else in_time(problem, outcome.plan, 0.2)
+            return outcome, None if outcome.plan is None else best_in_time(problem, outcome.plan, shorten=False)
     return concurrent.plan(problem, Limits(seconds=5.0))
 
 
@@ -113,6 +113,17 @@ def test_plans_of_random_timed_worlds_are_plans_and_not_shorter_than_the_shortes
 def test_schedules_of_random_timed_worlds_keep_constraints_at_every_time() -> None:
     found = {seed: said for seed in range(8_000, 8_080) if (said := wrong(timed_world(seed, constrained=True)))}
     assert found == {}
+
+
+def test_plans_of_random_worlds_with_windows_and_deadlines_keep_them() -> None:
+    assert {seed: told for seed in range(9_000, 9_080) if (told := wrong(timed_world(seed, limited=True)))} == {}
+
+
+def test_a_deadline_bounds_the_begin_of_a_step_that_achieves_its_goal_at_the_start() -> None:
+    world = TimedWorld(1, (Action(4, 0, (), (("start", (0, True)),)),), frozenset(), ((0, True),), (), ((0, 1),))
+    _, timed = planned(problem_of(world))
+    assert timed is not None
+    assert timed.plan is not None
 
 
 def test_a_plan_that_leaves_a_level_keeps_its_stretches_in_time(tmp_path: Path) -> None:
