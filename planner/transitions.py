@@ -24,6 +24,7 @@ from confab.planner.amount_transitions import amount, change, comparison, settle
 from confab.planner.generated import code, identifier, key_written, tuple_written, written
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.language import DomainError, needs, nothing_determines
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -211,6 +212,7 @@ class PythonWriter:
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
     ) -> list[str]:
         """Return the conditions as expressions, in an order that binds each variable before its use; `bound` grows."""
+        check("compiling conditions")
         return [self.expression(ready, bound, kinds, where) for ready in in_binding_order(conditions, bound, where)]
 
     def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:

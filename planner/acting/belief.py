@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Surprise
 from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
-from confab.planner.hierarchical.planner import compiled
+from confab.planner.hierarchical.planner import Compiled, compiled
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
@@ -50,7 +51,11 @@ class Belief:
 
     def __post_init__(self) -> None:
         self.certain, self.unobstructed = self.problem, self.problem.domain
-        self.using = compiled(self.problem)
+
+    @cached_property
+    def using(self) -> Compiled:
+        """The compiled domain; compiled when it is first needed, so that the time limit of an episode applies."""
+        return compiled(self.problem)
 
     @property
     def state(self) -> dict[Symbol, str]:
