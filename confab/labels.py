@@ -28,19 +28,19 @@ NAMED = re.compile(
 )
 """A symbol with a value, a symbol before a colon, or words that may contain facts."""
 AT_ONCE = 400
-"""Maximum number of labels in one query."""
+"""Maximum number of terms in one query for labels."""
 
 
 @dataclass(frozen=True)
 class Labels:
-    """Labels of terms: `words` by name, `verbs` by situation type (the label of its value property)."""
+    """Labels of terms by name (`words`), and labels of value properties by situation type (`verbs`)."""
 
     words: Mapping[str, str]
     verbs: Mapping[str, str]
     domain: Domain
 
     def name(self, name: str) -> str:
-        """Return the label of a term, or its name if it has none."""
+        """Return the label of a term; a term without a label keeps its name."""
         return self.words.get(name, name.lstrip("?"))
 
     def fact(self, fact: Fact) -> str:
@@ -66,7 +66,7 @@ class Labels:
         return denied(_joined(words)) if boolean and fact.value == FALSE else _joined(words)
 
     def sentence(self, text: str) -> str:
-        """Return a text in which facts and individuals by name are replaced by sentences and labels.
+        """Return a text with its facts replaced by sentences, and its names of individuals replaced by labels.
 
         >>> import confab
         >>> scene = confab.load("beverage-serving")
@@ -76,7 +76,7 @@ class Labels:
         return NAMED.sub(self._replaced, text)
 
     def _replaced(self, found: re.Match[str]) -> str:
-        """Return the replacement of a symbol with its value, of a symbol before a colon, or of words."""
+        """Return the replacement of a match of `NAMED`."""
         situations = self.domain.situations
         *arguments, situation = (found["symbol"] or f"{found['about']}, {found['of']}").split(", ")
         if found["words"] is None:
@@ -100,13 +100,13 @@ class Labels:
         return " ".join(said)
 
     def placed(self, name: str) -> str:
-        """Return the label of an individual as a noun: "the place in the box" if the label is "in the box"."""
+        """Return the label of an individual as a noun: the label "in the box" becomes "the place in the box"."""
         label = self.name(name)
         first, *more = label.split(" ")
         return f"the place {label}" if first in PLACING and more and more[-1] not in WAYS | {"of"} else label
 
     def about(self, symbol: Symbol) -> str:
-        """Return the beginning of a sentence about a symbol, without the value: "cup 1 is at"."""
+        """Return the beginning of a sentence about a symbol, without the symbol's value: "cup 1 is at"."""
         names = [self.name(name) for name in symbol.arguments]
         verb = self.verbs.get(symbol.situation)
         if verb is None or not names:
@@ -125,7 +125,7 @@ class Labels:
         return self.behavior(behavior, terms)
 
     def behavior(self, behavior: Behavior, terms: Mapping[str, str]) -> str:
-        """Return a behaviour as a sentence, with individuals in the place of some of its roles."""
+        """Return a behaviour as a sentence, with `terms` (individuals, for example) in place of some of its roles."""
         label = self.words.get(behavior.name)
         if label is None:
             return " ".join((behavior.name, *(self.name(terms.get(p.name, p.name)) for p in behavior.parameters)))
@@ -137,7 +137,7 @@ class Labels:
         for mark, pattern in zip(marks, mentioned.values(), strict=True):
             label = pattern.sub(rf"\g<1>{mark}", label, count=1)
         for mark, name in marks.items():
-            if name.split(" ")[0] in PLACING:  # "put letter in the box", not "put letter to in the box"
+            if name.split(" ")[0] in PLACING:  # "put letter in the box" instead of "put letter to in the box"
                 label = re.sub(rf"\b(?:{'|'.join(PLACING)}) {mark}", mark, label)
             label = label.replace(mark, name)
         rest = dict.fromkeys(self.name(terms[role]) for role in roles if role in terms and role not in mentioned)
@@ -146,11 +146,11 @@ class Labels:
 
 PLACING = {"at", "in", "on", "under", "to"}
 WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind", "beside"}
-"""Prepositions, which are also names of roles: in "move onto block" the role `onto` is the block."""
+"""Prepositions that may name roles: in "move onto block", the role `onto` is the block."""
 
 
 def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
-    """Return a pattern of the words in a label that denote a role, or None; for a role named "onto", the words after "onto"."""
+    """Return a pattern of the words for a role in a label, or None; a role named "onto" is denoted by the words after "onto"."""
     name = role.lstrip("?")
     if name.lower() in WAYS:
         others = "|".join(re.escape(term.lstrip("?")) for term in terms)
@@ -161,7 +161,7 @@ def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | N
 
 
 def _chosen(verb: str, value: str) -> str:
-    """Return the label of a property, reduced to one value if the label lists the values.
+    """Return the label of a property; if the label lists the possible values, only the given value remains.
 
     >>> _chosen("is tied up or loose", "loose"), _chosen("is clean or dirty", "clean"), _chosen("is at", "cup 1")
     ('is loose', 'is clean', 'is at')
@@ -171,7 +171,7 @@ def _chosen(verb: str, value: str) -> str:
 
 
 def _joined(parts: Sequence[str]) -> str:
-    """Return the parts of a sentence joined, without repeated words and without two prepositions in a row.
+    """Join the parts of a sentence without repeated words and without two successive prepositions.
 
     >>> _joined(["left hand", "hand is at", "cup 1"]), _joined(["cup 1", "is at", "in a hand"])
     ('left hand is at cup 1', 'cup 1 is in a hand')
@@ -194,10 +194,10 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
     ----------
     knowledge : KnowledgeGraph
     names : Names
-        Lead to the IRIs.
+        The IRIs of the names.
     problem : Problem
     others : iterable of str
-        Names that the problem doesn't have: of furniture, for instance.
+        Further names with labels that are not in the problem, for instance of furniture.
     """
     domain = problem.domain
     spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
@@ -213,7 +213,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of some IRIs; English labels are preferred, then labels without a language."""
+    """Return the labels of IRIs. An English label is preferred to a label without a language, and this label to all others."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

@@ -1,4 +1,4 @@
-"""Learned experience as sentences with labels: rules, orders, methods, kinds of goals, and facts of cogency."""
+"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and the facts that cogency counts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from confab.reasoner.symbols import (
 )
 
 MOST_SAID = 6
-"""Maximum number of conditions in the sentence of a rule; further conditions are only counted."""
+"""Maximum number of conditions in the sentence about a rule. The sentence states the number of further conditions."""
 ASKED = (
     (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
     (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),
@@ -32,7 +32,7 @@ ASKED = (
 
 
 class Sayings:
-    """Writes learned experience as sentences; without labels, in the ontology's names.
+    """Writer of sentences about learned experience, which uses labels if available and otherwise the ontology's names.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Sayings:
         return self.fact(what) if isinstance(what, Fact) else self.name(str(what))
 
     def fact(self, fact: Fact) -> str:
-        """Return a fact about roles."""
+        """Return a fact about roles as a sentence."""
         terms = {t: self.name(t) for t in (*fact.symbol.arguments, fact.value)}
         put = Fact(Symbol(fact.symbol.situation, tuple(terms[a] for a in fact.symbol.arguments)), terms[fact.value])
         if fact.value in ("true", "false"):
@@ -69,7 +69,7 @@ class Sayings:
         return self.labels.fact(put)
 
     def step(self, behavior: str, terms: Sequence[str]) -> str:
-        """Return a behaviour with roles or individuals."""
+        """Return a behaviour with its arguments (roles or individuals) as a sentence."""
         known = self.labels.domain.behaviors.get(behavior)
         if known is None or len(known.parameters) != len(terms):
             return " ".join((self.labels.name(behavior), *map(self.name, terms)))
@@ -77,7 +77,7 @@ class Sayings:
         return self.labels.behavior(known, put)
 
     def goal(self, rule: Rule) -> str:
-        """Return the goal of a rule."""
+        """Return the goal of a rule as a sentence."""
         if rule.goal.value in (MORE, LESS):
             who = " ".join(map(self.name, rule.goal.arguments))
             return f"{self.name(rule.goal.situation)} of {who} becomes {rule.goal.value}"
@@ -93,7 +93,7 @@ class Sayings:
         return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)}"
 
     def said(self, one: Said) -> str:
-        """Return any learned item as a sentence."""
+        """Return a learned rule, order of goals, method or kind of goal as a sentence."""
         match one:
             case Rule():
                 return self.rule(one)
@@ -108,7 +108,7 @@ class Sayings:
         raise TypeError(one)
 
     def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:
-        """Return a fact of cogency as a sentence, with individuals for roles."""
+        """Return a fact that cogency counts as a sentence, with its roles replaced by individuals."""
         asks, answer = fact
 
         def put(word: str) -> str:

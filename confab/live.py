@@ -1,4 +1,4 @@
-"""The live view of an episode: plan, current step, expectation against observation, interventions and changes of plan."""
+"""A live view of an execution: plan, current step, unexpected observations, interventions and changes of the plan."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 Observer = Callable[[Event], None]
 LOG = 6
-"""Number of recent events that are shown."""
+"""Maximum number of recent events that the view shows."""
 
 
 @dataclass(repr=False)
 class View:
-    """The view of the last event and of earlier ones."""
+    """A view that shows the plan at the last event and a log of recent events."""
 
     event: Event | None = None
     log: list[str] = field(default_factory=list)
@@ -40,7 +40,7 @@ class View:
             self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return the state of each step: done, or in progress."""
+        """Return marks for finished steps and for the primitive in progress, by the step's path."""
         if self.event is None:
             return {}
         notes = {step.path: "✓" for step in self.event.plan.walk() if _is_done(step, self.event)}
@@ -49,11 +49,11 @@ class View:
         return notes
 
     def __repr__(self) -> str:
-        """Return the state of the episode in one line."""
+        """Return the state of the execution in one line."""
         return "; ".join((self.headline(), *self.log[-1:]))
 
     def headline(self) -> str:
-        """Return the current step in one line."""
+        """Return the number of finished primitives and the current step in one line."""
         if self.event is None:
             return "planning"
         primitives = self.event.plan.primitives
@@ -61,7 +61,7 @@ class View:
         return f"{done} of {len(primitives)} primitives" + (f": {self.event.step}" if self.event.step else "")
 
     def __rich__(self) -> Group:
-        """Return the plan from the current step on, and the last happenings."""
+        """Return the current step with its sub-steps, the later steps, and the recent events."""
         from rich.console import Group
         from rich.text import Text
 
@@ -89,9 +89,10 @@ class View:
 
 @contextmanager
 def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
-    """Show an episode during its execution, in a terminal or a notebook; show nothing if the output goes to neither.
+    """Yield an observer that shows an execution in a notebook or, if stderr is a terminal, there.
 
-    `other` is another observer.
+    The observer also notifies the observer `other`. Without `watch`, or if there is nowhere to show the execution, the context
+    manager yields `other`.
     """
     if watch and _in_notebook():
         with in_notebook() as observer:
@@ -104,7 +105,7 @@ def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Obs
 
 
 def both(one: Observer | None, other: Observer) -> Observer:
-    """Return an observer that notifies two others."""
+    """Return an observer that passes each event to two other observers."""
 
     def observer(event: Event) -> None:
         if one is not None:
@@ -116,7 +117,7 @@ def both(one: Observer | None, other: Observer) -> Observer:
 
 @contextmanager
 def in_terminal(console: Any = None) -> Iterator[Observer]:
-    """Show an episode on a rich console, stderr if none is given."""
+    """Yield an observer that shows an execution on a rich console, by default stderr."""
     from rich.console import Console
     from rich.live import Live
 
@@ -132,7 +133,7 @@ def in_terminal(console: Any = None) -> Iterator[Observer]:
 
 @contextmanager
 def in_notebook() -> Iterator[Observer]:
-    """Show an episode in the output of a notebook's cell."""
+    """Yield an observer that shows an execution in the output of a notebook's cell."""
     from IPython.display import display
 
     view = View()
@@ -150,7 +151,7 @@ def _is_done(step: Any, event: Event) -> bool:
 
 
 def _in_notebook() -> bool:
-    """Whether this runs in a notebook's kernel."""
+    """Return whether the process is the kernel of a notebook."""
     shell = sys.modules.get("IPython")
     running = shell.get_ipython() if shell is not None else None
     return running is not None and hasattr(running, "kernel")

@@ -1,7 +1,7 @@
-"""The memory as Python and the command line use it: load, learn, save, merge, show.
+"""The class `Memory` for users of Python and the command line: load, learn, save, merge, show.
 
-One file holds both kinds of experience: rules with counts, which lead the default planner (`confab.reasoner.memory.experience`),
-and the paper's links between facts and quantified behaviours, which the paper's mode reads (`confab.reasoner.memory.links`).
+A memory file holds two kinds of experience. Rules with counts guide the default planner (`confab.reasoner.memory.experience`).
+The paper's links between facts and quantified behaviours guide the paper's mode (`confab.reasoner.memory.links`).
 """
 
 from __future__ import annotations
@@ -49,31 +49,32 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of links. A plan that would exceed it isn't learned for the paper's mode, which plans small scenes only."""
+"""Maximum number of the paper's links in a memory. If a plan would add more links, it is learned for the default planner only."""
 SHOWN = 3
-"""Maximum number of preferences of a method that are listed."""
+"""Maximum number of preferences that are listed for a method."""
 
 
 @right_names("a memory", "confab.hints", "MEMORY", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
 @dataclass
 class Memory:
-    """A confabulation memory.
+    """A confabulation memory: experience from planning and execution.
 
     Attributes
     ----------
     links : Links
-        The paper's p(situated object instance | quantified behaviour); read from a file on first access.
+        The paper's probabilities p(situated object instance | quantified behaviour), which are read from the file on first
+        access.
     names : Names
-        Leads short names to IRIs.
+        The IRIs of short names.
     scene : str
         IRI of the scene that the memory file imports.
     experience : Experience
-        Rules, orders of goals and methods, with counts of choices, rejections and failures.
+        Rules, orders of goals and methods, with the numbers of times that each was chosen, passed over and failed.
     trusted : set of replica
-        Replicas whose experience may lead; by default the replica of this memory. With experience of others, planning is
-        strict.
+        Replicas (writers of memories) whose experience may guide the search. The replica of this memory is always trusted. If
+        the memory has experience of an untrusted replica, planning uses the mode ``strict``.
     labels : function, optional
-        Labels of the scene's terms, looked up when a text needs them.
+        A function that returns the labels of the scene's terms. It is called when a text needs labels.
     """
 
     linked: Links | Callable[[], Links]
@@ -85,7 +86,7 @@ class Memory:
 
     @property
     def links(self) -> Links:
-        """The paper's links."""
+        """The paper's links between facts and quantified behaviours."""
         if not isinstance(self.linked, Links):
             self.linked = self.linked()
         return self.linked
@@ -110,16 +111,16 @@ class Memory:
         source : str or Path
             File, or URL of an endpoint.
         scene : Scene, optional
-            Its short names are used for the memory's terms.
+            The scene whose short names are used for the terms of the memory.
         trust : bool
-            Whether the experience of every replica may lead, and not only that of the replica that writes this file.
+            Whether the experience of every replica is trusted.
         lines : Lines, optional
-            The file's, if it was read already (`confab.reasoner.memory.links_file.memory_lines`).
+            The lines of the file, if the caller has read them with `confab.reasoner.memory.links_file.memory_lines`.
 
         Raises
         ------
         KnowledgeError
-            The memory is missing, broken or newer than this program; the message states the remedy.
+            The memory is missing, invalid, or in a newer format than this version reads. The message states the remedy.
         """
         url = endpoint(source)
         if url is not None:
@@ -140,20 +141,20 @@ class Memory:
         return found
 
     def learn(self, scene: Known, plan: AnyPlan, failed: tuple[int, ...] | None = None) -> None:
-        """Learn from a plan that was carried out from the scene's initial situation.
+        """Learn from a plan that was executed from the scene's initial state.
 
         Parameters
         ----------
         scene : Scene
         plan : Plan, Result, Execution or file
-            The lesson of an execution is the same as that of `live`.
+            An executed plan. For an execution, the method `live` is called.
         failed : path of a step, optional
-            The step that failed; the steps before it succeeded, the steps after it weren't tried.
+            The step that failed, if any. The steps before it succeeded, and the steps after it were not executed.
 
         Raises
         ------
         KnowledgeError
-            The plan isn't applicable in that situation; the memory is unchanged.
+            The plan isn't applicable in the initial state. The memory is unchanged.
         """
         from confab.planner.acting.episode import Episode
         from confab.planner.experience.lessons import live
@@ -161,7 +162,7 @@ class Memory:
         if isinstance(episode := getattr(plan, "episode", None), Episode):
             self.live(scene.problem, episode)
             return
-        planned = getattr(plan, "problem", scene.problem)  # in which a result's plan was made
+        planned = getattr(plan, "problem", scene.problem)  # the plan of a result was made for the result's goal
         problem = replace(scene.problem, goal=planned.goal)
         plan = plan_of(plan, problem)
         try:
@@ -172,18 +173,18 @@ class Memory:
         self.links = links
 
     def teach(self, scene: Known, plan: AnyPlan) -> None:
-        """Learn from solutions of a scene with its goals in several orders: see `confab.planner.experience.lessons`.
+        """Learn from solutions of a scene for several orders of its goals (`confab.planner.experience.lessons`).
 
         Parameters
         ----------
         scene : Scene
         plan : Plan, Result or file
-            The plan that solved it.
+            A plan that solves the scene's task.
 
         Raises
         ------
         KnowledgeError
-            The plan isn't applicable in the scene's situation; the memory is unchanged.
+            The plan isn't applicable in the scene's initial state. The memory is unchanged.
         """
         from confab.planner.experience.lessons import teach
 
@@ -196,12 +197,12 @@ class Memory:
         self.links = links
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
-        """Return the paper's links after learning a plan; they are unchanged if there would be too many."""
+        """Return the paper's links with those of a plan added; return them unchanged if the sum exceeds `MOST_LINKS`."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 
     def merge(self, other: Memory | str | Path, trust: bool = False) -> None:
-        """Add the counts of another memory or its file; with `trust`, they may lead. The paper's links can't be merged."""
+        """Add the counts of another memory, but not its links. With `trust`, the replicas of the other memory are trusted."""
         if not isinstance(other, Memory):
             other = Memory.load(other)
         self.experience.merge(other.experience)
@@ -209,7 +210,7 @@ class Memory:
             self.trusted.update(other.experience.episodes)
 
     def trust(self, replicas: Iterable[str]) -> None:
-        """Let the experience of other replicas lead, like that of this memory.
+        """Let the experience of other replicas in this memory guide the search.
 
         Raises
         ------
@@ -223,7 +224,7 @@ class Memory:
             self.trusted.add(replica)
 
     def live(self, problem: Problem, episode: Episode) -> None:
-        """Learn from an execution: its steps, if there were no interventions, and the behaviours that failed.
+        """Learn from an execution: all steps if there was no intervention and no failure, and otherwise the behaviours that failed.
 
         Parameters
         ----------
@@ -236,19 +237,20 @@ class Memory:
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
         failures = list(failed_steps(problem, episode))
         whole = not episode.interventions and not episode.failures
-        with suppress(LearningError):  # the executed steps aren't applicable in the initial observation
+        with suppress(LearningError):  # raised if the executed steps aren't applicable in the first observed state
             if whole or failures:
                 live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
 
     def save(self, target: str | Path) -> Path:
-        """Write the memory as Turtle atomically, and return the path. An endpoint gets only the counters of this replica.
+        """Write the memory into a Turtle file or to a SPARQL endpoint, and return the target.
 
-        A file is read back before it replaces the old one.
+        A file is written atomically. The new file is read back before it replaces the old file. An endpoint receives only the
+        counts of this memory's replica.
 
         Raises
         ------
         KnowledgeError
-            The written file differs from this memory; the old file stays.
+            The content of the new file differs from this memory. The old file is unchanged.
         OSError
             The file can't be written.
         """
@@ -263,7 +265,7 @@ class Memory:
         return Path(target)
 
     def _check_written(self, file: Path) -> None:
-        """Raise `KnowledgeError` unless a file has the content of this memory."""
+        """Raise `KnowledgeError` if the content of a file differs from this memory."""
         found = memory_lines(file)
         read, links = parse(found, "what was written", self.names), load_links(file, self.names, found)
         if read != self.experience or len(links) != len(self.links):
@@ -273,14 +275,14 @@ class Memory:
 
     @property
     def advisor(self) -> Advisor:
-        """The memory in the form that the default planner takes."""
+        """The memory in the form that the default planner uses."""
         from confab.planner.experience.advice import Memory as Advisor
 
         mine = {self.experience.replica, *self.trusted}
         return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
 
     def table(self, most: int | None = None) -> Table:
-        """Return the paper's links, the most probable first."""
+        """Return a table of the paper's links, the most probable links first."""
         rows = [
             (f"{behavior} {' '.join(arguments)}", str(symbol), value, f"{p:.3f}")
             for (behavior, arguments), symbols in self.links.tables.items()
@@ -297,7 +299,7 @@ class Memory:
         return Sayings(self.labels() if self.labels is not None else None)
 
     def advice(self, most: int | None = None) -> Table:
-        """Return the rules by kind of goal."""
+        """Return a table of the learned rules with their counts, ordered by kind of goal."""
         say, totals = self.sayings(), self.experience.totals()
         rules = [one for one in self.experience.said.values() if isinstance(one, Rule)]
         rows = []
@@ -312,7 +314,7 @@ class Memory:
         return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
 
     def told(self, most: int | None = None) -> list[tuple[str, list[str]]]:
-        """Return the rules as sentences with their counts, by kind of goal."""
+        """Return pairs of a kind of goal and its rules, as sentences with counts."""
         found: list[tuple[str, list[str]]] = []
         for row in self.advice(most):
             record, rule, chosen, passed, failed = map(str, row)
@@ -324,7 +326,7 @@ class Memory:
         return found
 
     def page(self, most: int | None = None) -> str:
-        """Return the advice as a page: the rules for each kind of goal, then the orders of goals and the methods."""
+        """Return a text with the rules for each kind of goal, the orders of goals, and the methods."""
         lines = [self.said()]
         for record, rules in self.told(most):
             lines += ["", f"{record}:", *(f"  – {rule}" for rule in rules)]
@@ -332,7 +334,7 @@ class Memory:
         return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
 
     def also(self) -> list[str]:
-        """Return the learned orders and methods as sentences with their counts."""
+        """Return the learned orders of goals and methods as sentences with their counts."""
         from confab.planner.experience.evidence import DECAY
         from confab.planner.experience.following import usable
 
@@ -355,14 +357,14 @@ class Memory:
         ]
 
     def __repr__(self) -> str:
-        """Return the numbers of learned items."""
+        """Return the numbers of links, counters, episodes and replicas in one line."""
         learned = counted(len(self.links), "link") + " of " + counted(len(self.links.tables), "behaviour")
         lived = counted(sum(self.experience.episodes.values()), "episode")
         by = counted(len(self.experience.episodes), "replica")
         return f"Memory({learned}, {counted(len(self.experience), 'counter')} of {lived} by {by}, in {self.scene})"
 
     def said(self) -> str:
-        """Return the numbers of learned items as a sentence."""
+        """Return the numbers of episodes, rules, orders of goals, methods and links as a sentence."""
         lived = counted(sum(self.experience.episodes.values()), "episode")
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
         kinds = [
@@ -373,7 +375,7 @@ class Memory:
         return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."
 
     def __rich__(self) -> Group:
-        """Return the learned items for rich, most decisive first."""
+        """Return a summary and the first learned rules for rich."""
         from rich.console import Group
 
         return Group(self.said(), self.advice(20).__rich__())
@@ -399,7 +401,7 @@ def _labels(scene: Known) -> Callable[[], Labels]:
 
 
 def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
-    """Return the recent preferences for individuals in words, the strongest first."""
+    """Return the strongest recent preferences for individuals as sentences, the strongest first."""
     clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
@@ -416,7 +418,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def endpoint(source: str | Path) -> str | None:
-    """Return the URL of a SPARQL endpoint, also if a path has removed one of its slashes; None for a file.
+    """Return the URL that a text or path contains, or None if it names a file. `Path` removes a slash of a URL; it is restored.
 
     Examples
     --------
@@ -428,12 +430,12 @@ def endpoint(source: str | Path) -> str | None:
 
 
 def undisturbed(target: str | Path) -> AbstractContextManager[None]:
-    """Lock a memory file against other writers; at an endpoint every replica has a graph of its own."""
+    """Lock a memory file against other writers. An endpoint needs no lock, since each replica has a separate graph."""
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
 def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
-    """Yield the behaviours of the most abstract level that failed in an episode, each with the state and the failed conditions."""
+    """Yield the failed first-level steps of an episode, each with the problem in the state of the failure and the failed path."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments

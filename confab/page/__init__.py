@@ -1,7 +1,8 @@
-"""One page for a scene, a plan, a run, an execution while it happens, and a folder of runs; and static pieces for notebooks.
+"""The HTML page that shows a scene, a plan, a run, a running execution or a folder of runs, and static HTML for notebooks.
 
-`timeline` computes the timeline of a run and `ground` the map; `data` gathers all that the page shows as one JSON object
-(docs/page.md). `page.html`, `page.css` and the parts of `script/` show that object: `frozen` embeds it in a file,
-`confab.serving` serves it, `widget` passes it to a notebook. `sheet` plans after changes on the page, `live` follows an
-execution. `pieces` and `markup` are HTML without a script, for the values that a notebook shows.
+The module `timeline` computes the timeline of a run, and `ground` the map. The module `data` collects the content of the page
+as one JSON object (docs/page.md). The files `page.html`, `page.css` and `script/` display this object. The module `frozen`
+embeds the page and the object in a file, `confab.serving` serves them, and `widget` shows them in a notebook. The module
+`sheet` plans after a user's change on the page, and `live` follows a running execution. The modules `pieces` and `markup` make
+HTML without a script.
 """

@@ -1,4 +1,4 @@
-"""The data that the page shows of a scene, a plan, a run or an execution, as one JSON object (docs/page.md)."""
+"""The JSON object with the content of the page about a scene, a plan, a run or an execution (docs/page.md)."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from confab.reasoner.embodiment.values import Embodiment
 
 LEARNED = 8
-"""Maximum number of goals whose learned rules are shown."""
+"""Maximum number of learned rules that the page shows."""
 MOST_STEPS = 4000
-"""Maximum number of steps of a plan whose purposes are computed for the page."""
+"""Maximum length of a plan, in steps, for which the page states the purpose of each step."""
 
 
 def page_data(
@@ -50,21 +50,21 @@ def page_data(
     learned: Memory | None = None,
     again: str = "",
 ) -> PageData:
-    """Return the data of the page.
+    """Return the JSON object with the content of the page.
 
     Parameters
     ----------
     scene : Scene
     result : Result, optional
-        The result of planning, with or without a plan.
+        The result of planning.
     report : Report, optional
         The verification of the plan in physics.
     execution : Execution, optional
-        The execution of the task; the page then shows it instead of the plan.
+        The execution of the task, which the page shows instead of the plan.
     learned : Memory, optional
         The memory after the run.
     again : str, optional
-        The command that repeats the run; derived from the other arguments by default.
+        The command that repeats the run; by default it is derived from the other arguments.
     """
     from confab.show import summary
 
@@ -115,7 +115,7 @@ def page_data(
 
 
 def page_labels(scene: Known, problem: Problem) -> Labels:
-    """Return the displayed names of all terms of a problem, and of furniture and robots."""
+    """Return the labels of the terms of a problem, of furniture and of robots."""
     from confab.labels import labels_of
 
     body = embodiment_of(scene)
@@ -127,7 +127,7 @@ def page_labels(scene: Known, problem: Problem) -> Labels:
 def timeline_data(
     scene: Known, timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], str], reasons: bool = True
 ) -> PageData:
-    """Return the parts of the page that follow from a timeline: title, map, rows and steps.
+    """Return the parts of the page's content that depend on a timeline, such as the map, the rows and the steps.
 
     Parameters
     ----------
@@ -135,9 +135,9 @@ def timeline_data(
     timeline : Timeline
     labels : Labels
     notes : mapping of path to str
-        A note on each step.
+        Notes on steps, by the step's path.
     reasons : bool
-        Whether the checker accepts the plan, so that each step has a purpose.
+        Whether to state the purpose of each step. The plan must be valid.
     """
     rows, hidden = rows_of(timeline, labels)
     data: PageData = {
@@ -174,7 +174,7 @@ def _timeline(problem: Problem, result: Planned | None, report: Report | None, e
 
 
 def embodiment_of(scene: Known) -> Embodiment | None:
-    """Return the scene's embodiment, or None if it is missing or incomplete."""
+    """Return the embodiment of a scene, or None if the scene has no complete embodiment."""
     from confab.reasoner.embodiment.facts import EmbodimentError
 
     try:
@@ -215,6 +215,6 @@ def _steps(timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], s
 
 
 def _measured(step: Step, bar: Bar | None, labels: Labels) -> list[tuple[str, str]]:
-    """Return the measurements of a primitive, and the individuals of a step's determined variables."""
+    """Return the names and values of a primitive's measurements, and of the variables that the state determines for a step."""
     pairs = [measurement(name, value) for name, value in (bar.measured if bar else {}).items()]
     return [*pairs, *((spaced(name), labels.name(value)) for name, value in step.bindings.items())]

@@ -1,4 +1,4 @@
-"""The page as one self-contained file: no server, no network."""
+"""The page as one HTML file that needs neither a server nor a network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from confab.page.schema import PageData
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
-    """Return the page as HTML text, with its data; if these are None, the page requests them from its server."""
+    """Return the page as HTML text with embedded data. If `data` is None, the page requests its data from the server."""
     content = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return Template(asset("page.html")).substitute(
         title=escape(title), style=asset("page.css"), data=content, script=script()
@@ -21,7 +21,7 @@ def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
 
 
 def write_page(path: str | Path, data: PageData) -> Path:
-    """Write the page with its data into a file, completely or not at all, and return the path."""
+    """Write the page with embedded data into a file atomically, and return the path."""
     from confab.reasoner.files import write_whole
 
     write_whole(Path(path), page_html(data, data["title"]))

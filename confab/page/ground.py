@@ -1,4 +1,4 @@
-"""The map: areas, places and the positions of robots, seen from the film's camera; or places that static relations connect."""
+"""The background of the map: places, areas and robots by their coordinates, or a layout of places without coordinates."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from confab.reasoner.symbols import Problem
 
 Point = tuple[float, float]
 MOST_SPOTS = 400
-"""Maximum number of places of a map."""
+"""Maximum number of places on a map."""
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-"""A coordinate in well-known text."""
+"""Pattern of a coordinate in well-known text."""
 STRETCH = 1.7
-"""Horizontal stretch of a layout of connected places; pages and names are wider than high."""
+"""Horizontal stretch of a layout of connected places, since pages and names are wider than high."""
 
 
 @dataclass(frozen=True)
 class Area:
-    """A polygon with a name: a table, a shelf, a room."""
+    """A polygon with a name, such as a table, a shelf or a room."""
 
     name: str
     corners: tuple[Point, ...]
@@ -31,9 +31,10 @@ class Area:
 
 @dataclass(frozen=True)
 class Ground:
-    """Positions of places (x to the right, y down), areas, connections between places, positions of robots.
+    """The background of the map: positions of places, areas, connections between places, and positions of robots.
 
-    `metric` says whether positions are metres; otherwise they are a layout. `note` names the source of the positions.
+    The x axis points to the right, the y axis down. If `metric` is true, positions are in metres, otherwise they have no unit.
+    The text `note` tells users the source of the positions.
     """
 
     spots: Mapping[str, Point]
@@ -45,16 +46,17 @@ class Ground:
 
 
 def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()) -> Ground | None:
-    """Return the background of the map: by coordinates, otherwise by connections, otherwise in order; None if there are no places.
+    """Return the background of the map, or None if the problem has no places.
 
-    With more than `MOST_SPOTS` places the map shows none, and its note says so.
+    Places are positioned by their coordinates if available, otherwise by static relations that connect them, otherwise in rows.
+    A map of more than `MOST_SPOTS` places has no places, and its note states the reason.
 
     Parameters
     ----------
     problem : Problem
     embodiment : Embodiment, optional
     shapes : iterable of pairs of an individual and its shape
-        Points and polygons as well-known text, in metres, y up (`c:shape`).
+        Points and polygons as well-known text, in metres, with the y axis up (`c:shape`).
     """
     if embodiment is not None and embodiment.places:
         return _furnished(embodiment)
@@ -66,7 +68,7 @@ def _too_many(number: int) -> Ground:
 
 
 def _furnished(embodiment: Embodiment) -> Ground:
-    """Return furniture and places as in the film, whose camera stands opposite the robots (`sim.picture.view_of`)."""
+    """Return furniture and places of an embodiment as in the film, with the camera opposite the robots (`sim.picture.view_of`)."""
     if len(embodiment.places) > MOST_SPOTS:
         return _too_many(len(embodiment.places))
     from confab.sim.linkage import with_open_mechanisms
@@ -94,7 +96,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
         reach = abs(solid.rotation) @ np.array(solid.half)
         for sign in (-1, 1):
             of.setdefault(solid.name, []).append(seen(*(solid.center + sign * reach)[:2]))
-    for name, points in of.items():  # the area of mechanisms with every joint open
+    for name, points in of.items():  # the area that a mechanism occupies when every joint is open
         (left, right), (back, front) = ((min(side), max(side)) for side in zip(*points, strict=True))
         areas.append(Area(name, ((left, back), (right, back), (right, front), (left, front))))
     return Ground(
@@ -106,7 +108,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
 
 
 def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
-    """Return stated polygons and points, or None if there are none; an individual with only a polygon is placed in its middle."""
+    """Return the polygons and points of shapes, or None. An individual with only a polygon is at the mean of its corners."""
     spots: dict[str, Point] = {}
     areas: list[Area] = []
     for name, text in shapes:
@@ -127,7 +129,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return values of a situation type that static relations connect, in a layout with connected values near each other."""
+    """Return the places that static relations connect, in a layout with connected places near each other, or None."""
     import networkx
 
     values = _values(problem)
@@ -147,7 +149,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return the places of objects in rows, by name; used if places have neither coordinates nor connections."""
+    """Return places without coordinates and connections in rows, ordered by name, or None."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial
@@ -167,7 +169,7 @@ def _in_order(problem: Problem) -> Ground | None:
 
 
 def natural(name: str) -> list[tuple[int, str]]:
-    """Return the key of the natural order of names: ``cup2`` before ``cup10``.
+    """Return the sort key of a name in natural order, in which ``cup2`` precedes ``cup10``.
 
     >>> sorted(["cup10", "cup2"], key=natural)
     ['cup2', 'cup10']
@@ -176,6 +178,6 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 
 def _values(problem: Problem) -> set[str]:
-    """Return all values of the situation types that are stated."""
+    """Return all values of the situation types of initial facts."""
     situations = {symbol.situation for symbol in problem.initial}
     return {v for name in situations for v in problem.classes.get(problem.domain.situations[name].range, ())}

@@ -1,4 +1,4 @@
-"""The lanes of the page: steps by level and by actor, and the values of each situated object in time."""
+"""The rows of the page's timeline: steps by level and by actor, and the values of each symbol in time."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 MOST_FIXED = 5000
-"""Maximum number of rows for static facts that aren't goals; the page states the number of further facts."""
+"""Maximum number of rows for symbols that neither change nor have a goal. The page states the number of further symbols."""
 LAST = 0.04
-"""Share of the axis that follows the last primitive, for its effects."""
+"""Extension of the time axis after the last primitive, as a share of the plan's duration, to show the last effects."""
 
 
 def axis_end(timeline: Timeline) -> float:
-    """Return the end of the axis; it is later than the end of the last primitive if that has an effect."""
+    """Return the end of the time axis. If the last primitive has an effect, the axis ends after the primitive."""
     late = any(period.begin >= timeline.end for periods in timeline.phases.values() for period in periods[1:])
     return round((timeline.end or 1.0) * (1 + LAST if late else 1), 4)
 
 
 def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
-    """Return the rows, and the number of facts for which there is no row."""
+    """Return the rows of the timeline, and the number of symbols without a row."""
     by_path = timeline.by_path
     rows: list[Row] = []
     for level in sorted({step.level for step in timeline.plan.walk() if step.steps}):
@@ -59,7 +59,7 @@ def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
 
 
 def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[Row]:
-    """Return the smallest number of rows for some bars in which no two overlap."""
+    """Distribute bars over the smallest number of rows in which no two bars overlap."""
     rows: list[list[Bar]] = []
     for bar in sorted(bars, key=lambda bar: (bar.begin, bar.end)):
         free = next((row for row in rows if row[-1].end <= bar.begin + 1e-6), None)
@@ -101,5 +101,5 @@ def tone_of(timeline: Timeline, symbol: Symbol, value: str) -> str:
 
 
 def id_of(path: Sequence[int]) -> str:
-    """Return the ID of a step."""
+    """Return the ID of a step from its path."""
     return ".".join(map(str, path))

@@ -1,4 +1,4 @@
-"""A running execution on the page: the executed steps by the world's clock, and the remaining planned steps."""
+"""A running execution on the page: the executed steps with times of the world's clock, and the remaining steps of the plan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from confab.reasoner.symbols import Problem, Symbol
 
 
 class Following:
-    """The events of an execution so far; `version` grows with each one. Threads may share it."""
+    """The events of a running execution. The number `version` grows with each event. The class is thread-safe."""
 
     def __init__(self, scene: Known) -> None:
         self.scene, self.version = scene, 0
@@ -34,7 +34,7 @@ class Following:
 
     @cached_property
     def labels(self) -> Labels:
-        """Displayed names of all terms of the problem."""
+        """The labels of the problem's terms."""
         return page_labels(self.scene, self.problem)
 
     @property
@@ -61,14 +61,14 @@ class Following:
                 self._marks.append((event.seconds, text))
 
     def _believe(self, belief: Problem, now: float) -> None:
-        """Record the symbols that have changed, and the goals."""
+        """Record the changed values of symbols, and the goals."""
         for symbol, value in belief.initial.items():
             if self.known.get(symbol) != value:
                 self._periods.setdefault(symbol, []).append((now, value))
         self.known, self._wanted = dict(belief.initial), belief
 
     def data(self) -> PageData:
-        """Return the present data of the page."""
+        """Return the JSON object with the present content of the page."""
         with self._lock:
             event, now = self._event, self._event.seconds if self._event is not None else 0.0
             bars, marks = list(self._bars), tuple(self._marks)
@@ -118,5 +118,5 @@ class Following:
 
 
 def _still_open(row: Row) -> Row:
-    """Return a row without the remark that its goal isn't met, since the execution isn't over."""
+    """Return a row without the mark of an unmet goal, since the execution isn't finished."""
     return {key: value for key, value in row.items() if key != "met" or value}  # type: ignore[return-value]

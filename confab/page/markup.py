@@ -1,4 +1,4 @@
-"""HTML as values: text is escaped, markup is not."""
+"""Construction of HTML in which text is escaped and markup isn't."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Markup(str):
 
 
 def tag(name: str, *inner: object, **attributes: object) -> Markup:
-    """Return an element; attributes that are None or False are left out, ``class_`` is the class and ``data_x`` is ``data-x``.
+    """Return an HTML element. Attributes that are None or False are omitted; ``class_`` denotes ``class``, ``data_x`` ``data-x``.
 
     >>> tag("p", "a < b ", tag("b", "yes"), class_="note", title=None)
     '<p class="note">a &lt; b <b>yes</b></p>'
@@ -34,7 +34,7 @@ def tag(name: str, *inner: object, **attributes: object) -> Markup:
 
 
 def joined(*parts: object) -> Markup:
-    """Return the concatenation of parts: text is escaped, lists are flattened, None is skipped."""
+    """Concatenate parts: text is escaped, lists are flattened, and None is skipped."""
     found = []
     for part in parts:
         if isinstance(part, Markup):
@@ -52,12 +52,12 @@ def number(value: float) -> str:
 
 
 UNITS = {"m": ("mm", 1000.0), "rad": ("°", 180 / pi), "n": ("N", 1.0), "s": ("s", 1.0)}
-"""The displayed unit and the factor of a measurement, by the end of its name."""
+"""The unit and the factor in which a measurement is displayed, by the ending of its name."""
 MEASURED = re.compile(r" \(\w+ [-\d.e+]+(, \w+ [-\d.e+]+)*\)$")
 
 
 def measurement(name: str, value: float) -> tuple[str, str]:
-    """Return a measurement's name and value in words.
+    """Return the name and the value of a measurement as texts.
 
     >>> measurement("tip_error_m", 0.0041), measurement("tilt_rad", 0.5), measurement("beads", 12)
     (('tip error', '4.1 mm'), ('tilt', '28.6°'), ('beads', '12'))
@@ -69,7 +69,7 @@ def measurement(name: str, value: float) -> tuple[str, str]:
 
 
 def spaced(name: str) -> str:
-    """Return the words of a name.
+    """Return a name in camel case or with underscores as separate words.
 
     >>> spaced("sourcePlace"), spaced("beside_place")
     ('source place', 'beside place')
@@ -78,23 +78,23 @@ def spaced(name: str) -> str:
 
 
 def plain(note: str) -> str:
-    """Return a note of a verdict without the measurements at its end."""
+    """Return the note of a verdict without the measurements at the end of the note."""
     return MEASURED.sub("", note)
 
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a file in this folder."""
+    """Return the text of a file in the folder of this module."""
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 @cache
 def script() -> str:
-    """Return the page's script: the parts in the folder `script`, in their order, as one module."""
+    """Return the script of the page, which joins the files of the folder `script` in their order."""
     parts = sorted((Path(__file__).parent / "script").glob("*.js"))
     return "\n".join(part.read_text(encoding="utf-8") for part in parts)
 
 
 def styled(*pieces: object) -> str:
-    """Return pieces with their style for a notebook, without external files and without effect on the rest of the page."""
+    """Return pieces of HTML with their style sheet, isolated from the style of the surrounding notebook."""
     return str(tag("div", tag("style", Markup(asset("page.css"))), *pieces, class_="confab"))

@@ -1,4 +1,4 @@
-"""HTML representations in notebooks of values from rooms that know no HTML (`register`)."""
+"""HTML representations, in notebooks, of values of modules that contain no HTML (`register`)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SHOWN: dict[tuple[str, str], Callable[[Any], str]] = {
     ("confab.planner.plan", "Step"): _of_step,
     ("confab.sim.verdict", "Verdict"): pieces.verdict,
 }
-"""The function that returns the HTML of a value, by the module and the name of its class."""
+"""The function that returns the HTML of a value, by the module and the name of the value's class."""
 
 
 def register() -> None:
-    """Register the representations of `SHOWN` in a running notebook; do nothing elsewhere."""
+    """Register the representations in `SHOWN` if the process runs a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if shell is None:
         return

@@ -1,4 +1,4 @@
-"""HTML without a script for notebooks: a plan as a tree, a verdict, a table. It needs `page.css`."""
+"""HTML without a script, for notebooks: a plan as a tree, a verdict, a table. The HTML needs the style of `page.css`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def tree(
     notes: Notes | None = None,
     purposes: Mapping[tuple[int, ...], Purpose] | None = None,
 ) -> Markup:
-    """Return a plan as folding lists: each step with its note and its purposes."""
+    """Return a plan as nested lists that the user can fold, with the note and the purposes of each step."""
     from confab.why import account, numbers
 
     why = {}
@@ -50,7 +50,7 @@ def tree(
 
 
 def verdict(told: Verdict) -> str:
-    """Return physics' verdict on a step."""
+    """Return the verdict of physics on a step as HTML."""
     sign, tone = MEANT[bool(told.ok)]
     pairs = [
         tag("div", tag("dt", name.replace("_", " ")), tag("dd", number(value))) for name, value in told.measured.items()
@@ -60,7 +60,7 @@ def verdict(told: Verdict) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Markup:
-    """Return a table that scrolls horizontally if it is too wide."""
+    """Return an HTML table, which scrolls horizontally if it is too wide for the page."""
     head = tag("tr", [tag("th", name) for name in columns])
     body = [tag("tr", [tag("td", cell if cell is not None else "") for cell in row]) for row in rows]
     return tag("div", tag("table", tag("thead", head), tag("tbody", body)), class_="scroll")

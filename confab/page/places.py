@@ -1,4 +1,4 @@
-"""The map of the page: areas, places, and the objects at places in time."""
+"""The map of the page: areas, places, and the places of objects in time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
-    """Return the map of a ground, with the places of objects in time."""
+    """Return the map from its background and the places of objects in time."""
     return {
         "areas": [
             {"id": area.name, "label": labels.name(area.name), "corners": list(area.corners)} for area in ground.areas
@@ -30,10 +30,11 @@ def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
 
 
 def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
-    """Return the objects on the map, each with its places.
+    """Return the objects on the map, each with its places in time.
 
-    The place of an object is the value of a symbol whose first value is on the map and whose situation type has no rest value.
-    (A hand's position is no place of an object.) Of several such symbols, the one with the longest time on the map counts.
+    The place of an object is the value of a symbol whose first value is on the map. The symbol's situation type must have no
+    rest value, which excludes the positions of hands. If an object has several symbols of this kind, the symbol whose values
+    are on the map for the longest time is used.
     """
     situations = timeline.problem.domain.situations
     found: dict[str, tuple[float, Thing]] = {}

@@ -1,4 +1,4 @@
-"""The result of a run for the page: its verdict, figures, failure, film and goals, and the command that repeats it."""
+"""The result of a run on the page: verdict, figures, failure, film, goals, and the command that repeats the run."""
 
 from __future__ import annotations
 
@@ -28,40 +28,40 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import TimedPlan
 
 LARGEST_FILM = 40_000_000
-"""Maximum size in bytes of a film that is embedded in the page; a larger one is linked."""
+"""Maximum size in bytes of a film that the page embeds. The page links a larger film."""
 
 
 class Planned(Protocol):
-    """The result of planning, as the page needs it: `confab.planning.Result`."""
+    """The part of `confab.planning.Result` that the page needs."""
 
     problem: Problem
     outcome: Outcome
     timed: TimedPlan | None
 
     def dearer(self) -> str:
-        """Return the known bounds on a cheaper plan."""
+        """Return the known bound on the cost of a cheaper plan, as text."""
 
 
 class Executed(Protocol):
-    """The result of executing a task, as the page needs it: `confab.execution.Execution`."""
+    """The part of `confab.execution.Execution` that the page needs."""
 
     @property
     def episode(self) -> Episode:
-        """The episode."""
+        """The record of the execution."""
 
     @property
     def reached(self) -> bool:
-        """Whether the goal was reached."""
+        """Whether the execution reached all goals."""
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return a note on each step, by its path."""
+        """Return notes on steps, by the step's path."""
 
     def summary(self) -> str:
-        """Return a summary of the result in one line."""
+        """Return a summary of the execution in one line."""
 
 
 def status_of(outcome: Outcome | None, report: Report | None, execution: Executed | None) -> tuple[bool | None, str]:
-    """Return whether the run succeeded, and its result in words."""
+    """Return whether a run succeeded (None if unknown), and the result of the run as text."""
     if execution is not None:
         return execution.reached, execution.episode.status.value
     if report is not None:
@@ -78,7 +78,7 @@ def tiles_of(
     report: Report | None,
     execution: Executed | None,
 ) -> list[Tile]:
-    """Return the figures of a run."""
+    """Return the figures of a run, such as the number of primitives and the planning time."""
     found: list[tuple[str, str]] = []
     if timeline is not None:
         steps = len(timeline.plan.primitives)
@@ -118,7 +118,7 @@ def tiles_of(
 def alarm_of(
     timeline: Timeline, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
 ) -> Alarm | None:
-    """Return the failure, or None if there was none."""
+    """Return the failure of a run, or None if the run didn't fail."""
     if execution is not None and execution.reached:
         return None
     reasons = [labels.sentence(reason.text) for reason in (execution.episode.reasons if execution is not None else ())]
@@ -159,7 +159,7 @@ def _proof(outcome: Outcome, labels: Labels) -> list[str]:
 
 
 def film_of(report: Report | None) -> Film | None:
-    """Return the film of a run, if there is one, with its first still as its poster."""
+    """Return the film of a verification with its first still as the poster, or None if there is no film."""
     if report is None or report.video is None or not report.video.is_file():
         return None
     kind = "image/gif" if report.video.suffix == ".gif" else "video/mp4"
@@ -174,7 +174,7 @@ def film_of(report: Report | None) -> Film | None:
 
 
 def _jpeg(still: Path) -> bytes:
-    """Return a picture as JPEG, which has a tenth of its size in bytes."""
+    """Return a picture in the format JPEG, which takes about a tenth of the bytes of PNG."""
     from PIL import Image
 
     made = BytesIO()
@@ -186,7 +186,7 @@ WHEN = re.compile(r"^(?:after|at)=\S+ ")
 
 
 def mark_of(text: str, labels: Labels) -> str:
-    """Return an intervention as it was written, or a change of plan, in words."""
+    """Return the text of an intervention or of a change of the plan as a sentence with labels."""
     what = WHEN.sub("", text)
     if what == text:
         return labels.sentence(text)
@@ -197,7 +197,7 @@ def mark_of(text: str, labels: Labels) -> str:
 
 
 def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData]:
-    """Return the goals with their initial values, and with their final values if there is a plan."""
+    """Return the goals with the initial values of their symbols and, if there is a plan, the final values."""
     found: list[GoalData] = []
     for symbol, value in sorted(timeline.problem.goal.items()):
         goal: GoalData = {
@@ -225,7 +225,7 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on the levels that were given up, and on the conditions that the plan violates as a result."""
+    """Return notes on levels that planning gave up, and on the conditions of these levels that the plan violates."""
     if outcome is None:
         return []
     broken = [broken.text for left in outcome.left for broken in left.broken]

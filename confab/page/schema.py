@@ -1,31 +1,35 @@
-"""The form of the page's JSON object (docs/page.md)."""
+"""The types of the page's JSON object (docs/page.md)."""
 
 from __future__ import annotations
 
 from typing import TypedDict
 
 FORMAT = 1
-"""Version of the JSON object; a page shows the objects of its own version."""
+"""Version of the format of the JSON object. A page can only show objects of the same version."""
 
 
 class Interval(TypedDict, total=False):
-    """A part of a row: from `begin` to `end`, a step or a value, and the meaning of its colour (`tone`).
+    """A bar in a row of the timeline: a step or a value, its times, and the meaning of its colour (`tone`).
 
-    `step` is the ID of the step that it shows. `slack` is the time until which its end may be delayed without delaying the end
+    `step` is the ID of the step. `slack` is the duration by which the end of the step may be delayed without delaying the end
     of the plan.
     """
 
     begin: float
     end: float
     label: str
-    tone: str  # action, planned, failed; of facts: start, between, wanted
+    tone: str  # for steps: action, planned, failed; for facts: start, between, wanted
     step: str
     note: str
     slack: float
 
 
 class Row(TypedDict, total=False):
-    """A lane. Its `group` is levels, actors, changes, wanted or fixed; `met` states whether its goal holds in the end."""
+    """A row of the timeline.
+
+    The text `group` is levels, actors, changes, wanted or fixed. The flag `met` states whether the symbol has its goal value in
+    the end.
+    """
 
     group: str
     label: str
@@ -34,7 +38,7 @@ class Row(TypedDict, total=False):
 
 
 class StepData(TypedDict, total=False):
-    """A step of the plan; `id` is its path, joined by dots, so that the ID of its parent is a prefix."""
+    """A step of the plan. The ID of a step is its path, joined by dots; the ID of its parent is a prefix."""
 
     id: str
     number: str
@@ -50,7 +54,7 @@ class StepData(TypedDict, total=False):
 
 
 class Thing(TypedDict):
-    """An object on the map: the times at which it reaches a place (empty: no place), in words, with the tone of each place."""
+    """An object on the map. Each element of `at` has a time, the place from then on (or an empty text), a sentence, and a tone."""
 
     id: str
     label: str
@@ -74,7 +78,7 @@ class Spot(TypedDict):
 
 
 class MapData(TypedDict):
-    """The map: x to the right, y down."""
+    """The map, whose x axis points to the right and whose y axis points down."""
 
     areas: list[AreaData]
     ways: list[tuple[str, str]]
@@ -86,7 +90,7 @@ class MapData(TypedDict):
 
 
 class Alarm(TypedDict, total=False):
-    """A failure: its text, its position, and the measured numbers."""
+    """A failure: its text, the failed step, and the measured numbers."""
 
     title: str
     step: str
@@ -97,7 +101,8 @@ class Alarm(TypedDict, total=False):
 class Film(TypedDict, total=False):
     """A film of the run.
 
-    `speed` is the ratio of the page's time to the film's, `poster` the picture that is shown before the film is played.
+    `speed` is the ratio of simulated time to the film's time. `poster` is the picture that the page shows before the film is
+    played.
     """
 
     source: str
@@ -108,14 +113,14 @@ class Film(TypedDict, total=False):
 
 
 class Tile(TypedDict):
-    """A figure with its name."""
+    """A figure of a run with its name."""
 
     name: str
     text: str
 
 
 class GoalData(TypedDict, total=False):
-    """A goal, its initial and its final value."""
+    """A goal with the initial and the final value of its symbol."""
 
     label: str
     before: str
@@ -124,14 +129,14 @@ class GoalData(TypedDict, total=False):
 
 
 class Mark(TypedDict):
-    """An intervention or a change of plan."""
+    """The time and the text of an intervention or of a change of the plan."""
 
     at: float
     text: str
 
 
 class Learned(TypedDict):
-    """The content of memory after the run."""
+    """The content of memory after a run: a summary and the rules by kind of goal."""
 
     text: str
     rules: list[tuple[str, list[str]]]
@@ -140,7 +145,7 @@ class Learned(TypedDict):
 class TurnableRow(TypedDict):
     """A symbol whose value the user can change.
 
-    Its key, its words, the name of its list of values, its current value and its goal value.
+    The row has the symbol's key, its label, the name of its list of values, its current value and its goal value.
     """
 
     key: str
@@ -151,7 +156,7 @@ class TurnableRow(TypedDict):
 
 
 class Turnable(TypedDict):
-    """All symbols whose values the user can change; `values` has each list of values by its name, and each value with its words."""
+    """All symbols whose values the user can change, and the lists of values by name. Each value has a label."""
 
     rows: list[TurnableRow]
     values: dict[str, list[tuple[str, str]]]
@@ -159,7 +164,7 @@ class Turnable(TypedDict):
 
 
 class ReadyQuery(TypedDict):
-    """A query that ships with Confab, with the question that it answers."""
+    """A shipped SPARQL query with the question that the query answers."""
 
     name: str
     question: str
@@ -167,7 +172,7 @@ class ReadyQuery(TypedDict):
 
 
 class PageData(TypedDict, total=False):
-    """The data of the page; `problem` is the reason why planning failed after a change on the page."""
+    """The content of the page. `problem` is the reason why planning failed after a change on the page."""
 
     format: int
     title: str

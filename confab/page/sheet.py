@@ -1,4 +1,4 @@
-"""The controls of the page, and their results: facts, goals and interventions."""
+"""Controls on the page, by which the user changes facts, goals and interventions, and the resulting plans."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of rows that can be changed; the page states the number of further symbols, which `with_fact` changes."""
+"""Maximum number of symbols that the user can change on the page. The page states the number of further symbols."""
 SECONDS = 10.0
-"""Limit of planning for the page."""
+"""Time limit of planning for the page in seconds."""
 
 
 class TurnedIntervention(TypedDict):
-    """An intervention chosen on the page: the step after which it happens, world or goal, the symbol, and the value."""
+    """An intervention from the page: the ID of the step before it, its kind (world or goal), and the symbol with the new value."""
 
     after: str | int
     what: str
@@ -43,7 +43,7 @@ class TurnedIntervention(TypedDict):
 
 
 class Turned(TypedDict, total=False):
-    """Changed controls: values of facts and goals by the symbol's words; None drops a goal."""
+    """Changed controls: new values of facts and goals, by the words of the symbol. The value None removes a goal."""
 
     facts: dict[str, str]
     goals: dict[str, str | None]
@@ -52,7 +52,7 @@ class Turned(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Sheet:
-    """The controls of a scene, and their results.
+    """A scene with changes of its facts, goals and interventions, and the resulting plans and executions.
 
     Examples
     --------
@@ -66,28 +66,28 @@ class Sheet:
 
     @cached_property
     def problem(self) -> Problem:
-        """The whole scene's problem."""
+        """The problem of the whole scene."""
         return self.scene.problem
 
     @cached_property
     def labels(self) -> Labels:
-        """Displayed names of all terms of the problem."""
+        """The labels of the problem's terms."""
         return labels_of(self.scene.knowledge, self.scene.names, self.problem)
 
     @cached_property
     def symbols(self) -> dict[str, Symbol]:
-        """The symbols by their words without a value, ``cup1 LOCATION``; those with a goal first."""
+        """The symbols by their words, such as ``cup1 LOCATION``, with symbols of goals first."""
         goal = self.problem.goal
         those = sorted({*self.problem.initial, *goal}, key=lambda s: (s not in goal, s.arguments, s.situation))
         return {" ".join((*s.arguments[:1], s.situation, *s.arguments[1:])): s for s in those}
 
     def turnable(self) -> Turnable:
-        """Return the rows that the user can change, and their lists of values."""
+        """Return the symbols that the user can change, and the lists of their possible values."""
         rows: list[TurnableRow] = []
         lists: dict[str, list[str]] = {}
         for key, symbol in list(self.symbols.items())[:MOST_SYMBOLS]:
             values, kind = self._values(symbol), self.problem.domain.situations[symbol.situation].range
-            name = kind if lists.setdefault(kind, values) == values else key  # a list of its own for a value of its own
+            name = kind if lists.setdefault(kind, values) == values else key  # a separate list if the values differ
             lists.setdefault(name, values)
             rows.append(
                 {
@@ -108,12 +108,12 @@ class Sheet:
         return [*values, *dict.fromkeys(v for v in there if v is not None and v not in values)]
 
     def turned(self, by: Turned) -> Problem:
-        """Return the problem with changed facts and goals, each by its symbol; a goal that is None is dropped.
+        """Return the problem with changed facts and goals.
 
         Raises
         ------
         KnowledgeError
-            There is no such symbol, a goal value is invalid, or the facts are inconsistent.
+            A symbol doesn't exist, a value is invalid, or the facts are inconsistent.
         """
         symbols = self.symbols
         for key in (*by.get("facts", {}), *by.get("goals", {})):
@@ -135,7 +135,7 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a valid value of a symbol; amounts are checked when they are compared."""
+        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. Amounts are not checked."""
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)
@@ -144,12 +144,12 @@ class Sheet:
         return value
 
     def plan(self, by: Turned) -> Result:
-        """Return the result of planning with changed controls."""
+        """Plan with the changed facts and goals, and return the result."""
         problem = self.turned(by)
         return Result(self.scene, problem, solve(Request(problem, DEFAULT_MODE, Limits(seconds=SECONDS))), {})
 
     def act(self, by: Turned, result: Result) -> Execution | None:
-        """Return the execution of the plan with the chosen interventions; None if there are none."""
+        """Execute the plan of a result with the interventions, and return the execution; None without interventions or plan."""
         from confab.execution import execute
 
         if not by.get("interventions") or not result.solved:
@@ -159,7 +159,7 @@ class Sheet:
 
     @staticmethod
     def intervention(turned: TurnedIntervention) -> str:
-        """Return an intervention in the notation of the command line.
+        """Return an intervention from the page in the notation of the command line.
 
         Examples
         --------
@@ -171,13 +171,13 @@ class Sheet:
 
     @cached_property
     def scene_data(self) -> PageData:
-        """The page of a scene before planning, with its controls and queries."""
+        """The content of the page before planning, with controls and queries."""
         data = page_data(self.scene)
         data["turnable"], data["queries"] = self.turnable(), ready_queries(self.scene.knowledge)
         return data
 
     def answer(self, by: Turned) -> PageData:
-        """Return the data of the page after a change of a control; `problem` is the reason that planning failed."""
+        """Return the content of the page after a change of controls. If planning fails, the content is the reason alone."""
         try:
             result = self.plan(by)
             execution = self.act(by, result)
@@ -186,7 +186,7 @@ class Sheet:
         return page_data(self.scene, result, execution=execution, again=self._again(by))
 
     def _again(self, by: Turned) -> str:
-        """Return the command, or the lines of Python, that do the same."""
+        """Return the command or the Python code that reproduces the result."""
         path = self.scene.knowledge.path
         shipped = path is not None and path.is_relative_to(ontology.ROOT)
         name = self.scene.iri if path is None else path.stem if shipped else str(path)
@@ -208,7 +208,7 @@ def _called(method: str, facts: Sequence[str]) -> str:
 
 
 def ready_queries(graph: KnowledgeGraph) -> list[ReadyQuery]:
-    """Return the shipped queries about the scene itself, by name; queries about other domains are left out."""
+    """Return the shipped queries that apply to a scene, in the order of their names."""
     from confab.reasoner.graph.query_process import unknown_prefixes
 
     found: list[ReadyQuery] = []
@@ -222,12 +222,12 @@ def ready_queries(graph: KnowledgeGraph) -> list[ReadyQuery]:
 
 
 def turned_from(data: object) -> Turned:
-    """Return the changed controls in the JSON that the page sends.
+    """Return the changed controls from the JSON data that the page sends.
 
     Raises
     ------
     KnowledgeError
-        The data aren't of that form.
+        The data have another form.
     """
     wanted = "wanted an object with facts, goals and interventions"
     if not isinstance(data, Mapping):

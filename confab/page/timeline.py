@@ -1,6 +1,7 @@
-"""The timeline of a run: the primitives of a plan, and the values of each situated object, with their beginnings and ends.
+"""The timeline of a run: the primitives of a plan and the values of symbols, with their begin and end times.
 
-A plan alone takes one unit of time per primitive; rollouts and episodes have the times of the world's clock.
+In the timeline of a plan without a schedule, each primitive takes one unit of time. Rollouts and episodes have times of the
+world's clock.
 """
 
 from __future__ import annotations
@@ -20,16 +21,16 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes by first argument; with more, all primitives share a lane."""
+"""Maximum number of lanes by first argument. If there would be more lanes, all primitives share one lane."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A step in time.
+    """A step with its begin and end times.
 
-    `ok` is None if it was not checked, `note` is a remark on its result, `planned` is True if it hasn't begun yet. In a
-    schedule, `actors` are its actors, and `slack` is the time by which its end may be delayed without an effect on the
-    makespan.
+    `ok` is the verdict on the step, or None without a verdict. `note` is a remark on the result of the step. `planned` is True
+    if the step hasn't begun. In a schedule, `actors` are the actors of the step, and `slack` is the duration by which the end
+    of the step may be delayed without a longer makespan.
     """
 
     step: Step
@@ -55,9 +56,10 @@ class Period:
 
 @dataclass(frozen=True)
 class Timeline:
-    """The primitives of a run in time, and the values of symbols in periods.
+    """The primitives of a run with their times, and the values of symbols by period.
 
-    `marks` are times with a text: interventions and changes of plan. `unit` is the unit of time. `final` is the last state.
+    `marks` are the times and texts of interventions and changes of the plan. `unit` is the unit of time. `final` is the last
+    state.
     """
 
     problem: Problem
@@ -76,9 +78,9 @@ class Timeline:
 
     @property
     def by_path(self) -> dict[tuple[int, ...], Bar]:
-        """The bar of each begun step of the plan's tree; the bar of a refined step spans its primitives."""
+        """The bars of all begun steps, by path. The bar of a step with sub-steps spans the bars of its primitives."""
         found: dict[tuple[int, ...], Bar] = {}
-        for bar in self.bars:  # repeated attempts make one bar with the last result
+        for bar in self.bars:  # several attempts at a step make one bar with the last result
             first = found.get(bar.step.path, bar)
             found[bar.step.path] = Bar(
                 bar.step, first.begin, bar.end, bar.ok, bar.note, bar.measured, bar.code, bar.planned
@@ -105,7 +107,7 @@ class Timeline:
         return found
 
     def lanes(self) -> dict[str, list[Bar]]:
-        """Return the bars of primitives by worker (`schedule.worker_of`), or by first argument if there are none."""
+        """Return the bars of primitives by actor or worker (`schedule.worker_of`); if no step has a worker, by first argument."""
         workers = workers_of(self.problem)
         found: dict[str, list[Bar]] = {}
         for bar in self.bars:
@@ -119,7 +121,7 @@ class Timeline:
         return dict(sorted(found.items()))
 
     def met(self, symbol: Symbol) -> bool | None:
-        """Return whether a symbol has its goal value in the end; None if it has no goal."""
+        """Return whether a symbol has its goal value in the end; None if the symbol has no goal."""
         wanted = self.problem.goal.get(symbol)
         return None if wanted is None else self.final.get(symbol, FALSE) == wanted
 
@@ -132,7 +134,7 @@ def of_plan(problem: Problem, plan: Plan) -> Timeline:
 
 
 def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
-    """Return the timeline of a plan in time; effects begin at the ends of primitives, or at their beginnings if so stated."""
+    """Return the timeline of a scheduled plan, with each effect at the end or the begin of a primitive, as the behaviour states."""
     bars = tuple(
         Bar(slot.step, float(slot.begin), float(slot.end), actors=slot.actors, slack=float(slot.slack))
         for slot in timed.slots
@@ -163,7 +165,7 @@ def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
 
 
 def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:
-    """Return the timeline of a rollout, with the effects of each successful primitive from its end on."""
+    """Return the timeline of a rollout, in which the effects of a successful primitive begin at its end."""
     now = max(0.0, rollout.simulated_seconds - sum(report.seconds for report in rollout.steps))
     by_path = {step.path: step for step in plan.primitives}
     bars = []
@@ -182,7 +184,7 @@ def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:
 
 
 def of_episode(problem: Problem, episode: Episode) -> Timeline:
-    """Return the timeline of an episode, as the robot perceived it."""
+    """Return the timeline of an episode, with the values of symbols that the robot perceived."""
     done = {step.path: step for step in episode.done.walk()}
     bars = tuple(
         Bar(
@@ -222,7 +224,7 @@ def of_episode(problem: Problem, episode: Episode) -> Timeline:
 
 
 def _states(problem: Problem, steps: Iterable[Step]) -> list[State]:
-    """Return the state after each of some primitives; an inapplicable one leaves the state unchanged."""
+    """Return the state after each primitive; an inapplicable primitive doesn't change the state."""
     state, found = problem.initial, []
     for step in steps:
         state = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state) or state

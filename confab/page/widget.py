@@ -1,4 +1,4 @@
-"""The page in a notebook, by anywidget, with the same script, data and style; Python plans and answers queries."""
+"""The page as a widget (anywidget) in a notebook. Python plans and answers the queries of the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MISSING = "the board needs anywidget, which isn't installed; pip install anywidg
 
 
 def board(scene: Known) -> anywidget.AnyWidget:
-    """Return the page of a scene, for a notebook; its `result` is the last plan.
+    """Return the page of a scene as a widget for a notebook, whose property `result` is the current result of planning.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
 
         @property
         def result(self) -> Result:
-            """The result of planning with the present controls."""
+            """The result of planning with the present facts and goals of the page."""
             return self.sheet.plan(turned_from(self.turned))
 
     return Board(Sheet(scene))
