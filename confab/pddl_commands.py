@@ -1,4 +1,4 @@
-"""The commands `confab import` and `confab export`: PDDL files to a scene; a level of a scene to PDDL, and plans back."""
+"""Conversion of PDDL files to a scene, of a level of a scene to PDDL, and of PDDL plans to plans of a scene."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import GroundBehavior, Problem
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
-"""A behaviour with its arguments."""
+"""The name of a behaviour, and its arguments."""
 
 
 def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Problem:
-    """Write a PDDL domain and problem as a scene in Turtle, its behaviours on one level.
+    """Write a PDDL domain and problem as a scene in Turtle, with all behaviours on one level.
 
     Returns
     -------
     Problem
-        The scene's problem.
+        The problem of the new scene.
 
     Raises
     ------
     KnowledgeError
-        The PDDL can't be used, or the scene can't be written; the message is one line, with file, line and column if known.
+        The PDDL can't be used, or the scene can't be written. The message states file, line and column if known.
     """
     try:
         pddl = parse_files(domain, problem)
@@ -54,18 +54,17 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
 
 
 def _check_turtle(file: Path) -> None:
-    """Raise `SyntaxError` if the written text isn't Turtle."""
+    """Raise `SyntaxError` if a file isn't valid Turtle."""
     for _ in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
         pass
 
 
 def exported(problem: Problem, level: int | None) -> Exported:
-    """Return one level of a scene in PDDL, the lowest if none is given.
+    """Return a level of a problem in PDDL, by default the lowest level.
 
     Raises
     ------
-    KnowledgeError
-        There is no such level, or the scene has none.
+    KnowledgeError The scene has no such level, or no level at all.
     """
     levels = problem.domain.levels
     if not levels:
@@ -78,12 +77,12 @@ def exported(problem: Problem, level: int | None) -> Exported:
 
 
 def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:
-    """Write one level of a scene, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder.
+    """Write a level of a problem, by default the lowest, as ``domain.pddl`` and ``problem.pddl`` into a folder.
 
     Raises
     ------
     KnowledgeError
-        There is no such level, the scene has none, or the folder can't be written.
+        The scene has no such level, or no level at all, or the folder can't be written.
     """
     found = exported(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"
@@ -98,17 +97,17 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
 def read_pddl_plan(
     problem: Problem, level: int | None, text: str, regroup: bool = False, shorten: bool = False
 ) -> Plan:
-    """Read a plan of another planner for an exported level, as one of our plans.
+    """Return the plan that another planner found for an exported level.
 
     A planner without hierarchy interleaves independent steps arbitrarily, so that one hand may wait at a place that the other
-    needs. `regroup` moves each step directly after the latest step on which it depends; `shorten` also removes steps that the
-    goal doesn't need. The values of a behaviour's variables (the object that is grasped) follow from the state before it. After
-    an inapplicable step they are left open, which validation reports.
+    hand needs. With `regroup`, each step is moved directly after the latest step on which it depends. With `shorten`, steps
+    that the goal doesn't need are removed. The values of a behaviour's variables (such as the object that is grasped) follow
+    from the state before the step. They remain unset from the first inapplicable step on, which validation reports.
 
     Raises
     ------
     KnowledgeError
-        A line is no action of the export.
+        A line of the text is no action of the exported level.
     """
     level = problem.domain.levels[-1] if level is None else level
     try:
@@ -129,7 +128,7 @@ def read_pddl_plan(
 
 
 def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:
-    """Return the steps regrouped; unchanged if they don't reach the goal or time is short."""
+    """Return the regrouped steps; return them unchanged if the level can't be grounded, also for lack of time."""
     try:
         task = ground(problem, level)
     except (OutOfTimeError, UngroundableError):

@@ -1,4 +1,4 @@
-"""Verification of plans in physics: rollouts of a scene's plan, and their report."""
+"""Verification of plans in physics: rollouts of a plan, and the report on them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 class SuccessJson(TypedDict):
-    """The number of verified rollouts, the interval of the rate, and the mean share of a serving that arrived."""
+    """The number of verified rollouts, the confidence interval of their rate, and the mean poured share of a serving."""
 
     verified: int
     of: int
@@ -41,13 +41,13 @@ class SuccessJson(TypedDict):
 
 
 class SeenRolloutJson(RolloutJson):
-    """A rollout, with the final observed values of the goals' symbols."""
+    """A rollout, with the final observed values of the symbols of goals."""
 
     seen: list[str]
 
 
 class ReportJson(TypedDict):
-    """The verification of a plan in physics."""
+    """The report of a verification of a plan in physics."""
 
     status: str
     success: SuccessJson
@@ -58,10 +58,10 @@ class ReportJson(TypedDict):
 @right_names("a report", "confab.hints", "REPORT")
 @dataclass(frozen=True)
 class Report:
-    """The report of a verification: one or more rollouts of a plan, and the film of the first.
+    """The report of a verification: the rollouts of a plan, and the film of the first rollout.
 
-    A rollout is good if every primitive had its expected effects and the goal's facts were seen in the end. `trusted` has the
-    number of effects of the plan by situation type that no perceiver reads: these effects are not verified.
+    A rollout is good if every primitive had its expected effects and no final observation contradicts a goal. `trusted` has the
+    numbers of effects of the plan that are not verified, since no perceiver reads their situation type.
     """
 
     plan: Plan
@@ -83,7 +83,7 @@ class Report:
 
     @property
     def shown(self) -> Rollout:
-        """The first rollout that isn't good; if all are good, the first."""
+        """The first rollout that isn't good; if all rollouts are good, the first rollout."""
         return next((r for r in self.rollouts if not r.ok or self.missed(r)), self.rollouts[0])
 
     @property
@@ -94,13 +94,13 @@ class Report:
         return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
-        """Return the goals for which another value was seen in the end; symbols without a perceiver are skipped."""
+        """Return the goals for whose symbols a rollout observed another final value; symbols without a perceiver are skipped."""
         wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
         return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
     @property
     def poured(self) -> float | None:
-        """Mean share of a serving that arrived, over all pours of all rollouts; None if there was no pour."""
+        """Mean poured share of a serving over all pours of all rollouts; None without a pour."""
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 
@@ -119,11 +119,11 @@ class Report:
         return [str(Fact(symbol, rollout.state[symbol])) for symbol in sorted(self.goal) if symbol in rollout.state]
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return the verdict on each step, by its path, in the rollout `shown`."""
+        """Return the verdicts on the primitives in the rollout `shown`, by the step's path."""
         return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in self.shown.steps}
 
     def table(self) -> Table:
-        """Return a table of the rollout `shown`: primitives with verdicts and measurements."""
+        """Return a table of the primitives in the rollout `shown`, with verdicts and measurements."""
         rows = (
             (
                 str(report.step),
@@ -135,7 +135,7 @@ class Report:
         return Table(("primitive", "done", "measured"), tuple(rows))
 
     def summary(self) -> str:
-        """Return the result in one line."""
+        """Return the result of the verification in one line."""
         first = self.shown
         several = self._on_trust() + (f"; {self.rate()}" if len(self.rollouts) > 1 else "")
         if first.failure is not None:
@@ -158,7 +158,7 @@ class Report:
         )
 
     def _on_trust(self) -> str:
-        """Return the number of effects that are not verified, by situation type."""
+        """Return the numbers of effects that are not verified, by situation type, as text."""
         effects = ", ".join(f"{count} of {situation}" for situation, count in self.trusted.items())
         return f"; on trust, since no perceiver reads the effects: {effects}" if effects else ""
 
@@ -170,13 +170,13 @@ class Report:
         return f"{self.good} of {len(self.rollouts)} rollouts verified ({seeds}; 95 % confidence: {low:.1%} to {high:.1%}){poured}"
 
     def __rich__(self) -> PlanTree:
-        """Return the plan with each primitive's verdict, for rich."""
+        """Return the plan as a tree for rich, with a verdict on each primitive."""
         from confab.show import plan_tree
 
         return plan_tree(self.plan, self.summary(), self.notes())
 
     def __repr__(self) -> str:
-        """Return the summary."""
+        """Return the summary of the verification."""
         return self.summary()
 
     def _repr_html_(self) -> str:
@@ -231,32 +231,33 @@ def verify(
     ----------
     scene, plan
     rollouts, seed
-        Number of rollouts, with the seeds `seed`, `seed` + 1, …
+        Number of rollouts, which have the seeds `seed`, `seed` + 1, …
     perturb
-        Vary poses, friction, masses and fill.
+        Vary poses, friction, masses and filled amounts at random.
     noise
         Standard deviation of perceived positions, in metres.
     video
         Film the first rollout.
     prepare
-        Called with each world before the first step (`confab.sim.faults`).
+        Called with each world before the first step, for instance to inject a fault (`confab.sim.faults`).
     progress
         Called before each step of a single or filmed rollout, with the number of steps done.
     workers
-        Number of processes, or a Ray cluster: see `confab.sim.rollouts.rollouts`.
+        Number of processes, or the address of a Ray cluster (`confab.sim.rollouts.rollouts`).
     done
         Called with each finished rollout.
     goal
-        Facts that have to be seen in the end; by default the scene's goal.
+        Goals that the final observation must confirm; by default the scene's goals.
     gui
-        Show the first rollout on the screen, no faster than the simulated time.
+        Show the first rollout on the screen, at most as fast as simulated time.
     time_limit
-        Seconds for the whole call, after which it raises `LimitError`.
+        Time limit of the whole call in seconds. At the limit, the call raises `LimitError`.
 
     Raises
     ------
     KnowledgeError
-        The plan isn't applicable in the scene's situation, the scene has no geometry, or `workers` or a screen is not available.
+        The plan isn't applicable in the scene's initial state, the scene has no geometry, or `workers` or a screen isn't
+        available.
     """
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
@@ -296,7 +297,7 @@ def verify(
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
-    """Return the number of values that change from state to state and that no perceiver reads, by situation type."""
+    """Return the numbers of changes between successive states that no perceiver reads, by situation type."""
     counts: dict[str, int] = {}
     for before, after in pairwise((scene.problem.initial, *expected)):
         for symbol in {*before, *after}:
@@ -309,7 +310,7 @@ def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
 
 
 def require_skills(scene: Known, behaviors: Iterable[str]) -> None:
-    """Raise `KnowledgeError` if one of the behaviours has no skill, or the scene no robot."""
+    """Raise `KnowledgeError` if a behaviour has no skill, or the scene has no robot."""
     skills = scene.embodiment.skills
     for behavior in behaviors:
         if behavior not in skills:
@@ -332,7 +333,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout of a seed on film, on the screen, or both."""
+    """Execute the rollout of a seed, and film it, show it on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:
@@ -358,7 +359,7 @@ def _shown(
 
 @contextmanager
 def counted(rollouts: int) -> Iterator[Done]:
-    """Show a progress bar on stderr; yield a function that counts a finished rollout."""
+    """Show a progress bar on stderr; yield the function to call with each finished rollout."""
     with progress("rollouts", rollouts) as advance:
         good = 0
 

@@ -1,4 +1,4 @@
-"""Pictures of a scene: its initial state, a behaviour with its conditions and effects, the classes of objects."""
+"""Pictures of a scene: the initial state, a behaviour with conditions and effects, or the classes of objects."""
 
 from __future__ import annotations
 
@@ -44,17 +44,19 @@ SITUATIONS = (
 
 
 def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
-    """Draw a picture into a file and return its path: by default the table with its places and the hands that reach them.
+    """Draw a picture of a scene into a file, and return the file's path.
+
+    By default the picture shows the table with its places and the hands that reach them.
 
     Parameters
     ----------
     scene : Scene
     path : Path
-        ``.png``; a diagram also ``.svg`` or ``.pdf``.
+        The file, whose suffix is ``.png``, or for a diagram also ``.svg`` or ``.pdf``.
     behavior : str, optional
-        Draw this behaviour with its conditions and effects instead.
+        Draw a diagram of this behaviour with its conditions and effects.
     classes : bool
-        Draw the classes of objects with their situation types instead.
+        Draw a diagram of the classes of objects with their situation types.
 
     Raises
     ------
@@ -74,14 +76,14 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
 
 
 def words_as_they_are() -> AbstractContextManager[None]:
-    """Return a context in which figures show ``$`` as a character; by default matplotlib parses it as the mark of a formula."""
+    """Return a context in which matplotlib draws ``$`` as a character instead of reading it as the begin of a formula."""
     from matplotlib import rc_context
 
     return rc_context({"text.parse_math": False})
 
 
 def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
-    """Write a figure atomically in the format of the path's suffix; return the path."""
+    """Write a figure into a file atomically, in the format of the path's suffix, and return the path."""
     drawn = BytesIO()
     form = path.suffix[1:].lower()
     figure.savefig(drawn, dpi=dpi, format=form, metadata={"Software" if form == "png" else "Creator": MAKER})
@@ -90,7 +92,7 @@ def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
 
 
 def card(scene: Known, name: str) -> Figure:
-    """Return a diagram of a behaviour between its preconditions and its effects, labelled by their sentences."""
+    """Return a diagram of a behaviour between its preconditions and its effects, which are labelled with sentences."""
     from matplotlib.figure import Figure
 
     behavior = behavior_named(scene.reading, name)
@@ -123,7 +125,7 @@ def card(scene: Known, name: str) -> Figure:
 
 
 def class_tree(scene: Known) -> Figure:
-    """Return a diagram of the classes of objects, from left to right, each with its situation types, defined ones last."""
+    """Return a diagram of the classes of objects from left to right, each class with its situation types."""
     from matplotlib.figure import Figure
 
     below: dict[str, list[str]] = {}
@@ -135,7 +137,7 @@ def class_tree(scene: Known) -> Figure:
     for row in scene.knowledge.select(SITUATIONS):
         situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
     defined: set[str] = set()
-    with suppress(KnowledgeError):  # a scene that can't be planned can still be drawn
+    with suppress(KnowledgeError):  # the classes of a scene that can't be planned in can be drawn
         defined |= {local_name(scene.names.iri(name)) for name in scene.reading.problem.domain.rules}
     root = next((iri for iri in below if local_name(iri) == "Object"), None)
     if root is None:
@@ -173,18 +175,18 @@ def class_tree(scene: Known) -> Figure:
 
 
 def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return pairs of class and subclass without redundant ones, which reasoners write into files."""
+    """Return the pairs of class and subclass without the redundant pairs that reasoners write into files."""
     import networkx
 
     graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])
-    if not networkx.is_directed_acyclic_graph(graph):  # equivalent classes
+    if not networkx.is_directed_acyclic_graph(graph):  # the scene has equivalent classes
         return list(pairs)
     direct = set(networkx.transitive_reduction(graph).edges)
     return [pair for pair in pairs if pair in direct]
 
 
 def fill_lines(words: str, width: int = 32) -> str:
-    """Return a text with each line wrapped to a width."""
+    """Wrap each line of a text to a width in characters."""
     return "\n".join(fill(line, width) for line in words.splitlines())
 
 
@@ -213,7 +215,7 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
 
 
 def _top(world: PhysicsWorld, name: str) -> Array:
-    """Return the middle of a body's top."""
+    """Return the middle of the top of a body, in metres in the world frame."""
     from confab.sim.bodies import outline
 
     rotation, base = world.truth(name)
@@ -222,7 +224,7 @@ def _top(world: PhysicsWorld, name: str) -> Array:
 
 
 def _table(scene: Known, path: Path) -> Path:
-    """Draw the initial world with objects and places, and the hands at places that not every hand reaches."""
+    """Draw the table in the initial state with objects and places. Places that not every hand reaches name their hands."""
     from PIL import Image, ImageDraw, ImageFont
     from PIL.PngImagePlugin import PngInfo
 

@@ -1,4 +1,4 @@
-"""Options of a planning call: one value, with one check, for Python, the command line, agents and the page."""
+"""The options of a planning call, which Python, the command line and agents share, and their validation."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from confab.reasoner.memory.links import Links
 
 NO_ENGINE = "none"
-"""The value of the option `engine` that excludes all engines."""
+"""Value of the option `engine` for planning without external planners."""
 OPTIMAL_SECONDS = 10.0
-"""Default time limit of the search for an optimal plan."""
+"""Default time limit of the search for an optimal plan in seconds."""
 
 
 class Options(TypedDict, total=False):
@@ -38,12 +38,12 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """Options of a planning call; `confab.planning.plan` describes them.
+    """Options of a planning call, as `confab.planning.plan` describes them.
 
     Raises
     ------
     KnowledgeError
-        The mode is unknown, a number isn't one, or options exclude each other.
+        The mode is unknown, the time limit is no number, or options exclude each other.
     """
 
     memory: Memory | Links | str | Path | None = None
@@ -57,7 +57,7 @@ class PlanOptions:
     minimise: Minimise | None = None
 
     def __post_init__(self) -> None:
-        """Check the options."""
+        """Raise `KnowledgeError` if an option is invalid or options exclude each other."""
         checked_minimise(self.minimise)
         if self.level is not None and not self.by_engine:
             raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
@@ -86,22 +86,22 @@ class PlanOptions:
 
     @property
     def asks_for_least(self) -> bool:
-        """Whether another option than `mode` requires the optimal search."""
+        """Whether an option other than `mode` requires the optimal search."""
         return self.optimal or self.minimise in ("cost", "steps")
 
     @property
     def strategy(self) -> str:
-        """The mode of planning that follows from all options."""
+        """The mode of planning that results from all options."""
         return "optimal" if self.asks_for_least else self.mode
 
     @property
     def limit(self) -> float | Deadline | None:
-        """The time limit, by default that of the optimal search."""
+        """The time limit. The optimal search has the default `OPTIMAL_SECONDS`."""
         return OPTIMAL_SECONDS if self.time_limit is None and self.strategy == "optimal" else self.time_limit
 
 
 def leaves_levels(levels: str) -> bool:
-    """Return whether levels may be left, given the value of ``--levels``."""
+    """Return whether the value of ``--levels`` allows plans without steps of some levels."""
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     return levels == "free"

@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar with the remaining time in a terminal, occasional lines elsewhere."""
+"""Progress on stderr: a bar with the remaining time in a terminal, and occasional lines in other outputs."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 PATIENCE = 1.0
-"""Seconds before a bar appears; shorter work shows none."""
+"""Seconds before a progress bar appears."""
 
 Advance: TypeAlias = Callable[[str, int], None]
-"""Receives the present activity and the amount of work done."""
+"""A function that receives the present activity and the amount of additional work done."""
 
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Advance]:
-    """Show the progress of work that takes longer than `PATIENCE`; yield the function that receives it.
+    """Show a progress bar for work that takes longer than `PATIENCE`; yield the function that advances the bar.
 
     Parameters
     ----------
     what : str
-        The current stage.
+        The activity at the beginning.
     total : int, optional
-        The amount of work; if unknown, the bar shows only the time.
+        The total amount of work. If the amount is unknown, the bar shows only the elapsed time.
     """
     begin = perf_counter()
     if quiet() or not sys.stderr.isatty() or log.isEnabledFor(logging.DEBUG):
@@ -53,7 +53,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
 
 
 def progress_bar() -> Progress:
-    """Return a rich progress bar on stderr that disappears in the end."""
+    """Return a rich progress bar on stderr, which is erased when it stops."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -71,13 +71,13 @@ def progress_bar() -> Progress:
 
 
 def tell(what: str) -> None:
-    """Write the present activity to stderr in a line, if no bar can be shown."""
+    """Print the present activity as a line on stderr if stderr is no terminal, where no bar is shown."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
 
 
 def be_verbose() -> None:
-    """Print the duration of each stage and log messages on stderr, until the process ends."""
+    """Print log messages and the duration of each stage on stderr."""
     spoken = logging.getLogger("confab")
     spoken.setLevel(logging.DEBUG)
     if not spoken.handlers:
@@ -88,5 +88,5 @@ def be_verbose() -> None:
 
 
 def quiet() -> bool:
-    """Return whether only results and errors are printed (`confab COMMAND --quiet`)."""
+    """Return whether the option ``--quiet`` suppresses all output except results and errors."""
     return not log.isEnabledFor(logging.WARNING)

@@ -1,4 +1,4 @@
-"""Reach facts: computed from geometry when they are missing or outdated, and kept beside the scene."""
+"""Reach facts (which hand reaches which place), computed from geometry and stored in a file beside the scene."""
 
 from __future__ import annotations
 
@@ -18,26 +18,28 @@ ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
   FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
   FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
-"""Ontologies of episodes and memories, whose scenes have reach facts of their own."""
+"""Query for the robots of a scene with geometry. It returns nothing for files of episodes and memories."""
 
 REACHED = "SELECT DISTINCT ?place WHERE {{ ?hand <{relation}> ?place }}"
-"""The places that some hand reaches."""
+"""Query for the places that at least one hand reaches."""
 
 
 def has_robot(scene: Known) -> bool:
-    """Return whether a scene has a robot with a body."""
+    """Return whether a scene has a robot whose body is described."""
     return bool(scene.knowledge.select(ROBOTS))
 
 
 def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
-    """Return the scene with reach facts if it has a robot and they are missing or older than one of the user's files.
+    """Return a scene whose reach facts are up to date if it has a robot with a body; other scenes are returned unchanged.
 
-    A scene with incomplete bodies can still be planned in; `tell` then receives what is missing.
+    Reach facts are computed if their file is missing or older than a file of the scene. If the bodies are described
+    incompletely, the scene is returned unchanged, and `tell` is called with the missing statement. Shipped scenes are always up
+    to date.
     """
     graph = scene.knowledge
     if graph.remote or graph.faults or not graph.select(ROBOTS):
         return scene
-    if graph.path is None:  # a text has no file beside it
+    if graph.path is None:  # a scene read from text has no file of reach facts
         try:
             return with_reach(scene)
         except (KnowledgeError, ImportError) as error:
@@ -61,16 +63,16 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
 
 
 def with_reach(scene: S) -> S:
-    """Return the scene with reach facts that fit its geometry.
+    """Return a scene with reach facts that agree with its geometry.
 
-    They are computed if the scene has none, or has those of another geometry. They are then written into ``SCENE.reach.ttl``
-    beside the scene's file, so that later planning needs no physics; if the file can't be written, only the returned scene has
-    them.
+    Reach facts are computed if they are missing or were computed for another geometry. Computed facts are written into
+    ``SCENE.reach.ttl`` beside the scene's file, so that later calls needn't compute them. If the file can't be written, the
+    facts are only in the returned scene.
 
     Raises
     ------
     KnowledgeError
-        The scene is symbolic only, or lacks statements that physics needs.
+        The scene has no geometry, or lacks statements that physics needs.
     """
     from confab.reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
     from confab.sim.reach import fingerprint, reach
@@ -100,7 +102,7 @@ def with_reach(scene: S) -> S:
 
 
 def unreached(scene: Known) -> list[str]:
-    """Return a line for each place in the initial facts or goals that no hand reaches, with the obstacle for each hand."""
+    """Return a sentence for each place in initial facts or goals that no hand reaches, with the obstacle for each hand."""
     from confab.reasoner.embodiment.reach import reach_relation
     from confab.sim.reach import hindrance
 

@@ -1,4 +1,4 @@
-"""Refutations: the next plan, and later calls, avoid behaviours that physics found impossible in a situation."""
+"""Refutations: behaviours that physics found impossible in a situation, which the next plan and later calls avoid."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
-    """Return the refutation of the first failed rollout; None if the failure wasn't a missing motion."""
+    """Return the refutations that follow from the first failed rollout; the tuple is empty if motion planning didn't fail."""
     failure = report.shown.failure
     if failure is None:
         return ()
@@ -32,21 +32,21 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:
-    """Return a scene in which some behaviours are refuted; this scene is unchanged."""
+    """Return a copy of a scene in which some behaviours are refuted."""
     return type(scene)(with_refuted(scene.knowledge, scene.reading, refutations), dict(scene.seconds))
 
 
 def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
-    """Write refutations into ``SCENE.reach.ttl`` beside a scene of the user, for later calls.
+    """Write refutations into the file ``SCENE.reach.ttl`` beside a user's scene, for later calls.
 
-    They are valid as long as the geometry doesn't change. Nothing is written beside shipped scenes.
+    Refutations are valid until the geometry of the scene changes. For shipped scenes, no file is written.
     """
     path = scene.knowledge.path
     if not refutations or path is None or path.is_relative_to(ontology.ROOT):
         return
     file = path.with_name(f"{path.stem}.reach.ttl")
     triples = [triple for one in refutations for triple in refuted(scene.knowledge, scene.reading, one)]
-    with suppress(FileNotFoundError):  # a scene that states reach by hand has no such file
+    with suppress(FileNotFoundError):  # a scene whose author states the reach facts has no such file
         try:
             add_to_reach(file, scene.knowledge, triples)
         except (PermissionError, FileExistsError, KnowledgeError) as error:

@@ -1,4 +1,4 @@
-"""The main job: validate, plan, verify in physics if there are bodies, learn, report."""
+"""The command ``confab run``: validate a scene, plan, verify the plan in physics, learn, and write a report."""
 
 from __future__ import annotations
 
@@ -33,14 +33,15 @@ if TYPE_CHECKING:
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8
-"""Number of primitives between two lines about the progress of execution, if there is no progress bar."""
+"""Number of primitives between two lines about the progress of execution in an output without a progress bar."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """The job of `run`: its scene and goals, planning options, video, and target folder.
+    """The arguments of `run`: a scene, goals, planning options, a target folder, and options for the film.
 
-    `memory` is the only file that is read or written as memory. `noise` is the standard deviation of perceived positions in metres.
+    `memory` is the memory file to read and to write, if any. `noise` is the standard deviation of perceived positions in
+    metres.
     """
 
     scene: str
@@ -55,7 +56,7 @@ class Job:
 
     @property
     def command(self) -> str:
-        """The command that does the same, without the options for output."""
+        """The command line that repeats the run, without options for output."""
         given = {"--mode": self.mode, "--seed": str(self.seed), "--noise": f"{self.noise:g}"}
         first = {"--mode": DEFAULT_MODE, "--seed": "0", "--noise": "0"}
         options = [part for name, value in given.items() if value != first[name] for part in (name, value)]
@@ -64,20 +65,21 @@ class Job:
 
 
 def run(job: Job) -> int:
-    """Do the main job, print its results, and write its files.
+    """Validate a scene, plan, verify the plan in physics, learn from it, print the results, and write files.
 
-    For a scene without a robot's body, the plan is made and checked, and not executed in physics. The same holds if PyBullet
-    isn't installed: a remark first names the obstacle, and the exit code is that of misuse.
+    Without a robot's body in the scene, the plan isn't executed in physics. Without PyBullet, the plan isn't executed either.
+    In this case a remark states the reason, and the exit code is 2.
 
     Returns
     -------
     int
-        Exit code: 0 verified, 1 invalid, unsolvable or failed in physics, 2 not verified without PyBullet, 3 gave up.
+        The exit code is 0 for a good plan, 1 for an invalid scene, an unsolvable task or a failure in physics, 2 for a plan
+        that is not verified since PyBullet is missing, and 3 if planning gave up.
 
     Raises
     ------
     KnowledgeError
-        The scene, or the memory, can't be read.
+        The scene or the memory can't be read.
     """
     kinds = {"plan.json": PLAN, "report.html": REPORT, "verify.json": VERDICTS, "observed.ttl": OBSERVED}
     for file, kind in {**kinds, "run.mp4": FILM, RECORD: RUN}.items():
@@ -115,7 +117,7 @@ def run(job: Job) -> int:
     good = result.outcome.plan is not None and (report is None or report.verified) and (physics or not bodies)
     if job.memory and good:
         with undisturbed(job.memory):
-            if has_content(job.memory):  # another process may have changed it
+            if has_content(job.memory):  # another process may have changed the file
                 remembered = Memory.load(job.memory, scene)
             remembered.learn(scene, result)
             remembered.save(job.memory)
@@ -130,9 +132,10 @@ def run(job: Job) -> int:
 
 
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
-    """Return the first plan that physics doesn't refute, the refutations, and the verdict of physics.
+    """Verify a plan in physics, and plan again as long as physics refutes the plan.
 
-    Refutations by motion planning apply to the next plan, and are saved if there is one.
+    Return the scene with all refutations, the last result of planning, and the report of its verification. Refutations are
+    saved if the next plan differs from the refuted plan.
     """
     report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):
@@ -148,7 +151,7 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
 
 
 def verified(scene: Scene, result: Result, job: Job) -> Report:
-    """Return the verdict of physics on a plan, with a progress bar on stderr."""
+    """Verify a plan in physics, show the progress on stderr, and return the report."""
     steps = result.plan.primitives
     video = job.out / "run.mp4" if job.film else None
     tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
@@ -163,9 +166,10 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
 
 
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
-    """Write the report and the record; also the plan if there is one, and the verdicts and observed facts of a rollout.
+    """Write the files of a run, and return their paths by kind.
 
-    Return the paths.
+    Each run has a report and a record. A plan, the verdicts and observed facts of a rollout, and a film are written if
+    available.
     """
     from confab.page.data import page_data
     from confab.page.frozen import write_page

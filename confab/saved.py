@@ -1,4 +1,4 @@
-"""Episodes and verdicts read from the JSON files in which they were saved (docs/execution.md, docs/command-line.md)."""
+"""Reading of episodes and verdicts from JSON files (docs/execution.md, docs/command-line.md)."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ Data: TypeAlias = Mapping[str, Any]
 
 
 def read_episode(scene: Known, path: Path) -> Execution:
-    """Return the execution in a JSON file.
+    """Return the execution that a JSON file describes.
 
     Parameters
     ----------
     scene : Scene
-        The scene in which it happened.
+        The scene of the execution.
     path : Path
-        Output of ``confab execute --json``, or a file written by `Execution.save` whose name ends in ``.json``. The file
-        doesn't contain the situation before a failure, and the static facts on which a step relied.
+        The output of ``confab execute --json``, or a JSON file of `Execution.save`. The returned execution lacks the states
+        before failures, and the static facts on which steps relied, since the file doesn't contain them.
 
     Raises
     ------
     KnowledgeError
-        The file contains no episode, or an episode of another scene, or it mentions terms that the scene doesn't have.
+        The file contains no episode, contains an episode of another scene, or mentions terms that the scene doesn't have.
     """
     from confab.execution import Execution
 
@@ -87,20 +87,20 @@ def read_episode(scene: Known, path: Path) -> Execution:
 
 
 def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
-    """Return the verification in a JSON file.
+    """Return the report of a verification that a JSON file describes.
 
     Parameters
     ----------
     scene : Scene
     verdicts : Path
-        Output of ``confab verify --json``, or ``verify.json`` written by ``confab run``.
+        The output of ``confab verify --json``, or the file ``verify.json`` of ``confab run``.
     plan : Plan
-        The plan that was verified.
+        The verified plan.
 
     Raises
     ------
     KnowledgeError
-        The file contains no verdicts, or the verdicts on another plan.
+        The file contains no verdicts, or verdicts on another plan.
     """
     from confab.physics import Report
     from confab.sim.verdict import Verdict
@@ -143,7 +143,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON object in a file; raise `KnowledgeError` if a part is missing or has another form."""
+    """Yield the JSON data in a file; raise `KnowledgeError` if the block finds a part missing or of another form."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -164,7 +164,7 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
 def _interventions(
     problem: Problem, data: Data
 ) -> tuple[tuple[tuple[Intervention, float], ...], tuple[Intervention, ...], Problem]:
-    """Return the interventions that took place, the interventions that didn't, and the problem with all added individuals."""
+    """Return the interventions that took place (with times), all other interventions, and the problem with added individuals."""
     from confab.execution import parse_intervention
 
     for one in data.get("discovered", []):
@@ -214,7 +214,7 @@ def _failure(one: Data, done: Mapping[tuple[int, ...], Step]) -> Failure:
 
 
 def _observed(initial: State, course: Sequence[Seen]) -> dict[Symbol, str]:
-    """Return the situation after all observed changes."""
+    """Return the state after all observed changes."""
     state = dict(initial)
     for seen in course:
         if seen.value is None:

@@ -7,10 +7,10 @@
                 newer); POST of changed controls, answered with the resulting plan
 ==============  ==========================================================================================================
 
-uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), in lanes. The first
-lane is for short queries; a query that exceeds the time of a lane starts again in the next one, with lower priority, so that
-short queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are
-refused.
+The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), which
+form lanes with growing time limits. A query that exceeds the limit of a lane is started again in the next lane with lower
+priority. Therefore short queries never wait for long queries. A query is cancelled when its client disconnects. Requests from
+other machines and from web pages of other sites are refused.
 """
 
 from __future__ import annotations
@@ -63,15 +63,15 @@ transport_log.setLevel(logging.CRITICAL + 1)
 T = TypeVar("T")
 PORT = 7879
 LANES, AT_ONCE = (0.05, 0.5, 5.0, None), 2
-"""Maximum seconds of a query in each lane, and maximum number of concurrent queries in each lane."""
+"""Time limits of the lanes in seconds, and maximum number of concurrent queries in each lane."""
 LARGEST, SLOWEST = 1_000_000, 20.0
-"""Maximum number of bytes of a request's body; maximum seconds in which a request must arrive, and an answer must be received."""
+"""Maximum size of a request's body in bytes, and maximum time of receiving a request or sending an answer in seconds."""
 MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
-"""Open connections."""
+"""Maximum number of open connections."""
 LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
-"""The target of a request if it contains a host."""
+"""Pattern of a request's target that contains a host."""
 SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
@@ -80,7 +80,7 @@ SOLUTIONS = {
     "text/csv": "sparql-csv",
     "text/tab-separated-values": "tsv",
 }
-"""Media types of the answer to a SELECT query; the first four are also those of an ASK query. The first one is the default."""
+"""Media types of answers to SELECT queries. ASK queries have the first four media types. The first media type is the default."""
 TRIPLES = {
     "text/turtle": ox.RdfFormat.TURTLE,
     "application/n-triples": ox.RdfFormat.N_TRIPLES,
@@ -91,21 +91,21 @@ DESCRIPTION = Path(__file__).with_name("service.ttl")
 
 
 class Worker:
-    """A process that answers queries about the current scene, called from an event loop."""
+    """A process that answers queries about the current state of the scene, called from an event loop."""
 
     def __init__(self, service: Service, nice: int) -> None:
         self.service, self.change = service, 0
         self.process = QueryWorker(service.scene.knowledge, service.limits, nice)
 
     def ready(self) -> None:
-        """Wait until the process has read the current scene."""
+        """Start the process if necessary, and wait until it has read the current state of the scene."""
         if self.change != self.service.change:
             self.change = self.service.change
             self.process.close()
         self.process.start()
 
     async def call(self, function: Callable[..., T], *arguments: object) -> T:
-        """Return the result of a function that runs in a thread; if the caller is cancelled, first end the query of the process."""
+        """Call a function in a thread and return its result; if the caller is cancelled, interrupt the process's query."""
         future = asyncio.get_running_loop().run_in_executor(self.service.threads, function, *arguments)
         try:
             return await asyncio.shield(future)
@@ -118,7 +118,7 @@ class Worker:
 
 
 class Service:
-    """A scene that is served, its view, and the processes that answer queries about it."""
+    """A served scene, the content of its page, and the processes that answer queries about the scene."""
 
     def __init__(self, scene: Known, limits: QueryLimits) -> None:
         self.scene, self.limits, self.change = scene, limits, 0
@@ -131,12 +131,12 @@ class Service:
             self.lanes[number // AT_ONCE].put_nowait(worker)
 
     async def run(self, work: Callable[[QueryWorker], T]) -> T:
-        """Return the result of a query, in the first lane whose limit suffices.
+        """Return the result of a query from the first lane whose time limit suffices.
 
         Raises
         ------
         HTTPException
-            A query is not SPARQL 1.1, or exceeds the limits.
+            The query isn't SPARQL 1.1, or exceeds the limits.
         """
         for seconds, lane in zip(LANES, self.lanes, strict=True):
             worker = await lane.get()
@@ -154,12 +154,13 @@ class Service:
         raise AssertionError("the last lane has no time limit of its own")
 
     def take(self, event: Event) -> None:
-        """Record an event of an execution: the page shows it, and queries see the observed facts."""
+        """Record an event of an execution for the page, and write the observed facts into the graph for queries."""
         from confab.reasoner.reading.observed import assert_observed
 
         self.following.take(event)
         names, known = self.scene.names, self.following.known
-        strange = {one for symbol in known for one in symbol.arguments if one not in names}  # objects that were added
+        # Individuals that were added during execution have no name in the scene.
+        strange = {one for symbol in known for one in symbol.arguments if one not in names}
         if known:
             those = {s: v for s, v in known.items() if v not in strange and not strange.intersection(s.arguments)}
             assert_observed(self.scene.knowledge, those, names)
@@ -170,17 +171,17 @@ class Service:
         for worker in self.workers:
             worker.process.close()
         self.threads.shutdown()
-        for worker in self.workers:  # some may have started since
+        for worker in self.workers:  # a process may have started after the first loop
             worker.process.close()
 
     def page_json(self, after: int) -> bytes | None:
-        """Return the data of the page: a running execution, otherwise the scene; None if there is no newer version."""
+        """Return the content of the page about a running execution or the scene; None if the page has the newest version."""
         if not self.following.begun:
             return json.dumps(self.sheet.scene_data).encode()
         return None if self.following.version <= after else json.dumps(self.following.data()).encode()
 
     def turned_json(self, content: bytes) -> bytes:
-        """Return the data of the page after a change; plans are made one after another."""
+        """Return the content of the page after a user's changes; only one plan is made at a time."""
         try:
             turned = turned_from(json.loads(content or b"{}"))
         except (ValueError, RecursionError, KnowledgeError) as error:
@@ -190,13 +191,13 @@ class Service:
 
 
 class Guard:
-    """Middleware that refuses requests of other machines, and of pages of other sites."""
+    """Middleware that refuses requests from other machines and from web pages of other sites."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or refuse it."""
+        """Pass a request to the application, or refuse it with an HTTP status."""
         headers = Headers(scope=scope)
         host, origin = headers.get("Host", "localhost"), headers.get("Origin", "")
         if named := TARGET.fullmatch(scope["path"]):
@@ -215,7 +216,7 @@ class Guard:
 
 
 class Endpoint:
-    """The pages of a service."""
+    """The HTTP endpoint of a service: the page, its content, and SPARQL."""
 
     def __init__(self, service: Service, url: str) -> None:
         self.service, self.url = service, url
@@ -234,11 +235,11 @@ class Endpoint:
         self.app.router.redirect_slashes = False
 
     async def page(self, request: Request) -> Response:
-        """Respond with the page, which requests its data."""
+        """Respond with the HTML page, which requests its content."""
         return HTMLResponse(page_html(None, "Confab"), headers={"Cache-Control": "no-store"})
 
     async def data(self, request: Request) -> Response:
-        """Respond with the data of the page."""
+        """Respond with the content of the page as JSON."""
         headers = {"Content-Type": "application/json", "Cache-Control": "no-store"}
         if request.method == "POST":
             content = await asyncio.to_thread(self.service.turned_json, await body(request))
@@ -250,7 +251,7 @@ class Endpoint:
         return Response(status_code=204) if found is None else Response(found, headers=headers)
 
     async def sparql(self, request: Request) -> Response:
-        """Answer a query, or describe the service."""
+        """Answer a SPARQL query; without a query, respond with the service description."""
         fields = form(request.scope["query_string"])
         if request.method == "POST":
             kind = request.headers.get("Content-Type", "").partition(";")[0].strip().lower()
@@ -281,7 +282,7 @@ class Endpoint:
     def answer(
         self, process: QueryWorker, query: str, dataset: tuple[Sequence[str], Sequence[str]] | None, accept: str
     ) -> tuple[str, bytes]:
-        """Return the answer of a query, preceded by its media type."""
+        """Return the media type and the text of the answer to a query."""
         what, columns, found = process.ask(query, dataset)
         if what == "triples":
             kind = preferred(accept, list(TRIPLES))
@@ -295,7 +296,7 @@ class Endpoint:
         return kind, Table(tuple(columns), (), tuple(map(tuple, found))).standard(SOLUTIONS[kind])
 
     def description(self, accept: str) -> tuple[str, bytes]:
-        """Return the service description, preceded by its media type."""
+        """Return the media type and the text of the service description."""
         kind, store = preferred(accept, list(TRIPLES)), self.service.scene.knowledge.store
         graphs = ", ".join(f"[ a sd:NamedGraph ; sd:name {name} ]" for name in sorted(map(str, store.named_graphs())))
         text = Template(DESCRIPTION.read_text()).substitute(url=f"{self.url}sparql", triples=len(store), graphs=graphs)
@@ -304,7 +305,7 @@ class Endpoint:
 
 
 async def refused(request: Request, error: Exception) -> Response:
-    """Answer a refused request with a status and one line."""
+    """Respond to a refused request with a status and one line of text."""
     assert isinstance(error, HTTPException)
     where = f"nothing is at {request.scope['path'][:80]!r}; the endpoint is at /sparql"
     return PlainTextResponse(
@@ -313,14 +314,14 @@ async def refused(request: Request, error: Exception) -> Response:
 
 
 async def fault(request: Request, error: Exception) -> Response:
-    """Answer a request that caused a fault of the program."""
+    """Respond to a request that caused a fault of the program."""
     if not isinstance(error, ClientDisconnect):
         log.error("confab: a request couldn't be answered", exc_info=error)
     return PlainTextResponse("a fault of Confab, not yours; see its log\n", 500)
 
 
 async def while_connected(request: Request, work: Awaitable[T]) -> T:
-    """Return the result of some work; cancel it, and raise `ClientDisconnect`, as soon as the client leaves."""
+    """Return the result of a coroutine; if the client disconnects, cancel the coroutine and raise `ClientDisconnect`."""
 
     async def leaving() -> None:
         while (await request.receive())["type"] != "http.disconnect":
@@ -339,7 +340,7 @@ async def while_connected(request: Request, work: Awaitable[T]) -> T:
 
 
 async def body(request: Request) -> bytes:
-    """Return the body of a request: at most `LARGEST` bytes, within `SLOWEST` seconds."""
+    """Return the body of a request; refuse a body of more than `LARGEST` bytes, or one that takes more than `SLOWEST` seconds."""
 
     async def read() -> bytes:
         content = bytearray()
@@ -360,7 +361,7 @@ async def body(request: Request) -> bytes:
 
 
 def form(content: bytes) -> dict[str, list[str]]:
-    """Return the fields of a form."""
+    """Return the fields of an HTML form in a request."""
     try:
         return parse_qs(utf8(content), keep_blank_values=True, errors="strict", max_num_fields=100)
     except ValueError as error:
@@ -368,7 +369,7 @@ def form(content: bytes) -> dict[str, list[str]]:
 
 
 def utf8(content: bytes) -> str:
-    """Return a text, which is UTF-8."""
+    """Decode bytes as UTF-8; refuse the request if they aren't UTF-8."""
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -376,7 +377,7 @@ def utf8(content: bytes) -> str:
 
 
 def preferred(accept: str, offered: Sequence[str]) -> str:
-    """Return the media type that an ``Accept`` header prefers; among equally preferred types, the first offered one.
+    """Return the offered media type that an ``Accept`` header prefers; of equally preferred types, return the first.
 
     >>> preferred("text/csv;q=0.5, application/*", ["application/json", "text/csv"]), preferred("*/*", ["a/b", "c/d"])
     ('application/json', 'a/b')
@@ -396,9 +397,9 @@ def preferred(accept: str, offered: Sequence[str]) -> str:
 
 
 class Connection(H11Protocol):
-    """A connection on which each request must arrive, and each answer must be received, within `SLOWEST` seconds.
+    """A connection that is dropped if a request doesn't arrive completely within `SLOWEST` seconds.
 
-    If too many connections are open, the one that has been idle for the longest time is dropped.
+    If more than `MOST` connections are open, the connection that has waited longest for a request is dropped.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -406,7 +407,7 @@ class Connection(H11Protocol):
         self.logger, self.access_log = transport_log, False
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
-        """Begin to wait for the first request."""
+        """Start the time limit for the first request; drop another connection if too many are open."""
         super().connection_made(transport)
         self.deadline = self.loop.call_later(SLOWEST, transport.abort)
         if len(self.connections) > MOST:
@@ -414,26 +415,26 @@ class Connection(H11Protocol):
             min(waiting, key=lambda c: c.deadline.when()).transport.abort()
 
     def handle_events(self) -> None:
-        """Handle the received data; after the head of a request, the application has its own limits."""
+        """Handle received data, and end the time limit after the head of a request. The application limits the time of the body."""
         before = self.cycle
         super().handle_events()
         if self.cycle is not before and not self.cycle.response_complete:
             self.deadline.cancel()
 
     def on_response_complete(self) -> None:
-        """Begin to wait for the next request."""
+        """Start the time limit for the next request."""
         self.deadline.cancel()
         self.deadline = self.loop.call_later(SLOWEST, self.transport.abort)
         super().on_response_complete()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the connection."""
+        """End the time limit of a closed connection."""
         self.deadline.cancel()
         super().connection_lost(exc)
 
 
 class Server(uvicorn.Server):
-    """A server in a separate thread, which drops its clients when it ends."""
+    """A server in a separate thread, which drops all connections when it stops."""
 
     def __init__(self, service: Service, listening: socket.socket) -> None:
         self.service, self.listening = service, listening
@@ -444,12 +445,12 @@ class Server(uvicorn.Server):
         self.thread = threading.Thread(target=asyncio.run, args=[self.run_quietly()], name="confab-serve", daemon=True)
 
     async def run_quietly(self) -> None:
-        """Serve until `should_exit`; disconnections of clients aren't logged."""
+        """Serve until `should_exit` is set; errors of connections are logged for debugging only."""
         asyncio.get_running_loop().set_exception_handler(lambda _, context: transport_log.debug("%s", context))
         await self.serve([self.listening])
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Drop the clients, which cancels their queries."""
+        """Drop all connections, which cancels their queries."""
         for connection in list(self.server_state.connections):
             connection.transport.abort()
         self.force_exit = True
@@ -458,12 +459,12 @@ class Server(uvicorn.Server):
 
 @contextmanager
 def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -> Iterator[Server]:
-    """Serve a scene until the end of the block; port 0 selects a free port.
+    """Serve a scene on a port until the end of the block; the port 0 selects a free port.
 
     Raises
     ------
     KnowledgeError
-        The port is taken, or the scene is at an endpoint already.
+        The port is in use, or the scene is already at an endpoint.
     """
     if scene.knowledge.remote:
         raise KnowledgeError(f"{scene.iri} is at an endpoint already; ask that one")

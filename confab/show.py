@@ -1,4 +1,4 @@
-"""Plans in a terminal; `confab.page` shows them in notebooks and pages."""
+"""Output of plans in a terminal, a pipe or a file."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ if TYPE_CHECKING:
 
 STYLES = ("bold cyan", "green", "default")
 Notes = Mapping[tuple[int, ...], str]
-"""Remarks on steps, by path: verdicts, for instance."""
+"""Remarks on steps, such as verdicts, by the step's path."""
 
 UNLIMITED = 100_000
-"""Number of columns for output that isn't a terminal, where no line is broken or cut."""
+"""Width in columns of an output that isn't a terminal, so that no line is wrapped or cut."""
 
 
 def page() -> Console:
-    """Return a rich console for stdout: as wide as the terminal, without limit in a pipe or a file."""
+    """Return a rich console for stdout with the width of the terminal, or `UNLIMITED` columns in a pipe or a file."""
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else UNLIMITED)
 
 
 def show(what: Any) -> None:
-    """Print an object of rich to stdout completely; lines are wrapped in a terminal only."""
+    """Print an object that rich can show to stdout; lines are wrapped in a terminal only."""
     page().print(what, markup=False, highlight=False)
 
 
 @dataclass(frozen=True)
 class PlanTree:
-    """A plan as a tree that rich prints: ID, behaviour and arguments of every step."""
+    """A plan as a tree that rich prints, with ID, behaviour and arguments of every step."""
 
     plan: Plan
     title: str
     notes: Notes
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Tree | Segment]:
-        """Yield a tree for a terminal, otherwise plain text, since rich takes longer to draw a large plan than the search takes."""
+        """Yield a rich tree for a terminal and otherwise plain text, since rich is slow for large plans."""
         from rich.control import strip_control_codes
         from rich.segment import Segment
         from rich.text import Text
@@ -56,14 +56,13 @@ class PlanTree:
             yield tree
         else:
             yield Segment(f"{strip_control_codes(self.title)}\n")
-            for line in _drawn(
-                self.plan.steps, self.notes, ""
-            ):  # rich splits a segment of many lines in quadratic time
+            # Each line is a segment, since rich splits a segment of many lines in quadratic time.
+            for line in _drawn(self.plan.steps, self.notes, ""):
                 yield Segment(f"{strip_control_codes(line)}\n")
 
 
 def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:
-    """Return the plan as rich prints it, with remarks on its steps."""
+    """Return a plan as a tree that rich prints, with a title and remarks on steps."""
     return PlanTree(plan, title, notes or {})
 
 
@@ -83,7 +82,7 @@ def _drawn(steps: Sequence[Step], notes: Notes, indent: str) -> Iterator[str]:
 
 
 def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
-    """Return pieces of text, each with its style."""
+    """Return the line for a step as pieces of text, each with its style in rich."""
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
     label = [(f"{step.id:>2} ", "dim"), (step.behavior, style), (" " + " ".join(step.arguments), "")]
     if step.bindings and not step.steps:
@@ -94,12 +93,12 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
 
 
 def lengths(plan: Plan) -> str:
-    """Return the number of steps on each level, e.g. ``4 / 10 / 32``."""
+    """Return the numbers of steps on all levels as text, e.g. ``4 / 10 / 32``."""
     return " / ".join(map(str, plan.length.values())) or "no"
 
 
 def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
-    """Return the cost of a plan if behaviours have prices, and the proved bounds on its length or cost."""
+    """Return a text with the cost of a plan if behaviours have costs, and with the proved bound on its length or cost."""
     said = "" if cost is None else f", costs {cost:g}"
     if bound is None:
         return said
@@ -112,7 +111,7 @@ def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
 
 
 def summary(outcome: Outcome) -> str:
-    """Return how a planning call ended: a line, and another for each level given up and each violated condition."""
+    """Return a summary of an outcome: a line on the result, and a line for each unmet soft goal and each violated condition."""
     expanded = sum(counts.expanded for counts in outcome.search.values())
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"

@@ -1,6 +1,7 @@
-"""Start of the command `confab`: Ctrl-C ends it with one line even during imports, and has no effect after the end.
+"""Start and end of the command `confab`. Ctrl-C ends the command with one line, even during imports.
 
-The process ends without freeing its objects one by one, which takes half a second for a large scene.
+At its end, the process ignores Ctrl-C. It doesn't free its objects one by one, which would take half a second for a large
+scene.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ def main() -> None:
 
     try:
         answer(ending=os._exit)
-    except SystemExit as end:  # whose frames hold all that was read
+    except SystemExit as end:  # the frames of the exception refer to all data of the process
         _leave(end.code if isinstance(end.code, int) else 1)
 
 
 def _leave(code: int) -> NoReturn:
-    """End the process after everything has been written."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all output is complete
+    """Call exit functions, flush the output, and end the process at once."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the result is complete
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
@@ -35,6 +36,6 @@ def _leave(code: int) -> NoReturn:
 
 
 def _interrupted(*_: object) -> None:
-    """Print the message that `confab.cli` would print, which may not be imported yet."""
+    """Print the message about an interrupt and end the process. The module `confab.cli` may not be imported yet."""
     os.write(2, b"confab: interrupted; every file is as it was before, or whole\n")
     os._exit(130)

@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 Term: TypeAlias = "NamedNode | BlankNode | Literal | Triple"
-"""An RDF term as the store answers it."""
+"""An RDF term in a query result of the store."""
 STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
-"""Forms of the SPARQL 1.1 recommendations, with pyoxigraph's names for them."""
+"""Result formats of the SPARQL 1.1 recommendations, each with its name in pyoxigraph."""
 
 
 class Row(tuple[str | None, ...]):
-    """A row of a table: a tuple whose cells also have the names of their columns."""
+    """A row of a table: a tuple whose cells can also be selected by the name of their column."""
 
     _fields: tuple[str, ...]
 
     def __new__(cls, cells: Iterable[str | None], names: tuple[str, ...]) -> Row:
-        """Make a row of cells and their names."""
+        """Return a row from its cells and the names of its columns."""
         made = super().__new__(cls, cells)
         made._fields = names
         return made
 
     def __getnewargs__(self) -> tuple[tuple[str | None, ...], tuple[str, ...]]:
-        """Return the parts of a copy."""
+        """Return the arguments of `__new__` for copying and pickling."""
         return tuple(self), self._fields
 
     @overload
@@ -44,12 +44,12 @@ class Row(tuple[str | None, ...]):
     def __getitem__(self, index: slice) -> tuple[str | None, ...]: ...
 
     def __getitem__(self, index: SupportsIndex | str | slice) -> str | tuple[str | None, ...] | None:
-        """Return the cell of a position or of a column, or some cells."""
+        """Return the cell at a position, the cell of a column, or the cells of a slice."""
         return super().__getitem__(column(self._fields, index) if isinstance(index, str) else index)
 
 
 def column(names: tuple[str, ...], name: str) -> int:
-    """Return the position of a column; raise a `KeyError` that says which there are."""
+    """Return the position of a column; raise `KeyError` with the names of all columns if the name is unknown."""
     if name.lstrip("?") not in names:
         raise KeyError(f"no column '{name}'{nearest(name, names)} (columns: {', '.join(names)})")
     return names.index(name.lstrip("?"))
@@ -58,10 +58,10 @@ def column(names: tuple[str, ...], name: str) -> int:
 @right_names("a table")
 @dataclass(frozen=True)
 class Table(Sequence[tuple[str | None, ...]]):
-    """Rows with named columns, for iteration, indexing, display and conversion into a DataFrame.
+    """A query result: a sequence of rows with named columns.
 
-    `terms` are the rows as the store returned them, with IRIs and datatypes; `truth` is the answer of an ASK query and then also
-    the truth value of the table.
+    `terms` are the rows with the RDF terms (IRIs, datatypes) of the store. `truth` is the answer to an ASK query, and None for
+    other queries. The truth value of a table is this answer, or whether the table has a row.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class Table(Sequence[tuple[str | None, ...]]):
     def __getitem__(self, index: slice) -> list[Row]: ...
 
     def __getitem__(self, index: int | str | slice) -> Row | list[str | None] | list[Row]:
-        """Return one row, some, or the cells of a column."""
+        """Return the row at an index, the rows of a slice, or the cells of a column."""
         if isinstance(index, str):
             return [row[column(self.columns, index)] for row in self.rows]
         if isinstance(index, slice):
@@ -98,7 +98,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return len(self.rows)
 
     def __bool__(self) -> bool:
-        """Return the truth of an ASK query; for other queries, whether there is a row."""
+        """Return the answer to an ASK query; for other queries, return whether the table has a row."""
         return bool(self.rows) if self.truth is None else self.truth
 
     def __iter__(self) -> Iterator[Row]:
@@ -106,11 +106,11 @@ class Table(Sequence[tuple[str | None, ...]]):
         return (Row(row, self.columns) for row in self.rows)
 
     def values(self) -> list[tuple[object, ...]]:
-        """Return the rows with numbers, truth values and dates as Python values."""
+        """Return the rows with Python values for numbers, booleans and dates."""
         return [tuple(map(_value, row, terms)) for row, terms in zip(self.rows, self.terms or self.rows, strict=True)]
 
     def iris(self) -> Table:
-        """Return the table with whole IRIs in place of short names."""
+        """Return the table with full IRIs instead of short names."""
         rows = tuple(tuple(None if t is None else str(getattr(t, "value", t)) for t in terms) for terms in self.terms)
         return replace(self, rows=rows) if self.terms else self
 
@@ -139,11 +139,11 @@ class Table(Sequence[tuple[str | None, ...]]):
         return "".join("\t".join((cell or "").translate(escaped) for cell in line) + "\n" for line in lines)
 
     def records(self) -> list[dict[str, str | None]]:
-        """Return a mapping for each row."""
+        """Return a mapping of column names to cells for each row."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
     def standard(self, form: str) -> bytes:
-        """Return the answer in a form of SPARQL 1.1: ``sparql-json``, ``sparql-xml``, ``sparql-csv`` or ``tsv``."""
+        """Return the query result in a format of SPARQL 1.1: ``sparql-json``, ``sparql-xml``, ``sparql-csv`` or ``tsv``."""
         from pyoxigraph import QueryResultsFormat, QuerySolutions, Store, parse_query_results
 
         if form not in STANDARD:
@@ -164,7 +164,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         Raises
         ------
         KnowledgeError
-            The query gave rows.
+            The query is no CONSTRUCT query.
         """
         import pyoxigraph as ox
 
@@ -174,7 +174,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return (ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"").decode("utf-8")
 
     def __rich__(self) -> RichTable:
-        """Return the table for rich."""
+        """Return the table as a table of rich."""
         from rich.table import Table as RichTable
 
         table = RichTable(*self.columns)
@@ -201,7 +201,7 @@ class Table(Sequence[tuple[str | None, ...]]):
 
 
 def _value(cell: str | None, term: object) -> object:
-    """Return a literal as a Python value if its datatype has one, otherwise as its text."""
+    """Return the Python value of a literal if its datatype has a counterpart in Python, otherwise the text of the literal."""
     from pyoxigraph import Literal as Stored
 
     if not isinstance(term, Stored) or term.language is not None:

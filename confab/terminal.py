@@ -1,4 +1,4 @@
-"""The terminal side of the command line: streams, exit codes and messages.
+"""Streams, exit codes and messages of the command line.
 
 Results go to stdout; remarks and errors go to stderr, one line each. Users never see a traceback.
 """
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from confab.reasoner.limits import Deadline
 
 Ending = Callable[[int], NoReturn]
-"""Ends the process at once with an exit code."""
+"""A function that ends the process at once with an exit code."""
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 4, 130, 141
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
-"""Exit codes by status of an outcome."""
+"""Exit codes by the status of a planning call."""
 LONGEST = 2_000
-"""Maximum number of characters of a message, which may quote texts of any length."""
+"""Maximum number of characters of a message."""
 
 WITHOUT_PHYSICS = (
     "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
@@ -38,16 +38,16 @@ WITHOUT_PHYSICS = (
 
 
 def run_to_end(call: Callable[[], int | None]) -> NoReturn:
-    """Run the command line: everything ends here, as an exit code and at most one line on stderr."""
+    """Run the command line, and turn each exception into an exit code and one line on stderr."""
     from confab.reasoner.language import DomainError
     from confab.reasoner.limits import LimitError
 
     _open_streams()
     try:
-        code = _interruptible(call) or YES  # None if a command returns no code
+        code = _interruptible(call) or YES  # a command without an exit code returns None
         sys.stdout.flush()
     except SystemExit as error:
-        closed = "PacifyFlush" in type(sys.stdout).__name__  # click's wrapper after the reader of a pipe has ended
+        closed = "PacifyFlush" in type(sys.stdout).__name__  # click replaces stdout when the reader of a pipe has ended
         sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
@@ -65,7 +65,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         try:
             sys.stdout.flush()
         except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # buffered output is discarded
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # discards the buffered output
         _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
     except Exception as error:
         if isinstance(error, ModuleNotFoundError) and error.name == "pybullet":
@@ -79,7 +79,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
 
 
 def _interruptible(call: Callable[[], int | None]) -> int | None:
-    """Call a function that Ctrl-C interrupts, even where a library turns the interrupt into another error, as C imports do."""
+    """Call a function; raise `KeyboardInterrupt` on Ctrl-C even if a library turns the interrupt into another error."""
     came = []
 
     def interrupt(sign: int, _: object) -> NoReturn:
@@ -100,7 +100,7 @@ def _interruptible(call: Callable[[], int | None]) -> int | None:
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[Deadline]:
-    """Limit a command to some seconds: it ends by itself or, a tenth later, by force."""
+    """Limit the time of a command. If the command exceeds the limit by a tenth, the process is ended."""
     from confab.reasoner.limits import within
 
     with within(seconds) as deadline, ended_by(deadline, click.get_current_context().obj):
@@ -109,9 +109,9 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
-    """End the process if a block exceeds its time by a tenth: nothing else interrupts a query of a store.
+    """End the process if a block exceeds its time limit by a tenth, since a query of a store can't be interrupted.
 
-    Files are written in the block completely or not at all (`confab.reasoner.files.write_whole`).
+    Files that the block writes are complete or unchanged (`confab.reasoner.files.write_whole`).
     """
     if deadline.left is None or ending is None:
         yield
@@ -133,7 +133,7 @@ def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
 
 
 def told(out: Path, text: str) -> None:
-    """Print the path of a written file: on stdout or, if the file itself went there, on stderr."""
+    """Print the path of a written file and a text on stdout; if the file is stdout, print the text on stderr."""
     if out == Path("-"):
         remark(text)
     else:
@@ -141,8 +141,9 @@ def told(out: Path, text: str) -> None:
 
 
 def show_result(what: Any) -> None:
-    """Print JSON data, a line of text, a table, or what rich can show, to stdout; a table in a pipe is separated by tabs."""
-    tsv = getattr(type(what), "tsv", None)  # of the class: a wrong name of an object is searched in all modules
+    """Print JSON data, a text, a table or an object of rich to stdout; a table in a pipe has tab-separated values."""
+    # The class is asked, since an object searches all modules for an unknown name.
+    tsv = getattr(type(what), "tsv", None)
     if tsv is not None and not sys.stdout.isatty():
         print(tsv(what), end="")
     elif isinstance(what, dict | list):
@@ -156,10 +157,10 @@ def show_result(what: Any) -> None:
 
 
 def _open_streams() -> None:
-    """Ensure that no opened file takes the place of a standard stream that the caller has closed."""
+    """Open the null device for each closed standard stream, so that no other file gets the number of the stream."""
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
-        os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+        os.open(os.devnull, os.O_RDWR)  # gets the lowest free file descriptor
     if 2 in closed:
         sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
     if 1 in closed:
@@ -176,7 +177,7 @@ def _is_open(stream: int) -> bool:
 
 
 def _log(error: BaseException) -> str:
-    """Write a traceback into a file of its own and return its path."""
+    """Write the traceback of an exception into a new file, and return the path of the file."""
     import tempfile
     import traceback
 
@@ -190,7 +191,7 @@ def _log(error: BaseException) -> str:
 
 
 def _usage(error: Any) -> str:
-    """Return the fault of a call in one line; for a call without arguments, print the help instead."""
+    """Return the error of a wrong call in one line; for a call without arguments, print the help and exit."""
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         sys.exit(MISUSE)
@@ -201,20 +202,20 @@ def _usage(error: Any) -> str:
         options = [each for each in error.ctx.command.params if isinstance(each, click.Option)]
         helps = {one: each.help or "" for each in options for one in each.opts if one.startswith("--")}
         meant = chosen(error.option_name, helps)
-        if meant:  # click itself drops an option that isn't spelt similarly
+        if meant:  # click suggests only options of similar spelling
             return f"no such option '{error.option_name}'. Did you mean '{meant}'?; see {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 
 
 def remark(text: str) -> None:
-    """Print a line on stderr, unless only results and errors are printed."""
+    """Print a line on stderr unless the option ``--quiet`` is given."""
     if not quiet():
         _say(text)
 
 
 def _say(text: str) -> None:
-    """Print a line on stderr, whichever characters it quotes."""
+    """Print a line on stderr, with unprintable characters escaped."""
     line = " ".join(text.split())
     shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
     with suppress(OSError):

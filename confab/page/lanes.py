@@ -94,7 +94,7 @@ def _interval(bar: Bar, labels: Labels) -> Interval:
 
 
 def tone_of(timeline: Timeline, symbol: Symbol, value: str) -> str:
-    """Return the meaning of a value's colour: a goal, an initial goal, or neither."""
+    """Return the meaning of a value's colour: goal value (``wanted``), initial value (``start``) or another value (``between``)."""
     if timeline.problem.goal.get(symbol) == value:
         return "wanted"
     return "start" if timeline.problem.initial.get(symbol, FALSE) == value else "between"
