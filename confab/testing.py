@@ -1,6 +1,6 @@
-"""Conformance test of a world in which the executive shall act: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
+"""Conformance test of a world, that is, of the interface to a robot: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
 
-Each check reports its finding with numbers. The robot really executes the primitives of a plan: keep people away from it.
+Each check reports a verdict with numbers. The robot executes the primitives of a plan; keep people away from a real robot.
 """
 
 from __future__ import annotations
@@ -19,37 +19,37 @@ from confab.planner.validation import successor
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LOOKS = 5
-"""Number of observations whose latency is measured."""
+"""Number of observations of which the latency is measured."""
 
 SOON = 1.0
-"""Seconds within which an observation, and `stop`, should return."""
+"""Maximum duration of an observation, and of `stop`, in seconds."""
 
 STOPPED_WITHIN = 10.0
-"""Seconds within which `execute` should return after `stop`."""
+"""Default time in seconds within which `execute` must return after `stop`."""
 
 ATTEMPTS = 5
-"""Maximum number of attempts at a primitive that fails."""
+"""Maximum number of attempts at a primitive."""
 
 BEGUN = 0.05
-"""Seconds after which a primitive counts as begun, and is stopped."""
+"""Seconds after the begin of a primitive at which the test stops it."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check: its name, whether it passed (None: it could not be made), and a description of the result."""
+    """A check with its name, its verdict (None if the check was impossible), and a description of the result."""
 
     name: str
     passed: bool | None
     found: str
 
     def __str__(self) -> str:
-        """Return it as a line."""
+        """Return the check as one line."""
         return f"{'ok  ' if self.passed else '-   ' if self.passed is None else 'FAIL'} {self.name:<14} {self.found}"
 
 
 @dataclass(frozen=True)
 class Conformance:
-    """The results of the checks."""
+    """The results of all checks of a world."""
 
     checks: tuple[Check, ...]
 
@@ -59,7 +59,7 @@ class Conformance:
         return all(check.passed is not False for check in self.checks)
 
     def __getitem__(self, name: str) -> Check:
-        """Return the check of a name."""
+        """Return the check with a name."""
         return next(check for check in self.checks if check.name == name)
 
     def __str__(self) -> str:
@@ -75,13 +75,13 @@ def check_world(
     Parameters
     ----------
     world : World
-        It must be in the initial situation of the problem, or near it.
+        The world, whose state must be the initial state of the problem or similar to it.
     problem : Problem
-        The problem of a scene: its primitives are executed, and its symbols are known.
+        The problem of a scene, which defines the primitives and the symbols of the world.
     steps : sequence of Step, optional
-        Primitives to execute, in order; by default those of a plan for the problem's goal from the observed state.
+        Primitives to execute, in order; by default the primitives of a plan from the observed state to the problem's goal.
     stopped_within : float
-        Seconds within which `execute` should return after `stop`.
+        Time in seconds within which `execute` must return after `stop`.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def check_world(
 
 
 def _observed(world: Guarded, problem: Problem, checks: list[Check]) -> State:
-    """Check observation and the clock; return the last observation."""
+    """Check the observations and the clock of a world; return the last observation."""
     times, seen, before = [], [], world.seconds
     for _ in range(LOOKS):
         begin = perf_counter()
@@ -154,7 +154,7 @@ def _known(problem: Problem, symbol: Symbol, value: str) -> bool:
 
 
 def _refusal(world: Guarded, before: State, arguments: tuple[str, ...]) -> Check:
-    """Check that a primitive that doesn't exist fails, reports it, and has no effect."""
+    """Check that an unknown primitive fails with an error code and without effects."""
     verdict = world.execute(Step((0,), 0, 1, "NO_SUCH_BEHAVIOUR", arguments))
     after = world.observe()
     changed = sorted(str(s) for s in after.keys() | before.keys() if after.get(s) != before.get(s))
@@ -170,7 +170,7 @@ def _refusal(world: Guarded, before: State, arguments: tuple[str, ...]) -> Check
 def _stopped(
     world: Guarded, problem: Problem, steps: Sequence[Step], within: float, checks: list[Check]
 ) -> Sequence[Step]:
-    """Check that `stop` ends a primitive and doesn't affect later ones; return the steps still to be executed."""
+    """Check that `stop` ends a running primitive and doesn't affect later primitives; return the remaining steps."""
     begin = perf_counter()
     world.stop()
     took = perf_counter() - begin
@@ -206,7 +206,7 @@ def _stopped(
 
 
 def _after_idle_stop(step: Step, ended: Verdict | Exception) -> Check:
-    """Check that a stop with nothing running doesn't stop the primitive after it."""
+    """Check that a call of `stop` without a running primitive didn't stop the next primitive."""
     if isinstance(ended, Exception):
         raise ended
     if ended.code == INTERRUPTED:
@@ -225,7 +225,7 @@ def _noting(answers: list[Verdict | Exception], work: Callable[[], Verdict]) -> 
 
 
 def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: list[Check]) -> None:
-    """Compare the verdict on each primitive with the observation after it; a failed primitive is tried again."""
+    """Execute primitives, repeat failed primitives, and compare each verdict with the observation after the primitive."""
     done, failed, lies, understated, nameless, times = 0, 0, list[str](), list[str](), list[str](), list[float]()
     seen, wanted, ended = set[Symbol](), dict[Symbol, None](), ""
     for step in steps:
@@ -268,7 +268,7 @@ def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: l
 
 
 def _missing(problem: Problem, before: State, expected: Mapping[Symbol, str], seen: State) -> str:
-    """Return the first expected change that was not seen, as text; amounts and unperceived symbols are left out."""
+    """Return the first expected change that the observation contradicts, as text; amounts are not compared."""
     for symbol, value in sorted(expected.items()):
         kind = problem.domain.situations[symbol.situation]
         if before.get(symbol) == value or kind.quantity is not None:
@@ -280,7 +280,7 @@ def _missing(problem: Problem, before: State, expected: Mapping[Symbol, str], se
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Check the robot of a scene; return the exit code."""
+    """Check the robot of a scene, print the results, and return the exit code."""
     from confab.connecting import connected
     from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load

@@ -1,4 +1,4 @@
-"""Plans in time for the public functions: when a schedule is required, the lanes of its actors, and its form as JSON."""
+"""Schedules of plans for the public functions: when a plan needs a schedule, and the schedule as text and as JSON."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import Slot, TimedPlan
 
 Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
-"""The quantity that a plan should minimise."""
+"""The quantity that planning minimises."""
 MINIMISE: tuple[Minimise, ...] = ("makespan", "cost", "steps")
 WIDTH = 72
-"""Number of columns of a lane."""
+"""Number of characters that represent the makespan in a lane."""
 MOST_CRITICAL = 12
-"""Maximum number of steps of the critical path that are listed."""
+"""Maximum number of listed steps of the critical path."""
 
 
 def checked_minimise(minimise: str | None) -> str | None:
-    """Return the quantity to be minimised; raise `KnowledgeError` if there is no such quantity."""
+    """Return the quantity to be minimised; raise `KnowledgeError` if the quantity is unknown."""
     if minimise is not None and minimise not in MINIMISE:
         raise KnowledgeError(f"--minimise is '{minimise}'; wanted one of {', '.join(MINIMISE)}")
     return minimise
 
 
 def with_unit_costs(problem: Problem) -> Problem:
-    """Return a problem in which every step costs 1."""
+    """Return a copy of a problem in which every step costs 1."""
     domain = problem.domain
     behaviors = {name: replace(one, cost=1.0, price=None) for name, one in domain.behaviors.items()}
     return replace(problem, domain=replace(domain, behaviors=behaviors))
 
 
 def asks_for_times(problem: Problem, minimise: str | None) -> bool:
-    """Return whether a plan needs a schedule: its makespan is minimised, or the task states times."""
+    """Return whether a plan needs a schedule, because its makespan is minimised or the task has deadlines, windows or events."""
     times = problem.times
     return minimise == "makespan" or (times is not None and bool(times.deadlines or times.windows or times.events))
 
 
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Return a plan with required concurrency, and its schedule."""
+    """Plan with steps that must overlap; return the outcome and the schedule."""
     from confab.planner.timed.concurrent import plan
 
     outcome, timed = plan(problem, Limits(seconds=deadline.left))
@@ -57,7 +57,7 @@ def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan
 def scheduled(
     problem: Problem, outcome: Outcome, deadline: Deadline, shorten: bool
 ) -> tuple[Outcome, TimedPlan | None]:
-    """Return an outcome with its plan in time; if no schedule keeps the times of the task, the outcome is "gave up"."""
+    """Schedule the plan of an outcome. If no schedule meets the times of the task, the outcome's status becomes "gave up"."""
     from confab.planner.timed.call import best_in_time
 
     if outcome.plan is None:
@@ -69,12 +69,12 @@ def scheduled(
 
 
 def needs_others_meanwhile(problem: Problem) -> bool:
-    """Return whether other behaviours need a value that a behaviour gives only for its duration."""
+    """Return whether behaviours need a value that another behaviour gives only during its execution."""
     return bool(only_during(problem))
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether overlapping steps may reach more than any sequence: some condition or effect is at a begin or an end."""
+    """Return whether a condition or effect is at the begin or end of a step, so that only overlapping steps may reach a goal."""
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()
@@ -87,7 +87,7 @@ def may_overlap_by_need(problem: Problem) -> bool:
 
 
 def said(seconds: Fraction) -> str:
-    """Return a time in seconds as text, to the millisecond.
+    """Return a time in seconds as text, rounded to milliseconds.
 
     >>> said(Fraction(5, 2)), said(Fraction(1, 3))
     ('2.5', '0.333')
@@ -96,7 +96,7 @@ def said(seconds: Fraction) -> str:
 
 
 def headline(timed: TimedPlan) -> str:
-    """Return the makespan with its bound in one line."""
+    """Return the makespan and its lower bound in one line."""
     bound = said(timed.bound)
     proved = " (no schedule of these steps is shorter)" if timed.bound == timed.makespan else ""
     return (
@@ -106,7 +106,7 @@ def headline(timed: TimedPlan) -> str:
 
 
 def lanes(timed: TimedPlan) -> Iterator[str]:
-    """Yield lines that show each actor's steps: ``█`` on the critical path, ``▒`` with slack, ``·`` idle."""
+    """Yield lines of text that show the steps of each actor: ``█`` on the critical path, ``▒`` with slack, ``·`` idle."""
     yield headline(timed)
     end = timed.makespan
     if not end:
@@ -135,7 +135,7 @@ def _in_order(slot: Slot) -> tuple[Fraction, Fraction, tuple[int, ...]]:
 
 
 def schedule_json(timed: TimedPlan) -> ScheduleJson:
-    """Return a plan in time as JSON data: seconds, and each step by its path (docs/command-line.md)."""
+    """Return a scheduled plan as JSON data, with times in seconds (docs/command-line.md)."""
     intervals = timed.intervals
     of = {slot.step.path: slot for slot in timed.slots}
     steps: list[ScheduledStepJson] = []

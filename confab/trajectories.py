@@ -1,4 +1,4 @@
-"""Trajectories of a verified plan, for robots and other simulators: one mapping, written as JSON or YAML (docs/physics.md)."""
+"""Trajectories of a verified plan as JSON or YAML, for robots and other simulators (docs/physics.md)."""
 
 from __future__ import annotations
 
@@ -26,27 +26,28 @@ FORMATS = (".json", ".yaml", ".yml")
 
 
 def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_hands: bool = False) -> dict[str, Any]:
-    """Return the trajectories of a plan that was executed in PyBullet with success.
+    """Execute a plan in PyBullet, and return its trajectories.
 
     Parameters
     ----------
     scene : Scene
     plan : Plan, Result or name of a file, optional
-        A plan is made if none is given.
+        The plan; by default a new plan.
     seed : int
         Seed of the rollout.
     both_hands : bool
-        Execute with all hands at once; the times of their primitives then overlap.
+        Execute the plan with all hands at once, so that the times of primitives overlap.
 
     Returns
     -------
     dict
-        ``scene``, ``seed``, ``rate`` in hertz, and ``primitives`` as `confab.sim.trajectory.exported` yields them.
+        A mapping with the keys ``scene``, ``seed``, ``rate`` (in hertz) and ``primitives`` (see
+        `confab.sim.trajectory.exported`).
 
     Raises
     ------
     KnowledgeError
-        The plan fails in physics, a robot drives, or the scene has no geometry.
+        The plan fails in physics, a robot has a driving base, or the scene has no geometry.
     """
     scene.settle()
     chosen: AnyPlan = scene.plan() if plan is None else plan
@@ -87,12 +88,12 @@ def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_
 
 
 def write_trajectories(path: Path, data: Mapping[str, Any]) -> None:
-    """Write trajectories as JSON or YAML, by the ending of the file's name."""
+    """Write trajectories as JSON if the path's suffix is ``.json``, otherwise as YAML."""
     write_whole(path, json.dumps(data) + "\n" if path.suffix == ".json" else stamped(TRAJECTORIES, _yaml(data)))
 
 
 def _yaml(value: Any, indent: int = 0) -> Iterator[str]:
-    """Yield mappings and sequences of mappings as YAML blocks, and all other values in YAML's flow style, as in JSON."""
+    """Yield a value as lines of YAML: mappings and sequences of mappings in block style, other values in flow style."""
     space = "  " * indent
     if isinstance(value, Mapping) and _nested(value):
         for key, inner in value.items():
@@ -114,7 +115,7 @@ def _yaml(value: Any, indent: int = 0) -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """Return a value in one line. Numbers have no exponents, since YAML 1.1 reads 1e-05 as a text."""
+    """Return a value in YAML's flow style. Numbers have no exponents, since YAML 1.1 reads 1e-05 as a text."""
     if isinstance(value, float):
         return f"{value:.9f}".rstrip("0") + "0" * value.is_integer()
     if isinstance(value, Mapping):
@@ -123,7 +124,7 @@ def _flow(value: Any) -> str:
 
 
 def _nested(value: Any) -> bool:
-    """Return whether a value contains mappings, or sequences of mappings, that get separate lines."""
+    """Return whether a value is written in block style."""
     if isinstance(value, Mapping):
         return any(isinstance(inner, Mapping | list) for inner in value.values())
     return isinstance(value, list) and any(isinstance(inner, Mapping) for inner in value)

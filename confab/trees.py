@@ -1,4 +1,4 @@
-"""Behaviour trees in files: BehaviorTree.CPP 4, with the model of its nodes for Groot2, and py_trees; and ticked in a world."""
+"""Export of behaviour trees to BehaviorTree.CPP 4 (with node models for Groot2) and to py_trees, and execution of py_trees."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact, Problem
 
 RETRIES = 5
-"""Number of failures after which an exported tree fails; before that it is ticked again from the beginning."""
+"""Number of failures after which an exported tree fails. After fewer failures, the tree is ticked from the beginning."""
 
 RESERVED = {
     "ID",
@@ -47,16 +47,16 @@ RESERVED |= {
     "Script",
     "ScriptCondition",
 }
-"""Names that leaves, ports and subtrees can't have, since nodes of the engines or their attributes have them."""
+"""Names of nodes and attributes of the two libraries, which leaves, ports and subtrees can't have."""
 
 
 @dataclass(frozen=True)
 class Element:
-    """A node in a form that both engines have.
+    """A node of a kind that both libraries support.
 
-    `kind` is Fallback, Sequence (both tick their first children again in each tick), Once (a sequence that resumes where it
-    was), Parallel, SubTree, Check, Set, Again, Condition or Action. `name` is the name of a subtree, a mark or a leaf; `key`
-    identifies a leaf.
+    The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. Fallback and Sequence
+    begin with their first child in each tick. Once is a sequence that resumes at the running child. `name` is the name of a
+    subtree, a mark or a leaf. `key` identifies a leaf.
     """
 
     kind: str
@@ -68,14 +68,18 @@ class Element:
 
 @dataclass(frozen=True)
 class Tree:
-    """The behaviour tree of a plan: subtrees by name, the whole tree first; the conditions or the action of each leaf, by key."""
+    """The behaviour tree of a plan.
+
+    `subtrees` has the subtrees by name, with the whole tree first. `leaves` has the condition or the primitive of each leaf by
+    key. `possible` has the names of leaves that check the preconditions of a primitive.
+    """
 
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
     possible: frozenset[str]
 
     def asks(self, key: str, situation: Situation) -> bool:
-        """Return whether the condition of a leaf holds in a situation."""
+        """Return whether the condition of a leaf, or the preconditions of its primitive, hold in a situation."""
         leaf = self.leaves[key]
         if isinstance(leaf, Step):
             return situation.can(leaf)
@@ -83,14 +87,14 @@ class Tree:
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
-    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`) in the form of the engines."""
+    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`) with nodes that both libraries support."""
     lowering = _Lowering(problem)
     lowering.lowered(tree_of(problem, plan))
     return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
 
 
 def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path]:
-    """Write the behaviour tree of a plan as ``tree.xml`` and ``tree.py`` into a folder, and return both paths."""
+    """Write the behaviour tree of a plan into a folder as ``tree.xml`` and ``tree.py``, and return both paths."""
     tree = behavior_tree(problem, plan)
     folder.mkdir(parents=True, exist_ok=True)
     paths = folder / "tree.xml", folder / "tree.py"
@@ -102,7 +106,7 @@ def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path
 
 
 class _Lowering:
-    """Turns nodes into elements, and numbers the leaves."""
+    """Conversion of the nodes of a plan's behaviour tree into elements with numbered leaves."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -111,7 +115,7 @@ class _Lowering:
         self.possible: set[str] = set()
 
     def lowered(self, node: Node) -> Element:
-        """Return the element of a node."""
+        """Return the element for a node."""
         check("exporting the behaviour tree")
         match node:
             case Holds(facts, conditions):
@@ -135,25 +139,25 @@ class _Lowering:
             case Together(nodes):
                 return Element("Parallel", children=tuple(map(self.lowered, nodes)))
             case Subtree(name, child):
-                own = _identifier(name)  # engines allow no spaces in it
-                self.subtrees[own] = Element("")  # its place is before those of the subtrees in it
+                own = _identifier(name)  # names can't have spaces in the libraries
+                self.subtrees[own] = Element("")  # reserves a place before nested subtrees
                 self.subtrees[own] = self.lowered(child)
                 return Element("SubTree", own)
 
     def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
-        """Return a leaf with a unique key."""
+        """Return a new leaf with a unique key."""
         key = f"{kind[0].lower()}{len(self.leaves)}"
         self.leaves[key] = what
         return Element(kind, name, ports=ports, key=key)
 
     def primitive(self, step: Step) -> tuple[str, dict[str, str]]:
-        """Return name and ports of a primitive: those of its behaviour's parameters."""
+        """Return the name of a primitive, and its arguments by the names of ports."""
         parameters = self.problem.domain.behaviors[step.behavior].parameters
         names = [_identifier(parameter.name.rpartition(".")[2]) for parameter in parameters]
         return _identifier(step.behavior), dict(zip(names, step.arguments, strict=True))
 
     def words(self, one: Fact | Condition) -> tuple[str, dict[str, str]]:
-        """Return name and ports of a condition: those of a situation type, or its text."""
+        """Return the name and the ports of a condition. Conditions that are no facts have one port with their text."""
         if not isinstance(one, Fact):
             return "Holds", {"condition": said(one)}
         arguments = {f"argument{number}": each for number, each in enumerate(one.symbol.arguments, 1)}
@@ -165,7 +169,7 @@ def _mark(path: tuple[int, ...]) -> str:
 
 
 def _identifier(name: str) -> str:
-    """Return a name that the engines allow: letters, digits and underscores, not beginning with a digit, and no reserved name."""
+    """Return an identifier of letters, digits and underscores that is valid in both libraries and not reserved."""
     found = re.sub(r"\W+", "_", name).strip("_")
     found = f"_{found}" if found[:1].isdigit() else found
     return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
@@ -177,7 +181,7 @@ TAGS = {"Fallback": "ReactiveFallback", "Sequence": "ReactiveSequence", "Once": 
 
 
 def to_btcpp(tree: Tree) -> str:
-    """Return a tree as XML of BehaviorTree.CPP 4, with the model of its nodes."""
+    """Return a tree as XML for BehaviorTree.CPP 4, with models of its nodes."""
     first = next(iter(tree.subtrees))
     root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": first})
     for name, element in tree.subtrees.items():
@@ -214,7 +218,7 @@ def _xml(element: Element) -> ElementTree.Element:
 
 
 def _models(tree: Tree) -> dict[tuple[str, str], list[str]]:
-    """Return kinds and names of leaves with their ports."""
+    """Return the ports of all leaves, by kind and name."""
     found: dict[tuple[str, str], list[str]] = {}
     for element in tree.subtrees.values():
         for leaf in _leaves(element):
@@ -263,7 +267,7 @@ def parallel(*children):
 
 
 def to_py_trees(tree: Tree) -> str:
-    """Return a tree as a module of Python for py_trees."""
+    """Return a tree as a Python module for py_trees."""
     names = {name: f"subtree{number}" for number, name in enumerate(tree.subtrees)}
     leaves = [f"{kind} {name}({', '.join(ports)})" for (kind, name), ports in sorted(_models(tree).items())]
     text = HEAD.format(leaves="\n".join(leaves))
@@ -274,7 +278,7 @@ def to_py_trees(tree: Tree) -> str:
 
 
 def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
-    """Return an element as an expression."""
+    """Return an element as a Python expression."""
     pad = "\n" + "    " * (depth + 1)
     below = "".join(f"{pad}{_python(child, names, depth + 1)}," for child in element.children)
     end = "\n" + "    " * depth
@@ -301,14 +305,14 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
 def filled(
     tree: Tree, path: Path, problem: Problem, world: World, observer: Callable[[Step], None] | None = None
 ) -> Any:
-    """Return the root of an exported ``tree.py``, its leaves filled by a world: conditions by observation, actions by execution.
+    """Return the root of an exported ``tree.py`` whose leaves observe a world and execute primitives in it.
 
     Parameters
     ----------
     tree : Tree
         The exported tree.
     path : Path
-        Its ``tree.py``.
+        The path of the file ``tree.py``.
     problem : Problem
     world : World
     observer : callable, optional
@@ -317,7 +321,7 @@ def filled(
     from py_trees.behaviour import Behaviour
     from py_trees.common import Status
 
-    class Leaf(Behaviour):  # type: ignore[misc, unused-ignore]  # where py_trees is not installed, it is untyped
+    class Leaf(Behaviour):  # type: ignore[misc, unused-ignore] # py_trees is untyped where it isn't installed
         def __init__(self, kind: str, name: str, key: str) -> None:
             super().__init__(f"{name} {key}")
             self.kind, self.key = kind, key
@@ -343,7 +347,7 @@ def filled(
 
 
 def ticked(root: Any, most: int = 10_000) -> bool:
-    """Tick the root of a tree until it succeeds or fails, at most `most` times; return whether it succeeded."""
+    """Tick the root of a tree until it succeeds or fails, at most `most` times; return whether the tree succeeded."""
     from py_trees.common import Status
 
     for _ in range(most):

@@ -1,4 +1,4 @@
-"""Watching edited files: report every change of a file or of an import."""
+"""Detection of changes of ontology files and their imports."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from confab import ontology
 from confab.reasoner.graph.knowledge import KnowledgeError, load, scene_file
 
 PAUSE = 0.3
-"""Seconds between two looks."""
+"""Seconds between two checks of the files."""
 
 
 def again_and_again(files: Sequence[str | Path], pause: float = PAUSE) -> Iterator[None]:
-    """Yield whenever some ontology files or their imports have changed; without end."""
+    """Yield after each change of ontology files or their imports, without end."""
     watched = _with_imports(files)
     seen = _stamps(watched)
     while True:
         sleep(pause)
         if _stamps(watched) != seen:
-            sleep(pause)  # an editor that writes a file in several steps is done by then
+            sleep(pause)  # an editor may write a file in several steps
             watched = _with_imports(files)
             seen = _stamps(watched)
             yield
@@ -33,7 +33,7 @@ def _with_imports(files: Sequence[str | Path]) -> set[Path]:
         found |= {path, path.with_name(ontology.CATALOG)}
         try:
             found |= set(load(path, tolerant=True).files.values())
-        except KnowledgeError:  # reported by validation
+        except KnowledgeError:  # validation reports the error
             continue
     return found
 

@@ -1,4 +1,4 @@
-"""Reasons in sentences: why a step is in a plan, and why an alternative isn't (`Result.why`, `Result.why_not`, `Scene.explain`)."""
+"""Sentences that explain why a step is in a plan, and why an alternative isn't (`Result.why`, `Result.why_not`)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 
 MOST_TOLD = 12
-"""Maximum number of facts of one kind in the text of a certificate."""
+"""Maximum number of facts of one kind in the text about a certificate."""
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
     from confab.planner.certificates import Certificate
 
 Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
-"""Plans again for some goals; also returns the problem and the labels of its names."""
+"""A function that plans for other goals, and returns the problem, the outcome and the labels."""
 Path: TypeAlias = "tuple[int, ...]"
 Steps: TypeAlias = "Mapping[Path, Step]"
 BY = re.compile(r"\s+(?:by|with)\s+(\S+)\s*$")
 SHOWN = 3
-"""Maximum number of needs of a step that are listed; the others are counted."""
+"""Maximum number of listed reasons for a step."""
 
 
 @dataclass(frozen=True)
 class Because:
-    """Why a step is in a plan: its effects and their needs, nearest first.
+    """The reasons why a step is in a plan: its effects (`gives`), and what needs these effects (`needs`).
 
-    `number` names the step: ``L2#3`` is step 3 of level 2, counted from 0.
+    `number` names the step. For example, ``L2#3`` is step 3 of level 2, counted from 0.
     """
 
     number: str
@@ -54,7 +54,7 @@ class Because:
     needs: tuple[str, ...]
 
     def json(self) -> BecauseJson:
-        """Return it as JSON data."""
+        """Return the reasons as JSON data."""
         return {
             "number": self.number,
             "path": list(self.path),
@@ -66,7 +66,7 @@ class Because:
         }
 
     def __str__(self) -> str:
-        """Return it in a few lines."""
+        """Return the reasons in a few lines."""
         more = len(self.needs) - SHOWN
         return "\n".join(
             [
@@ -78,15 +78,15 @@ class Because:
         )
 
     def __repr__(self) -> str:
-        """Return it in a few lines."""
+        """Return the reasons in a few lines."""
         return str(self)
 
     def __rich__(self) -> str:
-        """Return it for rich."""
+        """Return the reasons for rich."""
         return str(self)
 
     def reasons(self) -> list[Markup]:
-        """Return it as HTML, in short."""
+        """Return a short form of the reasons as HTML."""
         more, gives = len(self.needs) - 2, "; ".join(self.gives)
         said = [tag("span", need) for need in self.needs[:2]] + ([tag("span", f"and {more} more")] if more > 0 else [])
         return [
@@ -104,10 +104,11 @@ class Because:
 
 @dataclass(frozen=True)
 class WhyNot:
-    """Why an alternative isn't in the plan: its failing conditions, or the plan with it and its additional cost.
+    """The reasons why an alternative isn't in the plan.
 
-    `answer` is the answer as a sentence. `plan` is the complete plan with the alternative, if there is one; `more` is its
-    additional cost; `breaks` lists conditions of levels above that this plan violates and the present plan doesn't.
+    `answer` is the answer as a sentence. `lacks` has the failing conditions of an inapplicable alternative. `plan` is a
+    complete plan with the alternative, if one was found. `more` is the additional cost of this plan. `breaks` has the
+    conditions of upper levels that this plan violates and the present plan doesn't violate.
     """
 
     asked: str
@@ -119,7 +120,7 @@ class WhyNot:
     breaks: tuple[str, ...] = ()
 
     def json(self) -> WhyNotJson:
-        """Return it as JSON data."""
+        """Return the answer as JSON data."""
         from confab.interchange import step_json
 
         steps = None if self.plan is None else [step_json(step) for step in self.plan.steps]
@@ -133,15 +134,15 @@ class WhyNot:
         }
 
     def __str__(self) -> str:
-        """Return it in a few lines."""
+        """Return the answer in a few lines."""
         return "\n".join([self.answer, *(f"  {line}" for line in (*self.lacks, *self.breaks, *self.steps))])
 
     def __repr__(self) -> str:
-        """Return it in a few lines."""
+        """Return the answer in a few lines."""
         return str(self)
 
     def __rich__(self) -> str:
-        """Return it for rich."""
+        """Return the answer for rich."""
         return str(self)
 
     def _repr_html_(self) -> str:
@@ -156,7 +157,10 @@ class WhyNot:
 
 @dataclass(frozen=True)
 class Account:
-    """An explanation of a plan step by step, or of why there is none: `proof` states the claims of the certificate."""
+    """An explanation of each step of a plan, or of the reason why there is no plan.
+
+    `proof` has the claims of the certificate of unsolvability, if any.
+    """
 
     headline: str
     steps: tuple[Because, ...] = ()
@@ -164,7 +168,7 @@ class Account:
     proof: tuple[str, ...] = ()
 
     def json(self) -> AccountJson:
-        """Return it as JSON data."""
+        """Return the explanation as JSON data."""
         return {
             "headline": self.headline,
             "steps": [step.json() for step in self.steps],
@@ -172,7 +176,7 @@ class Account:
         }
 
     def __str__(self) -> str:
-        """Return the account as text, a step per line, each with its first need."""
+        """Return the explanation as text, with a line for each step and its first reason."""
         lines = [self.headline, *(f"  {line}" for line in self.proof)]
         for step in self.steps:
             why = f": {step.needs[0]}" if step.needs else ""
@@ -180,11 +184,11 @@ class Account:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        """Return it as text."""
+        """Return the explanation as text."""
         return str(self)
 
     def __rich__(self) -> Tree:
-        """Return it as a tree for rich."""
+        """Return the explanation as a tree for rich."""
         from rich.text import Text
         from rich.tree import Tree
 
@@ -219,12 +223,12 @@ class Account:
 
 
 def number_of(plan: Plan, step: Step) -> str:
-    """Return the number of a step: its level, and its position on that level, counted from 0."""
+    """Return the number of a step, such as ``L2#3``: its level and its position on the level, counted from 0."""
     return f"L{step.level}#{[other.path for other in plan.at_level(step.level)].index(step.path)}"
 
 
 def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
-    """Return the number of each step, by its path."""
+    """Return the numbers of all steps by path."""
     seen: dict[int, int] = {}
     found = {}
     for step in plan.walk():
@@ -240,20 +244,20 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
     ----------
     plan : Plan
     asked : Step, int, str or path
-        The number of a step of the first level, counted from 0; ``L3#12``, the step 12 of level 3, counted from 0; the position
-        in the tree, ``0.1.2``; or the words of the printed step or of its label.
+        The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12 of
+        level 3, counted from 0; a path like ``0.1.2``; or words of the printed step or of its label.
     labels : Labels
 
     Raises
     ------
     KnowledgeError
-        No step, or more than one, matches.
+        No step matches, or several steps match.
     """
     steps = list(plan.walk())
     if isinstance(asked, Step):
         asked = asked.path
     if not isinstance(asked, int | str) and any(isinstance(word, str) for word in asked):
-        asked = " ".join(map(str, asked))  # a behaviour and its arguments
+        asked = " ".join(map(str, asked))  # the tuple is a behaviour with its arguments
     if isinstance(asked, int):
         if not 0 <= asked < len(plan.steps):
             named = [number_of(plan, step) for step in steps if step.id == asked]
@@ -298,7 +302,7 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
 
 
 def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels) -> Because:
-    """Return why a step is there."""
+    """Return the reasons why a step is in a plan."""
     return _because(step, purpose, labels, {other.path: other for other in plan.walk()}, numbers(plan))
 
 
@@ -317,7 +321,7 @@ def _because(step: Step, purpose: Purpose, labels: Labels, steps: Steps, number:
 
 
 def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
-    """Return the claims of a certificate of unsolvability, a sentence per line.
+    """Return the claims of a certificate of unsolvability as sentences.
 
     Parameters
     ----------
@@ -344,13 +348,13 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
 
 
 def _listed(before: str, sentences: Sequence[str]) -> list[str]:
-    """Return a line for each of some sentences, and a last line that counts the others."""
+    """Return the first sentences as lines, and a line with the number of further sentences."""
     lines = [f"{before}{sentence}" for sentence in sentences[:MOST_TOLD]]
     return [*lines, *([f"{before}{len(sentences) - MOST_TOLD} facts more"] if len(sentences) > MOST_TOLD else [])]
 
 
 def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Labels, headline: str) -> Account:
-    """Return why each step of a plan is there."""
+    """Return an explanation of each step of a plan."""
     by_path, number = {step.path: step for step in plan.walk()}, numbers(plan)
     steps = tuple(_because(step, purposes[path], labels, by_path, number) for path, step in by_path.items())
     return Account(headline, steps, plan)
@@ -391,16 +395,16 @@ def why_not(
     Parameters
     ----------
     asked : str
-        A fact, ``cup2 LOCATION location8``, as an alternative goal; followed by ``by hand2``, the individual that must take part in
-        its changes. Or a behaviour, ``B2_PICK right_hand cup1``, with individuals for its parameters in their order, or some of
-        them by name: ``B2_PICK hand=right_hand``.
+        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``, which may be followed by
+        ``by hand2``, the individual that must take part in its changes. A behaviour has arguments in the order of its
+        parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``.
     problem, plan
         The problem and its plan.
     labels : Labels
     ask, replan : callable
-        `ask` plans in a given problem; `replan` plans in the scene for other goals.
+        Functions that plan: `ask` plans in a given problem, and `replan` plans in the scene for other goals.
     instead : Step, optional
-        The step that the behaviour would replace.
+        The step that the behaviour replaces.
 
     Raises
     ------
@@ -429,7 +433,7 @@ def why_not(
 
 
 def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
-    """Return the individuals that a text assigns to a behaviour's parameters."""
+    """Return the individuals that a text assigns to the parameters and variables of a behaviour, by name."""
     names = [p.name for p in behavior.parameters]
     given: dict[str, str] = {}
     for position, word in enumerate(text.split()):
@@ -485,7 +489,7 @@ def _fact_told(
     ]
     try:
         symbol, value = parse_fact(problem, fact)
-    except KnowledgeError:  # the individual may be in the scene though the task doesn't need it
+    except KnowledgeError:  # the whole scene may have an individual that the problem hasn't
         problem, outcome, labels = replan([*goals, fact])
         symbol, value = parse_fact(problem, fact)
     else:
@@ -530,10 +534,10 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:
-    """Return the conditions that another plan violates and this one doesn't, as sentences."""
+    """Return the conditions of levels that the plan `other` violates and the plan `plan` doesn't, as sentences."""
     first = problem.domain.levels[0]
     if all(step.level == first for step in other.steps):
-        return ()  # no level is left
+        return ()  # no level is without steps
     known = {(one.change, one.conditions) for left in levels_left(problem, plan) for one in left.broken}
     found = []
     for level, one in ((left.level, one) for left in levels_left(problem, other) for one in left.broken):

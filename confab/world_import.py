@@ -1,4 +1,4 @@
-"""The world model of a robot as a scene: what `confab import WORLD` does."""
+"""Import of a robot's world model, or of a foreign RDF file, as a scene (`confab import`)."""
 
 from __future__ import annotations
 
@@ -20,30 +20,31 @@ from confab.scene import load
 from confab.sim.robots.transport import Model, RobotError
 
 MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
-"""Namespaces in the scene query of an interface: of the fields of a world model, and of the entities that their texts name."""
+"""Namespaces of the properties for a world model: for fields with literals, and for fields that name an entity."""
 
 DCTERMS = "http://purl.org/dc/terms/"
 WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
-"""The interface that reads a world file, by the file's suffix."""
+"""The name of the interface that reads a world file, by the file's suffix."""
 
 
 def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
-    """Write a scene of a robot's world model as Turtle, and return the number of its individuals.
+    """Write the world model of a robot as a scene in Turtle, and return the number of the scene's individuals.
 
     Parameters
     ----------
     on : str
-        ``INTERFACE:ADDRESS`` of a shipped interface, or a world file, whose suffix tells the interface.
+        ``INTERFACE:ADDRESS`` with a shipped interface, or a world file whose suffix determines the interface.
     path : Path
         File to write.
     seed : int
-        Of a simulated robot.
+        Seed of a simulated robot.
     title : str, optional
 
     Raises
     ------
     KnowledgeError
-        There is no such interface, or it has no scene query; the robot can't be reached; or its model yields no scene.
+        The interface doesn't exist or has no scene query, no connection to the robot is possible, or the scene query has no
+        result.
     """
     name, where = (
         (WORLD_FILES[Path(on).suffix], on) if Path(on).suffix in WORLD_FILES and Path(on).is_file() else parts_of(on)
@@ -64,12 +65,12 @@ def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
 
 
 def scene_text(interface: Interface, model: Model, name: str, title: str) -> tuple[str, int]:
-    """Return the scene that the scene query of an interface makes of a world model, as Turtle, and its number of individuals.
+    """Return the scene that an interface's scene query constructs from a world model, as Turtle, and the number of individuals.
 
     Raises
     ------
     KnowledgeError
-        The interface has no scene query, or the query returns nothing from the model.
+        The interface has no scene query, or the query has no result.
     """
     if not interface.scene_query:
         raise KnowledgeError(f"{interface.name} has no e:sceneQuery, so its world model makes no scene")
@@ -87,21 +88,21 @@ def scene_text(interface: Interface, model: Model, name: str, title: str) -> tup
 
 
 def scene_of_graph(source: Path, query: str, path: Path) -> int:
-    """Write the scene that a CONSTRUCT query makes of a foreign graph as Turtle, and return the number of its individuals.
+    """Write the scene that a query constructs from a foreign RDF file as Turtle, and return the number of individuals.
 
     Parameters
     ----------
     source : Path
-        A file of RDF whose terms are of another ontology.
+        An RDF file with terms of another ontology.
     query : str
-        The name of a query among the alignments, or its file.
+        The path of a CONSTRUCT query, or the file name of a shipped query (in the folder ``alignments``).
     path : Path
         File to write. It imports the shipped ontologies whose terms the query uses.
 
     Raises
     ------
     KnowledgeError
-        A file can't be read, or the query returns nothing from the graph.
+        A file can't be read, or the query has no result.
     """
     file = next((one for one in (Path(query), ontology.ROOT / "alignments" / query) if one.is_file()), None)
     if file is None:
@@ -126,7 +127,7 @@ def scene_of_graph(source: Path, query: str, path: Path) -> int:
 
 
 def _interfaces() -> Mapping[str, Path]:
-    """Return the shipped interfaces: name to file."""
+    """Return the files of the shipped interfaces by the name of the interface."""
     shipped = {iri.rsplit("/", 1)[-1]: path for iri, path in ontology.shipped().items()}
     return {
         name: path
@@ -139,7 +140,7 @@ def _interfaces() -> Mapping[str, Path]:
 
 
 def _triples(model: Model, namespace: str) -> Iterator[ox.Triple]:
-    """Yield a world model as triples: an individual for each entity, a property for each field."""
+    """Yield a world model as triples, with an individual for each entity and a property for each field."""
     nodes = {entity: ox.NamedNode(namespace + as_iri_part(entity)) for entity in model}
     for entity, fields in model.items():
         for name, shown in fields.items():
@@ -160,7 +161,7 @@ def _literal(shown: Any) -> ox.Literal | None:
 
 
 def _turtle(iri: str, imported: Sequence[str], found: list[ox.Triple], title: str) -> str:
-    """Return the triples of a scene as Turtle, with a header and labels; all individuals are stated to be different."""
+    """Return a scene as Turtle: a header, the given triples, labels, and the statement that all individuals are different."""
     individuals = sorted({str(triple.subject.value) for triple in found if isinstance(triple.subject, ox.NamedNode)})
     things = [one for one in individuals if "." not in one.rpartition("#")[2]]
     labelled = {
