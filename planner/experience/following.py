@@ -1,11 +1,11 @@
-"""Learned rules as methods: the unmet conditions of a rule are achieved first, by rules again, then its step is applied.
+"""Learned rules used as methods: to achieve a goal, achieve the unmet conditions of a rule, then apply the rule's step.
 
-achieve    a goal by its cheapest instances (`confab.planner.experience.instances`), the most cogent first: their unmet conditions
-           one by one, those that plans achieved first, otherwise the most expensive; then the step, refined and applied
-budget     rules spend the budget of the search; failed attempts may waste a tenth of it (`confab.planner.experience.allowance`)
+Other rules achieve the unmet conditions, one condition at a time. The cheapest rule instances for a goal are tried first
+(`confab.planner.experience.instances`); of equally cheap instances, the most cogent is tried first. A condition that earlier
+plans achieved before the others comes first; otherwise the most expensive condition comes first.
 
-`RulePolicy.follow` either achieves the targets and keeps the other values, or leaves the table unchanged. The search then continues
-as if no rules had been tried.
+Rules spend the budget of the search. Failed attempts may waste a tenth of the budget (`confab.planner.experience.allowance`).
+If `RulePolicy.follow` fails, the table of current values is unchanged, and the planner continues with a search.
 """
 
 from __future__ import annotations
@@ -28,17 +28,20 @@ from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, T
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition, Witness
 
 STEPS_PER_COST = 3
-"""Maximum ratio of applied steps to a goal's cost, beside `SLACK` more: each condition is costed separately."""
+"""A goal of cost c may take at most `STEPS_PER_COST` * c + `SLACK` steps.
+
+The cost of a goal may be smaller than the number of required steps, because the conditions are costed separately.
+"""
 TWICE = 2
-"""Maximum number of times that a goal is achieved: a door that was closed may be opened once more."""
+"""Maximum number of times that `RulePolicy.achieve_all` achieves the same goal; a later goal may undo an earlier goal once."""
 CASES, NEARLY = 3, 0.95
-"""Minimum number of cases of an order of goals, and minimum share of cases in which it held."""
+"""An order of two goals is used if at least `CASES` plans had this order, and at least the share `NEARLY` of all plans."""
 
 Steps: TypeAlias = "list[RefinedStep]"
 
 
 class RulePolicy:
-    """Rules that achieve the goals of one call.
+    """A policy that follows learned rules to achieve the goals of one planning call.
 
     Parameters
     ----------
@@ -48,9 +51,9 @@ class RulePolicy:
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
-        Compiled rules of other calls of the same program; it is extended.
+        Compiled rules of other calls of the same program; newly compiled rules are added.
     ranked : function of a method and individuals for its roles, optional
-        Returns these, the best first.
+        Returns the individuals in order of preference.
     """
 
     def __init__(
@@ -73,7 +76,10 @@ class RulePolicy:
         self.steps_left = 0
         """Number of steps that may still be applied for the current goal."""
         self.serial, self.passed = True, set[str]()
-        """Whether each goal so far left another one within reach, and the situation types for which this was checked."""
+        """`serial` is true until an achieved goal makes another goal unreachable.
+
+        `passed` contains the situation types for which the policy has checked reachability.
+        """
 
     # ----------------------------------------------------------------------------------------------------- the call's goals
 
@@ -86,7 +92,7 @@ class RulePolicy:
         return any(not self.call.met(other) for other in self.before.get(cell, ()))
 
     def every(self, cells: Mapping[Cell, str]) -> Iterator[RuleInstance]:
-        """Yield the instances of the most abstract level without unmet conditions, for some goals or for their subgoals."""
+        """Yield the applicable rule instances of the most abstract level, for given goals or for their subgoals."""
         goals = dict.fromkeys(cells.items())
         for goal in (waiting := list(goals)):
             ready = [one for one in self.instances.of((self.first, goal, False)) if not one.unmet]
@@ -97,11 +103,11 @@ class RulePolicy:
                 waiting += new
 
     def ready(self) -> bool:
-        """Return whether the planner should follow rules now."""
+        """Return whether the effort wasted by rules is within the allowance."""
         return self.allowance.ready()
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if a rule achieves the goal in one step, 2 if in more steps, 0 if no rule achieves it."""
+        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if no rule is for the goal."""
         goal = cell, self.call.goal[cell]
 
         def fewest() -> int:
@@ -113,16 +119,16 @@ class RulePolicy:
     # ------------------------------------------------------------------------------------------------------------- following
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Apply refined steps of a level that achieve the targets and keep the other values.
+        """Follow rules of a level to achieve the targets; return the applied steps, each with its refinement.
 
-        Returns None, with the table unchanged, if rules fail or have no allowance left.
+        Return None and leave the table unchanged if the rules fail, change a value to be kept, or exceed the allowance.
         """
         if not (self.ready() if level == self.first else self.allowance.left() > 0):
             return None
         return self.allowance.bounded(lambda: self.attempt(level, targets, keep))
 
     def attempt(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Do the same as `follow`, without a limit of the effort of search."""
+        """Follow rules as `follow` does, without setting a limit on the effort of matching."""
         call, space, allowance = self.call, self.call.space, self.allowance
         wasted, start, expanded, began = (
             allowance.wasted_effort,
@@ -149,7 +155,7 @@ class RulePolicy:
         return None
 
     def achieve_all(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> Steps | None:
-        """Achieve the targets, and restore the values to be kept, until none differs."""
+        """Achieve the targets and restore the values to be kept; return the steps, or None if the rules fail."""
         start, steps = len(self.call.table.trail), list[RefinedStep]()
         achieved: dict[Cell, int] = {}
         while differing := self.differing(start, targets, keep):
@@ -169,7 +175,7 @@ class RulePolicy:
         return steps
 
     def differing(self, start: int, targets: Mapping[Cell, str], keep: Keep) -> dict[Cell, str]:
-        """Return the required values that don't hold: the targets, and kept values that were changed since a mark."""
+        """Return the required values that don't hold: targets, and values to be kept that changed since the mark `start`."""
         now, wanted = self.call.table.now, dict(targets)
         for cell in self.call.space.defined:
             if value := keep(cell, ""):
@@ -182,16 +188,16 @@ class RulePolicy:
     # -------------------------------------------------------------------------------------------------------------- one goal
 
     def achieve(self, level: int, goal: Goal, above: tuple[Goal, ...] = (), below: float = inf) -> Steps | None:
-        """Apply steps that achieve a goal; return None, with the table unchanged, if no instance does.
+        """Apply steps that achieve a goal; return None and leave the table unchanged if no rule instance achieves the goal.
 
         Parameters
         ----------
         level : int
         goal : Goal
         above : tuple of Goal
-            The goals that this one is a subgoal of.
+            The goals to which `goal` is a subgoal.
         below : float
-            Only instances of lower cost are tried.
+            Only instances with a cost below this bound are tried.
         """
         if self.instances.met(goal):
             return []
@@ -206,7 +212,7 @@ class RulePolicy:
             if steps:
                 most: float = cost
                 if (steps[-1].behavior, steps[-1].arguments) == instance.ground:
-                    # A defined situation type, or an amount, may need the same step once more.
+                    # A defined situation type or an amount may need the same step several times.
                     most = below if self.deviation(goal) < deviation else 0.0
                     self.steps_left = left if most else self.steps_left
                 rest = self.achieve(level, goal, above, most)
@@ -216,13 +222,16 @@ class RulePolicy:
         return None
 
     def undone_within_reach(self, level: int, mark: int) -> bool:
-        """Return whether the achieved goals that were undone since a mark can be achieved again."""
+        """Return whether rules can achieve again those achieved goals of the call that were undone since a mark."""
         kept, trail = self.call.kept, self.call.table.trail[mark:]
         undone = dict.fromkeys((situation, key) for situation, key, _ in trail if (situation, key) in kept)
         return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)
 
     def deviation(self, goal: Goal) -> float:
-        """Return the difference of an amount from its goal, or the number of wrong facts of a defined goal; zero for others."""
+        """Return the distance of an amount from its goal, or the number of wrong facts of a defined goal.
+
+        The result is zero for all other goals.
+        """
         (situation, key), value = goal
         if situation in self.call.program.rules:
             return len(self.call.space.subgoals.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
@@ -232,9 +241,10 @@ class RulePolicy:
         return min(abs(now - float(number(bound.lstrip("<>=")))) for bound in value.split(","))
 
     def apply(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
-        """Achieve the unmet conditions of an instance, and apply its step; stop early if no instance of the rule is left.
+        """Achieve the unmet conditions of a rule instance, and apply the step of the rule; return the steps.
 
-        The table may be changed if None is returned.
+        If no instance of the rule for the goal remains after a condition is achieved, the method returns the steps so far. On
+        failure the method returns None and may leave the table changed.
         """
         call, steps = self.call, list[RefinedStep]()
         rounds, fewest = 2 * len(self.instances.achievers[instance.rule.name].soft), inf
@@ -259,7 +269,10 @@ class RulePolicy:
         return None if step is None else [*steps, step]
 
     def achieve_condition(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
-        """Achieve one unmet condition of an instance, such that the others stay within reach."""
+        """Achieve one unmet condition of a rule instance so that the other unmet conditions remain reachable.
+
+        Return None if the rules achieve no condition in this way.
+        """
         conditions, named, table = self.instances.achievers[instance.rule.name].soft, instance.named, self.call.table
         goals = dict[int, list[Goal]]()
         cost = dict[Goal, float]()
@@ -285,17 +298,20 @@ class RulePolicy:
                     continue
                 condition = conditions[n]
                 if isinstance(condition, Witness) and condition.negated:
-                    self.steps_left = left  # each individual that the condition excludes has steps of its own
+                    self.steps_left = left  # each individual that the condition excludes may need separate steps
                 if all(any(self.instances.distance(level, other) < inf for other in goals[m]) for m in ready if m != n):
                     return done
                 table.undo(mark)
                 others_lost = True
-            if not others_lost:  # otherwise another condition comes first
+            if not others_lost:  # otherwise another condition is tried first
                 return None
         return None
 
     def suffices(self, instance: RuleInstance, position: int, goal: Goal) -> bool:
-        """Return whether a goal alone makes a condition true; amounts and defined situation types aren't tested."""
+        """Return whether a goal alone makes an unmet condition true.
+
+        Goals about amounts and defined situation types aren't tested; the result is then true.
+        """
         table, achiever, program = self.call.table, self.instances.achievers[instance.rule.name], self.call.program
         if goal[0][0] in program.rules or program.domain.situations[goal[0][0]].quantity is not None:
             return True
@@ -304,18 +320,21 @@ class RulePolicy:
         holds = self.call.space.subgoals.holds(achiever, achiever.soft[position], instance.named)
         table.undo(mark)
         if self.instances.age == age:
-            self.instances.age = table.age  # the state is the same again
+            self.instances.age = table.age  # undoing has restored the state
         return holds
 
     def ordered(self, first: Condition, then: Condition, named: Mapping[str, str]) -> bool:
-        """Return whether plans achieved one condition before another one."""
+        """Return whether earlier plans achieved the condition `first` before the condition `then`."""
         one, other = fact(first, named), fact(then, named)
         return one is not None and other is not None and Order.of(one, other, self.constants) in self.orders
 
     # --------------------------------------------------------------------------------------------------------- goals jointly
 
     def other_open_goal(self, targets: Mapping[Cell, str]) -> Goal | None:
-        """Return another open goal of a target's situation type that is within reach, once for each type."""
+        """Return a reachable open goal that has the situation type of a target and isn't a target.
+
+        Return None if there is no such goal, or if reachability was already checked for the situation type.
+        """
         kinds = {cell[0] for cell in targets} - self.passed if self.serial else set()
         for cell, value in reversed(self.call.goal.items()) if kinds else ():
             if cell[0] in kinds and cell not in targets and not self.call.met(cell):
@@ -324,9 +343,10 @@ class RulePolicy:
         return None
 
     def achieve_jointly(self, level: int, goals: Sequence[Goal]) -> Steps | None:
-        """Achieve goals none of which can be achieved after the others: first the conditions of all their last steps.
+        """Achieve the conditions of the last steps of all goals first, then apply the last steps; return the steps.
 
-        Each goal has an instance with individuals of its own. The table may be changed if None is returned.
+        This method is for goals of which each makes the others unreachable. No individual is consumed by the rule instances
+        of two goals. On failure the method returns None and may leave the table changed.
         """
         chosen, steps = list[tuple[Goal, RuleInstance]](), list[RefinedStep]()
         try:
@@ -356,7 +376,10 @@ class RulePolicy:
         return steps
 
     def achieve_nearest(self, level: int, subgoals: Sequence[Goal]) -> Steps | None:
-        """Achieve the cheapest subgoal after which those of about the same cost are still within reach."""
+        """Achieve the cheapest subgoal after which other subgoals of about the same cost remain reachable.
+
+        Return None if there is no such subgoal.
+        """
         table, cost = self.call.table, {goal: self.instances.distance(level, goal) for goal in subgoals}
         for goal in sorted((goal for goal in subgoals if cost[goal] < inf), key=cost.__getitem__):
             near = [other for other in subgoals if other != goal and cost[other] <= cost[goal] + SLACK]
@@ -368,7 +391,7 @@ class RulePolicy:
         return None
 
     def consumed(self, instance: RuleInstance) -> set[str]:
-        """Return the individuals in conditions of an instance that its step makes false."""
+        """Return the individuals in those conditions of a rule instance that the rule's step makes false."""
         named, behavior = instance.named, self.call.program.domain.behaviors[instance.rule.does[0]]
         bound = {p.name: individual for p, individual in zip(behavior.parameters, instance.ground[1], strict=True)}
         made = {(e.situation, tuple([bound.get(a, a) for a in e.arguments])): e.value for e in behavior.effects}
@@ -382,7 +405,7 @@ class RulePolicy:
 
 
 def by_rules(policy: RulePolicy) -> None:
-    """Achieve as many goals of a call as possible by rules alone."""
+    """Achieve goals of a call by rules alone, until the rules achieve no further goal."""
     call, progress = policy.call, True
     while progress:
         progress = False
@@ -396,15 +419,15 @@ def by_rules(policy: RulePolicy) -> None:
 
 
 def rules_in(experience: Experience) -> list[Rule]:
-    """Return the rules that may be followed."""
+    """Return the rules of an experience that aren't disabled."""
     said = sorted(experience.said.items())
     return [one for name, one in said if isinstance(one, Rule) and name not in experience.disabled]
 
 
 def usable(experience: Experience) -> list[Order]:
-    """Return the orders that held in nearly all cases.
+    """Return the orders of goals that nearly all plans had.
 
-    Orders between goals without a common individual are returned only for different situation types.
+    Orders between goals without a common individual are returned only if the goals have different situation types.
     """
     counts = experience.totals()
     found = []
@@ -418,7 +441,10 @@ def usable(experience: Experience) -> list[Order]:
 
 
 def fact(condition: Condition, named: Mapping[str, str]) -> Fact | None:
-    """Return the fact that a positive value condition requires, with the individuals of its roles; None for other conditions."""
+    """Return the fact that a positive value condition requires, with roles replaced by individuals.
+
+    Return None for any other condition.
+    """
     if not isinstance(condition, ValueCondition) or condition.negated:
         return None
     arguments = tuple([named.get(a, a) for a in condition.arguments])
@@ -426,7 +452,7 @@ def fact(condition: Condition, named: Mapping[str, str]) -> Fact | None:
 
 
 def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program) -> dict[Cell, list[Cell]]:
-    """Return for each goal the other goals that orders place before it."""
+    """Return, for each goal, the goals that the orders place before this goal."""
     found: dict[Cell, list[Cell]] = {}
     parts = {cell: (*arguments_of(cell[1]), value) for cell, value in goal.items()}
     constants = frozenset(program.named) | {TRUE, FALSE}

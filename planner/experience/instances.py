@@ -1,7 +1,8 @@
-"""Instances of learned rules in the current state, and the least number of rules that lead to a goal.
+"""Instances of learned rules in the current state, and the cost of a goal as a number of rules.
 
-instance   a rule with an individual in each role, and its unmet conditions; for each of these, one of several goals suffices
-cost       least number of rules in a chain to a goal; each condition is costed separately, as in h_max, by iterative deepening
+An instance is a rule with an individual in each role. An unmet condition of an instance has one or more goals; achieving
+one of these goals makes the condition true. The cost of a goal is the least number of rules in a chain that achieves the
+goal. Conditions are costed separately, as in the heuristic h_max. Costs are computed by iterative deepening.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from confab.reasoner.symbols import FALSE, TRUE, ValueCondition
 COMPARED, TRIES = 40, 3
 """Maximum number of instances of a rule that are compared, and of instances for a goal that are tried."""
 FARTHEST, SLACK = 30, 2
-"""Maximum cost of a goal, and maximum excess in cost of an instance over the cheapest one."""
+"""Maximum cost of a goal, and maximum difference between the cost of a rule instance and the least cost."""
 MATCHING = 5
 """Cost of matching a rule, in states times operators (about a microsecond each)."""
 
 Roles: TypeAlias = "tuple[str, ...]"
 Goal: TypeAlias = "tuple[Cell, str]"
 Query: TypeAlias = "tuple[int, Goal, bool]"
-"""A level, a goal on it, and whether roles may be filled by individuals that the state doesn't suggest."""
+"""A level, a goal, and whether individuals that the state doesn't suggest may fill roles."""
 
 
 class RuleInstance(NamedTuple):
-    """A rule with individuals in its roles: the symbol that it changes, and the positions of its unmet conditions."""
+    """A rule with the symbol of a goal, an individual for each role, and the positions of the unmet conditions."""
 
     rule: Rule
     goal: Cell
@@ -44,7 +45,7 @@ class RuleInstance(NamedTuple):
 
     @property
     def named(self) -> dict[str, str]:
-        """The individuals by role."""
+        """The individual in each role."""
         return dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
 
     @property
@@ -58,7 +59,9 @@ Score: TypeAlias = "Callable[[RuleInstance], float]"
 
 
 class Instances:
-    """The instances of rules in the state of a call, compared by cost; results are cached until the state changes.
+    """The instances of rules in the current state of a call, and the costs of goals.
+
+    Results are cached until the state changes.
 
     Parameters
     ----------
@@ -69,13 +72,13 @@ class Instances:
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
-        Compiled rules of other calls of the same program; it is extended.
+        Compiled rules of other calls of the same program; newly compiled rules are added.
 
     Attributes
     ----------
     rules : mapping of level and situation type to rules
     excluded : frozenset of str
-        Individuals that instances for other goals use up; no role is filled by them.
+        Individuals that rule instances for other goals consume; excluded individuals fill no role.
     """
 
     def __init__(
@@ -100,7 +103,7 @@ class Instances:
         self.found: dict[Query, list[RuleInstance]] = {}
         self.least: dict[Query, int] = {}
         self.more_than: dict[Query, float] = {}
-        """Known bounds of costs: the cost of a goal is at most `least`, and more than `more_than`."""
+        """Known bounds of costs: the cost of a goal is at most its bound in `least`, and exceeds its bound in `more_than`."""
         self.seen: set[Query] = set()
         self.cut = False
         self.picked: dict[tuple[int, str], Sequence[str]] = {}
@@ -109,7 +112,7 @@ class Instances:
     # ------------------------------------------------------------------------------------------------------------- instances
 
     def exclude(self, individuals: frozenset[str]) -> None:
-        """Fill no more roles with some individuals."""
+        """Set the individuals that fill no role."""
         self.excluded, self.age = individuals, -1
 
     def refresh(self) -> None:
@@ -120,7 +123,7 @@ class Instances:
                 cache.clear()
 
     def of(self, query: Query) -> list[RuleInstance]:
-        """Return the instances of rules for a goal in the current state."""
+        """Return the rule instances for a goal in the current state."""
         self.refresh()
         if query not in self.found:
             level, (cell, value), suggested_or_not = query
@@ -137,7 +140,10 @@ class Instances:
     def fillings(
         self, rule: Rule, cell: Cell, value: str, suggested_or_not: bool
     ) -> Iterator[tuple[Roles, tuple[int, ...]]]:
-        """Return individuals for the roles of a rule, with its unmet conditions; a rule is compiled when it is first needed."""
+        """Return individuals for the roles of a rule, with the positions of the rule's unmet conditions.
+
+        The rule is compiled at its first use.
+        """
         name, program = rule.name, self.call.program
         if name not in self.finds:
             conditions = soft(rule, program.problem)
@@ -152,7 +158,10 @@ class Instances:
         return find(*arguments_of(cell[1]), value, suggested_or_not) if find is not None else iter(())
 
     def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
-        """Return one of many candidates for the value of a situation type for each symmetry class and state, free ones first."""
+        """Return candidates for a role whose individual becomes the value of a situation type, free candidates first.
+
+        Of many candidates, the result contains one for each combination of symmetry class and state.
+        """
         found = self.picked.get((id(candidates), situation))
         if found is None:
             self.allowance.spent += len(candidates)
@@ -175,7 +184,7 @@ class Instances:
         return found
 
     def goals_of(self, level: int, instance: RuleInstance, position: int) -> list[Goal]:
-        """Return the goals of which one suffices for an unmet condition of an instance."""
+        """Return the goals for an unmet condition of a rule instance; achieving one of them suffices."""
         self.refresh()
         if (key := (level, id(instance), position)) not in self.goals:
             self.goals[key] = instance, self._goals_of(level, instance, position)
@@ -202,17 +211,20 @@ class Instances:
         return meets(self.call.table.now[situation].get(key, FALSE), value)
 
     def distance(self, level: int, goal: Goal) -> float:
-        """Return the cost of a goal by the individuals that the state suggests, else by any; infinity if no chain leads to it."""
+        """Return the cost of a goal with the individuals that the state suggests.
+
+        If their cost is infinite, return the cost with any individuals; infinity if no chain of rules achieves the goal.
+        """
         cost = self.cost(level, goal, False)
         return cost if cost < inf else self.cost(level, goal, True)
 
     def cost(self, level: int, goal: Goal, suggested_or_not: bool) -> float:
-        """Return the least number of rules in a chain to a goal; infinity if there is none of at most `FARTHEST` rules."""
+        """Return the least number of rules in a chain that achieves a goal; infinity if the number exceeds `FARTHEST`."""
         for most in range(FARTHEST + 1):
             self.cut, self.seen, before = False, set(), len(self.least)
             if self.within(level, goal, most, suggested_or_not):
                 return most
-            if not self.cut and len(self.least) == before:  # no chain of any length leads to it
+            if not self.cut and len(self.least) == before:  # no chain of any length achieves the goal
                 self.more_than.update((query, inf) for query in self.seen if query not in self.least)
                 return inf
         return inf
@@ -228,7 +240,7 @@ class Instances:
         if most <= 0 or self.more_than.get(query, 0) >= most:
             self.cut |= (query not in self.seen or query in self.least) and self.more_than.get(query, 0) < inf
             return False
-        before, self.more_than[query] = self.more_than.get(query, 0), most  # a cycle to the same goal isn't cheaper
+        before, self.more_than[query] = self.more_than.get(query, 0), most  # a chain that needs its goal isn't cheaper
         self.seen.add(query)
         if any(self.instance_within(level, one, most, suggested_or_not) for one in instances):
             self.least[query], self.more_than[query] = most, before
@@ -236,7 +248,7 @@ class Instances:
         return False
 
     def instance_within(self, level: int, instance: RuleInstance, most: int, suggested_or_not: bool) -> bool:
-        """Return whether an instance costs at most `most`; an unmet condition without goals costs one rule."""
+        """Return whether a rule instance costs at most `most`; an unmet condition without goals costs one rule."""
         alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)
         return all(
             any(self.within(level, goal, most - 1, suggested_or_not) for goal in goals) if goals else most > 1
@@ -244,7 +256,7 @@ class Instances:
         )
 
     def by_cost(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, list[RuleInstance]]]:
-        """Yield the instances for a goal by increasing cost, up to `SLACK` above the cheapest."""
+        """Yield the rule instances for a goal by increasing cost, up to `SLACK` above the least cost."""
         for suggested_or_not in (False, True):
             least, found = self.cost(level, goal, suggested_or_not), False
             left = self.of((level, goal, suggested_or_not)) if least < inf else []
@@ -257,12 +269,19 @@ class Instances:
                 return
 
     def cheapest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, RuleInstance]]:
-        """Yield the instances to try for a goal, each with its cost, the best first; costs are computed on demand."""
+        """Yield at most `TRIES` rule instances for a goal, each with its cost, the best first.
+
+        Costs are computed on demand.
+        """
         ranked = ((cost, one) for cost, equal in self.by_cost(level, goal, below) for one in self.ranked(level, equal))
         return islice(ranked, TRIES)
 
     def ranked(self, level: int, instances: Sequence[RuleInstance]) -> Iterator[RuleInstance]:
-        """Yield equally cheap instances: those that undo fewer achieved goals and have fewer unmet conditions first."""
+        """Yield equally cheap rule instances in order of preference.
+
+        Instances that undo fewer achieved goals come first, then instances with fewer unmet conditions, then instances with
+        a greater score.
+        """
         if len(instances) < 2:
             yield from instances
             return
@@ -274,7 +293,10 @@ class Instances:
             yield from group
 
     def undone(self, level: int, instance: RuleInstance) -> int:
-        """Return the number of achieved goals that the step of an instance, or a condition with one goal, undoes."""
+        """Return the number of achieved goals that the step of a rule instance undoes.
+
+        For an instance with unmet conditions, return the number of goals that are undone by conditions with a single goal.
+        """
         if instance.unmet:
             alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)
             changes = [goals[0] for goals in alternatives if len(goals) == 1]
@@ -284,7 +306,10 @@ class Instances:
         return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
 
     def next(self, level: int, instance: RuleInstance, goal: Goal) -> RuleInstance | None:
-        """Return the cheapest instance of the same rule in the current state, if possible with the same step."""
+        """Return the cheapest instance of the same rule for a goal in the current state; None if there is none.
+
+        Among equally cheap instances, fewer unmet conditions are preferred, then the same step.
+        """
         same_rule = ([w for w in equal if w.rule is instance.rule] for _, equal in self.by_cost(level, goal))
         equal = next(filter(None, same_rule), [])
         return min(equal, key=lambda w: (len(w.unmet), w.ground != instance.ground), default=None)

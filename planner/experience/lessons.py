@@ -1,9 +1,9 @@
-"""Lessons from an episode: rules, orders of goals, methods, and a record of the rules known before.
+"""Lessons from an episode: rules, orders of goals, methods, choices, and the record of known rules.
 
-record     known rules are tried first; the goals that they achieve without search are counted for each kind of goal
-regress    the rules of the plan (`confab.planner.experience.regression`)
-replay     where several rule instances are applicable, the plan's step counts as chosen and the others as passed over
-orders     `teach` also plans with the goals in other orders; only the orders of achieved goals that all plans share are learned
+The record counts, for each kind of goal, the goals that known rules achieve without search. New rules follow from the plan
+by goal regression (`confab.planner.experience.regression`). The plan is also replayed: in each state, the applicable rule
+instance with the plan's step counts as chosen, and the other applicable instances count as passed over. `teach` also plans
+with the goals in other orders, because one plan doesn't show whether an order is required.
 """
 
 from __future__ import annotations
@@ -39,22 +39,25 @@ from confab.reasoner.memory.experience import (
 from confab.reasoner.symbols import Problem, Symbol
 
 SINGLE, OTHERS = 6, 2
-"""Number of goals taught one by one, and number of other orders of all goals."""
+"""Maximum number of goals that are taught separately, and maximum number of additional orders of all goals."""
 SHORT = Limits(expansions=20_000, seconds=20.0)
-"""Limits of planning one lesson."""
+"""Limits of one planning call during learning."""
 CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
-"""Counts of one case."""
+"""A single case in which a choice was made, passed over, or failed."""
 
 
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:
-    """Learn how a problem is solved, with its goals in several orders and one by one; return the plan, None if there is none.
+    """Learn how to solve a problem, with its goals in several orders and separately; return the plan.
+
+    Return None if no plan is found.
 
     Parameters
     ----------
     experience : Experience
+        The experience that is extended.
     problem : Problem
     plan : Plan, optional
-        Planned if left out.
+        The plan to learn from; without it, the function plans.
     """
     using = compiled(problem)
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
@@ -73,7 +76,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
 
 
 def variants(problem: Problem) -> Iterator[Problem]:
-    """Yield the problem as it is, with its goals in other orders, and with some of its goals alone."""
+    """Yield the unchanged problem, then the problem with its goals in other orders, then with single goals."""
     goals = list(problem.goal.items())
     yield problem
     if len(goals) > 1:
@@ -97,7 +100,7 @@ def live(
     ----------
     experience : Experience
     problem : Problem
-        Its initial state is the state before the plan.
+        The problem whose initial state is the state before the plan.
     plan : Plan
     failed : path of a step, optional
         The step that failed; later steps weren't tried.
@@ -107,7 +110,7 @@ def live(
     Raises
     ------
     LearningError
-        A step's preconditions don't hold in the state before it; the experience is unchanged.
+        The preconditions of a step don't hold in the state before the step. The experience is unchanged.
     """
     using = compiled(problem)
     lesson = record(experience, problem, using) if failed is None and plan.steps else Lesson()
@@ -120,12 +123,12 @@ def live(
 
 
 def grounds(steps: Sequence[Step]) -> list[Ground]:
-    """Return steps as behaviours with their arguments."""
+    """Return each step as the name of its behaviour and its arguments."""
     return [(step.behavior, step.arguments) for step in steps]
 
 
 def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Change]]:
-    """Return the individuals that the current state assigns to a behaviour's variables, and the changes that it makes.
+    """Return the individuals that the current state assigns to a behaviour's variables, and the behaviour's changes.
 
     Raises
     ------
@@ -139,7 +142,10 @@ def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Chang
 
 
 def on_one_level(steps: Sequence[Step]) -> list[Step]:
-    """Return steps with those above the lowest level replaced by their refinements, which change symbols unseen above."""
+    """Return the steps of the lowest level: each step of a higher level is replaced by its refinement.
+
+    Refinements also change symbols that the higher level doesn't see.
+    """
     found, lowest = list(steps), max((step.level for step in steps), default=0)
     while any(step.level < lowest for step in found):
         found = [inner for step in found for inner in (step.steps if step.level < lowest else (step,))]
@@ -148,7 +154,7 @@ def on_one_level(steps: Sequence[Step]) -> list[Step]:
 
 
 def carry_out(call: Call, step: Step) -> None:
-    """Apply a step by its refinement, including changes that the step's level doesn't see."""
+    """Apply the refinement of a step, including the changes that the step's level doesn't see."""
     for inner in step.steps:
         carry_out(call, inner)
     if not step.steps:
@@ -156,7 +162,7 @@ def carry_out(call: Call, step: Step) -> None:
 
 
 def with_first_record(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
-    """Return a lesson; if `experience` has no rules yet, with the record of the lesson's rules on its own problem."""
+    """Return a lesson; if `experience` has no rules, add the record of the lesson's rules on the problem."""
     if not rules_in(experience):
         alone = Experience("alone")
         alone.learn(lesson)
@@ -172,7 +178,7 @@ def record(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     lesson, open_ = Lesson(), policy.open()
     with suppress(LimitError):
         by_rules(policy)
-    check("learning")  # without time for its rules there is no record
+    check("learning")  # a record without time for the rules would count failures
     for cell in open_:
         kinds = {rule.goals for rule in policy.instances.rules.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
@@ -197,7 +203,7 @@ def learned(
     failed: tuple[int, ...] | None = None,
     rules: Sequence[Rule] = (),
 ) -> Lesson:
-    """Return the lesson of a plan: rules, orders, methods, choices and rejections."""
+    """Return the lesson of a plan: rules, orders, methods, chosen individuals, and individuals passed over."""
     steps = list(plan.steps)
     at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
     if at is not None:
@@ -209,7 +215,7 @@ def learned(
 
 
 def rules_and_methods(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
-    """Return the rules and orders of a plan's steps, and those of their refinements with the methods."""
+    """Return the rules, orders and methods of a plan and of the refinements of its steps."""
     trace = PlanTrace(problem, grounds(on_one_level(plan.steps)))
     lesson = Lesson(said=list(trace.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in trace.orders()]
@@ -218,7 +224,7 @@ def rules_and_methods(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
 
 
 def refined(call: Call, steps: Iterable[Step]) -> Lesson:
-    """Apply steps, and return the refinement of each: the method, the individuals of its roles, and the rules."""
+    """Apply steps; return, for each refined step, the method, the individuals in the method's roles, and the rules."""
     lesson = Lesson()
     for step in steps:
         check("learning")
@@ -241,7 +247,10 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
 
 
 def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fact, Tally]]:
-    """Yield the individuals in the open roles of a method as chosen, and those that the next level also allowed as passed over."""
+    """Yield the individuals in the open roles of a method as chosen; yield other possible individuals as passed over.
+
+    Another individual is possible if the steps of the method are applicable with this individual.
+    """
     own = fillers(method, roles, call.problem)
     yield from ((method, fact, CHOSEN) for fact in own)
     for place, role in enumerate(method.open, method.roles) if own else ():
@@ -252,7 +261,7 @@ def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fa
 
 
 def possible(call: Call, method: Method, roles: Roles) -> bool:
-    """Return whether the steps of a method are applicable now, whatever their refinements."""
+    """Return whether the steps of a method are applicable in the current state; refinements aren't tested."""
     mark, left = len(call.table.trail), len(method.steps)
     for name, arguments in call.refiner.methods.filled(method, roles):
         done = call.space.forward[name](*arguments)
@@ -265,7 +274,10 @@ def possible(call: Call, method: Method, roles: Roles) -> bool:
 
 
 def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> PlanTrace:
-    """Return the trace of a level's steps since a mark: from the state at the mark to the targets and the values to be kept."""
+    """Return the trace of the steps of a level since a mark.
+
+    The trace begins with the state at the mark. The goals of the trace are the targets and the values to be kept.
+    """
     before, state = call.table.before(mark), call.table.state()
     goal = {}
     for cell, first in before.items():
@@ -280,7 +292,10 @@ def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, don
 
 
 def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
-    """Return a step's refinement over roles, and their individuals; None where the table determines them."""
+    """Return a step's refinement as a method, and the individual of each role.
+
+    The individual is None for roles that the current state determines.
+    """
     method = methods.lifted(step.behavior, grounds(step.steps), own)
     filled = dict(zip(range(len(own)), own, strict=True))
     for (_, places), inner in zip(method.steps, step.steps, strict=True):
@@ -294,7 +309,7 @@ def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Metho
 def chosen(
     rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
 ) -> Lesson:
-    """Return the choices and rejections of a plan among the applicable instances of known rules and of the given ones."""
+    """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules."""
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call, also=rules)
     reader = FactReader(using.program, call.table, call.goal)
@@ -315,12 +330,12 @@ def chosen(
 
 
 def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
-    """Yield the counts of a rule instance: for the rule, and for the facts about the individuals in its roles."""
+    """Yield a case of a rule instance for the rule, and for each fact about the individuals in the rule's roles."""
     return ((c.rule, fact, tally) for fact in (ITSELF, *reader.facts(c.rule, c.roles)))
 
 
 def compared(reader: FactReader, done: Sequence[RuleInstance], passed: Sequence[RuleInstance]) -> Lesson:
-    """Return the counts for some chosen and some passed-over instances."""
+    """Return the lesson of a choice: the cases of chosen and of passed-over rule instances."""
     lesson = Lesson()
     for c in {c.rule.name: c for c in done}.values():
         lesson.counted += counts_of(reader, c, CHOSEN)
@@ -350,7 +365,8 @@ def lesson_of_failure(
 ) -> Lesson:
     """Return the lesson of a step whose sub-step with the given path failed.
 
-    It counts a failure of the rules that would have chosen the step, with its facts, and of the individuals in its refinement.
+    The lesson counts a failure of the rules that would have chosen the step, of the facts about the individuals in the
+    rules' roles, and of the individuals in the step's refinement.
     """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call)

@@ -1,8 +1,9 @@
-"""A rule as a join over the table: generated Python that yields the rule instances now, each with its unmet conditions.
+"""Matching of rules: each rule is compiled to a Python function that yields the rule instances in the current state.
 
-Static conditions must hold; the others may be *unmet*, since steps can achieve them first. A role is filled, in this order of
-preference, by the value of a symbol or the holder of a value; by a static relation; by a class. If no individual of the first kind
-fits, or all instances are requested, the others follow, one of each symmetry class. Different roles have different individuals.
+The static conditions of an instance hold. The other conditions may be *unmet*, because steps can achieve unmet conditions
+later. The preferred candidates for a role are values of symbols and holders of values. If no preferred candidate fits, or
+if all instances are requested, the candidates are one individual of each symmetry class, taken from a static relation or
+from the role's class. Different roles have different individuals.
 """
 
 from __future__ import annotations
@@ -17,19 +18,24 @@ from confab.reasoner.memory.experience import Rule
 from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
-"""Given a goal's arguments and value, and whether all instances are requested, yields individuals for the roles, and unmet
-conditions."""
+"""Function that yields the instances of a rule, each as the individuals in the roles and the positions of unmet conditions.
+
+The parameters are the arguments of the goal's symbol, the goal's value, and whether all instances are requested.
+"""
 
 Pick: TypeAlias = "Callable[[tuple[str, ...], str], Sequence[str]]"
-"""Returns one individual of each symmetry class, free ones first if they become values of a situation type."""
+"""Function that returns one of the given individuals for each symmetry class.
+
+The second parameter names the situation type whose value the individual becomes. Free individuals come first.
+"""
 Bind: TypeAlias = "Callable[[Table, Pick], Find]"
 
 DEEPEST = 18
-"""Maximum number of nested loops in Python, with a margin."""
+"""Maximum number of nested loops in a generated function; Python allows slightly more."""
 
 
 def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
-    """Return the conditions of a rule that can be achieved before its step: those on the state, and its comparisons."""
+    """Return the conditions that steps can achieve: conditions of a rule on the state, and comparisons of its behaviour."""
     behavior = problem.domain.behaviors[rule.does[0]]
     put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
     compared = (c for c in behavior.preconditions if isinstance(c, Comparison) and mentions(c) <= put.keys())
@@ -37,9 +43,9 @@ def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
 
 
 def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind | None:
-    """Return the function that binds a rule, with unmet conditions, to a table; None if the rule has too many roles.
+    """Return the function that binds a compiled rule to a table of current values; None if the rule has too many roles.
 
-    The problem has the rule's terms (`known`).
+    The problem must have the rule's behaviour, classes and situation types (`known`).
     """
     lines = _Join(rule, writer, asks).lines()
     if lines is None:
@@ -49,7 +55,7 @@ def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind 
 
 
 def known(rule: Rule, problem: Problem) -> bool:
-    """Return whether a problem has the behaviour, the classes and the situation types of a rule."""
+    """Return whether a problem has the behaviour, all classes and all situation types of a rule."""
     domain, classes = problem.domain, problem.classes
     behavior = domain.behaviors.get(rule.does[0])
     if (
@@ -77,7 +83,7 @@ def _variables(terms: Iterable[str]) -> set[str]:
 
 
 class _Join:
-    """Writes the function of one rule."""
+    """Writer of the Python function that yields the instances of one rule."""
 
     def __init__(self, rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> None:
         self.rule, self.writer, self.soft = rule, writer, asks
@@ -86,7 +92,7 @@ class _Join:
         self.bound: set[str] = set()
 
     def lines(self) -> list[str] | None:
-        """Return the function; `None` if it would have too many nested loops."""
+        """Return the lines of the function; None if the function would need too many nested loops."""
         rule, depth = self.rule, 0
         given = (*rule.goal.arguments, rule.goal.value)
         lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}, everybody):"]
@@ -123,7 +129,10 @@ class _Join:
         return lines
 
     def tests(self, role: str) -> list[str]:
-        """Fill a role; return the tests on its individual: its class, that it fills no other role, and its conditions."""
+        """Mark a role as bound; return the tests on the role's individual.
+
+        The tests concern the individual's class, whether the individual fills another role, and the rule's conditions.
+        """
         members = self.problem.members
         mine = members(self.kinds[role])
         others = [r for r in sorted(self.bound) if not members(self.kinds[r]).isdisjoint(mine)]
@@ -134,7 +143,7 @@ class _Join:
         return found + self.ready() + self.ahead(role)
 
     def ahead(self, role: str) -> list[str]:
-        """Return tests that each static relation relates the role's individual to some individual not yet bound."""
+        """Return tests that the static relations of a role's individual have candidates for roles that aren't bound yet."""
         found = []
         for c in self.hard:
             if isinstance(c, RelationCondition) and not c.negated and role in c.arguments:
@@ -143,14 +152,17 @@ class _Join:
         return found
 
     def ready(self) -> list[str]:
-        """Return tests for every required condition all of whose roles are bound, each once."""
+        """Return tests for the required conditions whose roles are all bound; each condition is tested once."""
         now = [c for c in self.hard if not mentions(c) - self.bound]
         self.hard = [c for c in self.hard if c not in now]
         now.sort(key=lambda c: not isinstance(c, ValueCondition))
         return [self.writer.expression(c, set(self.bound), self.kinds, self.rule.name) for c in now]
 
     def sources(self, role: str) -> tuple[list[str], tuple[float, str]]:
-        """Return the candidates for a role by the state, as elements of a list, the other candidates, and their number."""
+        """Return expressions for the candidates that the state suggests for a role, and for the other candidates.
+
+        The expression for the other candidates is preceded by their estimated number.
+        """
         now, writer = list[str](), self.writer
         members = self.problem.classes.get(self.kinds[role], ())
         other = len(members) + 1.0, writer.constant(("members", self.kinds[role]), members)

@@ -1,14 +1,15 @@
-"""From a plan to rules: the facts that each step achieved for later steps, and its conditions, with roles for individuals.
+"""Goal regression through a plan: each step that achieves a needed fact becomes a lifted rule.
 
-need     the conditions under which the remaining steps lead to the goals; at the end, the goals
-back     a step is relevant if a needed condition doesn't hold before it: its preconditions then replace that condition
-link     each change of a relevant step is a goal for a rule, and the step is the rule's step
-lift     each individual that no behaviour names becomes a role with the narrowest class that a condition requires
+The regression starts with the goals and visits the steps of the plan backwards. A condition is needed if the remaining steps
+achieve the goals only under this condition. A step is relevant if a needed condition holds after the step and not before the
+step; the step's preconditions then replace this condition. Each needed change of a relevant step becomes the goal of a rule
+for the step. In a rule, individuals that no behaviour names become roles; a role has the narrowest class that a condition
+requires.
 
-Goal regression by R. Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977), and lifted rules as in
-Moose: D. Z. Chen et al., AAAI 2026. Here a rule is for one causal link, since chains of such rules cover all plans. Only conditions
-with a quantifier or alternatives need special treatment: they are replaced by the condition of the individual, or the alternative,
-that held. Conditions are evaluated by the checker, so that a new kind of condition needs no code here.
+Goal regression is due to R. Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977). Lifted rules
+are learned in a similar way by Moose (D. Z. Chen et al., AAAI 2026). In this module, each rule stands for one causal link;
+chains of rules cover longer plans. A condition with a quantifier or alternatives is replaced by the condition of the individual
+or the alternative that held. The plan checker evaluates all conditions (`confab.planner.validation`).
 """
 
 from __future__ import annotations
@@ -41,15 +42,15 @@ from confab.reasoner.symbols import (
 )
 
 WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf
-"""Conditions that memory files can express; a rule with any other isn't learned."""
+"""Types of conditions that memory files can express; rules with other conditions aren't learned."""
 STATIC = RelationCondition, ClassCondition
 BINDINGS = 100
-"""Maximum number of derivations of a defined fact that are examined for one that isn't circular."""
+"""Maximum number of derivations of a defined fact that are examined to find a derivation without a cycle."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """An executed step: its ground conditions, and its changes with the conditions of each."""
+    """An executed step: the ground preconditions, and the changes, each with the conditions of the effect."""
 
     ground: Ground
     asked: tuple[Condition, ...]
@@ -58,7 +59,7 @@ class Done:
 
 
 class PlanTrace:
-    """The steps of a plan, executed one after another on the checker's facts.
+    """The steps of a plan, executed one after another on the facts of the plan checker.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class PlanTrace:
         self.problem, self.rules, self.facts = problem, BehaviorReader(problem), Facts(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
-        """The individuals that behaviours name; all others, including rest values, become roles."""
+        """The individuals that behaviours name; all other individuals, including rest values, become roles."""
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
         for number, (name, arguments) in enumerate(steps):
@@ -97,7 +98,9 @@ class PlanTrace:
                 because.setdefault(cell, []).extend(self.plain(effect.when, inner, behavior.kinds, facts))
         made = self.rules.changes(behavior, arguments, facts)
         if made is None:
-            raise LearningError(f"step {number} ({' '.join((name, *arguments))}): an amount would be what it can't be")
+            raise LearningError(
+                f"step {number} ({' '.join((name, *arguments))}): an amount would take a value that isn't allowed"
+            )
         changes = [(situation, key, value, tuple(because.get((situation, key), ()))) for situation, key, value in made]
         self.done.append(Done((name, arguments), (*kinds, *asked), tuple(changes), len(facts.log)))
         goals = self.problem.goal
@@ -111,7 +114,11 @@ class PlanTrace:
     def plain(
         self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: Facts
     ) -> Iterator[Condition]:
-        """Yield conditions that hold with the individuals and alternatives chosen."""
+        """Yield ground conditions without quantifiers and alternatives.
+
+        A quantified condition is replaced by the conditions of an individual that satisfies it; alternatives are replaced by
+        an alternative that holds.
+        """
         for condition in (substituted(lifted, bound) for lifted in conditions):
             if isinstance(condition, Witness) and not condition.negated:
                 inner = {**kinds, condition.variable: condition.kind}
@@ -131,7 +138,7 @@ class PlanTrace:
                 yield condition
 
     def because(self, condition: ValueCondition, facts: Facts) -> Iterator[list[Condition]]:
-        """Yield the facts from which a defined situation follows where it is true."""
+        """Yield the derivations of a defined situation in a state; each derivation is a list of conditions."""
         rules = self.problem.domain.rules
         of = [(rule.conditions, rule.behavior.kinds, rule.parameters) for rule in rules[condition.situation]]
         group = next(group for group in strata(rules) if condition.situation in group)
@@ -152,9 +159,9 @@ class PlanTrace:
     # -------------------------------------------------------------------------------------------------------- regressing
 
     def rules_of(self) -> Iterator[Rule]:
-        """Yield for each change of a step that a goal or a later step needed the rule that this step achieves it.
+        """Yield a rule for each change of a step that a goal or a later step needs.
 
-        The facts are those of the initial state afterwards.
+        Afterwards, the facts of the trace are those of the initial state.
         """
         later, facts = self.facts, Facts(self.problem, self.problem.initial)
         for done in self.done:
@@ -178,19 +185,19 @@ class PlanTrace:
     def needed(
         self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
     ) -> tuple[dict[Condition, None], dict[Condition, None]]:
-        """Return the conditions before a step under which a condition holds after it, and whether the step contributes to it.
+        """Return the conditions needed before a step, and the conditions that the step achieves.
 
-        A defined situation is replaced by the facts from which it follows, as far as the step achieved them; one that no longer
-        follows,
-        by the facts from which it followed before.
+        The conditions `after` are needed after the step. If the step makes a defined situation true, the facts of a
+        derivation replace the situation. If the step makes a defined situation false, the facts of a derivation before the
+        step replace the situation.
         """
         need, achieved = dict[Condition, None](), dict[Condition, None]()
         tries = BINDINGS
 
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
-            """Return the conditions from which a fact follows, each with whether it holds before the step.
+            """Return the conditions of a derivation of `c`, each with whether the condition holds before the step.
 
-            Return None if it follows only from itself.
+            Return None if every derivation is circular.
             """
             nonlocal tries
             if self.rules.satisfied([c], {}, {}, facts) is not None:
@@ -225,7 +232,7 @@ class PlanTrace:
         return need, achieved
 
     def links(self, done: Done, achieved: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
-        """Yield for each needed change of a step the rule with that change as its goal."""
+        """Yield the rule for each needed change of a step; the change is the rule's goal."""
         goals: dict[ValueCondition, None] = {}
         for c in achieved:
             if isinstance(c, ValueCondition) and c.situation in self.problem.domain.rules:
@@ -247,13 +254,16 @@ class PlanTrace:
                     yield rule
 
     def aimed(self, goal: ValueCondition, facts: Facts) -> ValueCondition:
-        """Return a goal for rules; for an amount only the direction of its change, since equal amounts seldom recur."""
+        """Return the goal of a rule; for an amount, replace the value by the direction of the change.
+
+        Equal amounts seldom occur in other problems.
+        """
         if self.problem.domain.situations[goal.situation].quantity is None:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
 
     def before(self, condition: Condition, done: Done) -> Iterator[Condition]:
-        """Yield the conditions of a step's effects that make given facts true."""
+        """Yield the conditions of those effects of a step that contribute to a given condition."""
         about = {(c.situation, c.arguments) for c in walk(condition) if isinstance(c, ValueCondition)}
         situations = {situation for situation, _ in about}
         plain = isinstance(condition, ValueCondition)
@@ -262,7 +272,11 @@ class PlanTrace:
                 yield from when
 
     def hindered(self, achieved: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
-        """For a "no object …" condition, yield the fact of the one object that violated it, and that no other did."""
+        """For each achieved "no object …" condition that exactly one individual violated, yield two results.
+
+        The first result are the conditions that the individual satisfied before the step. The second result is the condition
+        that no other individual satisfies them.
+        """
         for c in achieved:
             if isinstance(c, Witness) and c.negated:
                 wanted = (*c.conditions, ClassCondition(c.variable, c.kind))
@@ -275,7 +289,10 @@ class PlanTrace:
     def lifted(
         self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]
     ) -> Rule | None:
-        """Return a rule: individuals become roles, implied conditions are left out; None if too little remains."""
+        """Return a rule in which individuals are replaced by roles and implied conditions are removed.
+
+        Return None if memory files can't express a condition.
+        """
         members = self.problem.members
         if not all(isinstance(inner, WRITABLE) for c in need if not isinstance(c, Comparison) for inner in walk(c)):
             return None
@@ -314,7 +331,7 @@ class PlanTrace:
         asks: dict[Condition, None] = {}
         for c in need:
             if isinstance(c, EqualityCondition | Comparison):
-                continue  # different roles are different individuals; the behaviour has the comparisons
+                continue  # different roles have different individuals; the behaviour contains the comparisons
             if isinstance(c, ValueCondition) and c.negated and (c.situation, c.arguments) in known:
                 continue
             if isinstance(c, ClassCondition) and not c.negated:
@@ -331,7 +348,10 @@ class PlanTrace:
         )
 
     def plainest(self, individual: str, of: str) -> str:
-        """Return the widest class of an individual within another class that isn't made of a situation type's values."""
+        """Return the class `of`, unless `of` is empty or a situation type.
+
+        Otherwise return the individual's widest class that is within `of` and isn't a situation type.
+        """
         members, situations = self.problem.members, self.problem.domain.situations
         if of and of not in situations:
             return of
@@ -348,14 +368,14 @@ class PlanTrace:
     # ------------------------------------------------------------------------------------------------------------ order
 
     def orders(self) -> Iterator[Order]:
-        """Yield for every two goals achieved one after another which came first."""
+        """Yield the order of every two goals that different steps achieved."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
                 yield Order.of(first, then, self.constants)
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
-    """Return conditions and those inside witnesses, and the classes of all variables."""
+    """Return the conditions with those inside positive witnesses instead of the witnesses, and the classes of all variables."""
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
@@ -386,7 +406,7 @@ def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
 
 
 def undo(facts: Facts, mark: int) -> None:
-    """Undo the changes since the log had the given length."""
+    """Undo the changes that were made after the log had the length `mark`."""
     while len(facts.log) > mark:
         situation, key, old = facts.log[-1]
         facts.put(situation, key, old)
@@ -394,7 +414,7 @@ def undo(facts: Facts, mark: int) -> None:
 
 
 def ordered_inside(condition: Condition) -> Condition:
-    """Return a condition with its parts in canonical order, so that equal rules have equal names."""
+    """Return a condition with its parts in canonical order; equal rules then have equal names."""
     if isinstance(condition, Witness):
         return replace(condition, conditions=tuple(sorted(map(ordered_inside, condition.conditions), key=repr)))
     if isinstance(condition, AnyOf):

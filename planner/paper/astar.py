@@ -1,13 +1,14 @@
-"""A* as intended by Algorithm 1 of the paper, with the cogency ranking score of eqs. (3) and (5) in f.
+"""A* as Algorithm 1 of the paper intends; the function f contains the cogency ranking score of eqs. (3) and (5).
 
 g:   cost of the behaviours from the start to a node
 h:   estimated cost from a node to the goal: the number of situated object symbols that don't match the goal
 c:   cogency term of the behaviour that led to a node, computed in the state before it; not accumulated along the path
-f:   g + h + c; the node with the least f is expanded next, and among ties the node that was generated first
+f:   g + h + c; the node with the least f is expanded next; among nodes with equal f, the node that was generated first
 n:   depth of a node
 
-Algorithm 1 as printed never puts the start into the open set, has no closed set and overwrites parents without comparing g;
-here a state is reached again only by a smaller g. The goal test compares only the goal's symbols, as Table I's goal is partial.
+Algorithm 1 as printed never puts the start into the open set, has no closed set, and overwrites parents without comparing g.
+This implementation puts a state into the open set again only if the new g is smaller. The goal test compares only the symbols
+of the goal, because the goal in Table I of the paper is partial.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Goal = Mapping[int, str]
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The result of a search; `path` is meaningful only if `status` is solved."""
+    """The result of a search; the path is empty unless the status is solved."""
 
     status: Status
     path: tuple[Applied, ...]
@@ -36,7 +37,7 @@ class SearchResult:
 
 
 def mismatches(values: Values, goal: Goal) -> int:
-    """Return h: the number of the goal's symbols with another value (section IV-A of the paper)."""
+    """Return h: the number of symbols whose value differs from the goal (section IV-A of the paper)."""
     return sum(not meets(values[i], wanted) for i, wanted in goal.items())
 
 
@@ -55,9 +56,9 @@ def a_star(
     ----------
     start : Values
     goal : Goal
-    successors : function from a state to the behaviours applied in it; raises `OutOfTimeError` to end the search
+    successors : function from a state to the behaviours applied in the state; raises `OutOfTimeError` to end the search
     cost : function from a state and a behaviour applied in the state to the behaviour's cost
-    rank : function from a state to the ranking scores (eq. 4), in [0, 1], of behaviours applied in it; without `rank`, c is 0
+    rank : function from a state to the ranking scores (eq. 4), in [0, 1], of the applied behaviours; without `rank`, c is 0
     bonus : function from ranking score and depth to the term c of eq. (3)
     limits : Limits
 
@@ -74,7 +75,7 @@ def a_star(
     while open_set:
         _, _, state, g_state = heapq.heappop(open_set)
         if g_state > g[state]:
-            continue  # a cheaper path has been found since
+            continue  # the search has found a cheaper path to the state
         if not mismatches(state, goal):
             return _reconstruct(came_from, state, counts)
         if counts.expanded >= limits.expansions:

@@ -1,7 +1,7 @@
 """Cogent confabulation: the degree to which a behaviour supports the assumed facts.
 
-The memory of the paper is a table p(<o, S> | b): for each quantified behaviour b and situated object symbol <o, S> one
-categorical distribution over the values of the symbol, which is uniform before anything is learned.
+The memory of the paper is a table p(<o, S> | b). For each quantified behaviour b and each situated object symbol <o, S>, the
+table contains a categorical distribution over the values of the symbol. The distribution is uniform before learning.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class PaperConstants:
     """The constants of eqs. (2) and (5)."""
 
     k: float = 3.0
-    anticipated_length: int = 100  # N; the paper gives no value; a value near the plan's length does harm
+    anticipated_length: int = 100  # N; the paper gives no value; a value near the plan's length degrades the search
     learning: float = 0.1  # λ of eq. (2)
 
     def bonus(self, c_m: float, n: int) -> float:
@@ -34,7 +34,7 @@ PAPER = PaperConstants()
 def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, str, tuple[str, ...]]]:
     """Return the facts of a state that a level sees, each with the values that its symbol can have on that level.
 
-    Each fact is a factor of the cogency, relevant or not (section III-D of the paper).
+    The cogency has a factor for each fact, even for irrelevant facts (section III-D of the paper).
     """
     facts = []
     for symbol in sorted(state):
@@ -50,7 +50,8 @@ def cogencies(
 ) -> dict[Conclusion, float]:
     """Return ln cogency(b) of each conclusion: the sum of ln p(fact | b) over the facts of a state.
 
-    Facts are treated as independent given the behaviour, eq. (1). The factor k of eq. (1) is common to all behaviours and left out.
+    Eq. (1) treats the facts as independent given the behaviour. The factor k of eq. (1) is omitted, because k is the same for
+    all behaviours.
 
     Returns
     -------
@@ -70,7 +71,9 @@ def cogencies(
 
 
 def ranking(scores: Mapping[Conclusion, float]) -> dict[Conclusion, float]:
-    """Return c_m of eq. (4): the rank divided by the number of conclusions; rank 1 is the most cogent, ties share the lowest rank.
+    """Return c_m of eq. (4) for each conclusion: the rank divided by the number of conclusions.
+
+    The most cogent conclusion has rank 1. Equally cogent conclusions share the lowest of their ranks.
 
     >>> ranking({("a", ()): -1.0, ("b", ()): -3.0, ("c", ()): -1.0, ("d", ()): -9.0})
     {('a', ()): 0.25, ('b', ()): 0.75, ('c', ()): 0.25, ('d', ()): 1.0}

@@ -1,12 +1,13 @@
-"""The hierarchical planner: search on the most abstract level, then refine each behaviour on the level below, down to primitives.
+"""The hierarchical planner of the paper.
 
-docs/levels.md defines the goal of a refinement. Symbols that the refined behaviour's level sees must have their values after the
-behaviour. Symbols that only the lower level sees must be at rest if the refinement changed them (hands empty, raised and upright).
-The next behaviour begins in the state in which the refinement ended.
+The planner searches the most abstract level, then refines each behaviour on the level below, down to primitives.
+docs/levels.md defines the goal of a refinement. Symbols that the level of the refined behaviour sees must end with the values
+that the behaviour gives them. Symbols that only the lower level sees must end at rest if the refinement changed them; for
+example, hands must be empty, raised and upright. The next behaviour begins in the state in which the refinement ended.
 
-The refinement of each behaviour in each state is stored. If a behaviour can't be refined, or the rest of the plan isn't applicable
-after its refinement, the level above is searched again with the stored results. If a level has no plan, the level below gets the
-goal itself.
+The planner stores the refinement of each behaviour in each state. If a behaviour has no refinement, or if the refinement makes
+a later behaviour inapplicable, the planner searches the level again with the stored results. If a level has no plan, the
+planner searches the level below for the goal.
 """
 
 from __future__ import annotations
@@ -25,12 +26,21 @@ from confab.reasoner.memory.links import Links
 from confab.reasoner.symbols import Fact, GroundBehavior, Problem
 
 SETTLED, UNSETTLED = "settled", "unsettled"
-"""Marks of a symbol that isn't at rest in the beginning: settled while unchanged or at rest, otherwise unsettled (see `Target`)."""
+"""Marks of a symbol that isn't at rest in the beginning (`Target`).
+
+The symbol is settled if no step has changed it, or if the symbol is at rest; otherwise the symbol is unsettled.
+"""
 
 DOUBT = 1_000
-"""Number of expansions before a proof of unsolvability is tried; a proof is tried again each time the number has quadrupled."""
+"""Number of expansions before the first attempt to prove unsolvability.
+
+The planner repeats the attempt each time that the number of expansions has quadrupled.
+"""
 Proof: TypeAlias = "Callable[[Problem, int, float | None], UnsolvableError | None]"
-"""Function of a problem, a number of states and a deadline; returns an `UnsolvableError` if the problem is proved unsolvable."""
+"""Function of a problem, a number of states and a deadline.
+
+The function returns an `UnsolvableError` if the problem is proved unsolvable, otherwise None.
+"""
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
 """A step with its refinement, and the state after the refinement; None if there is no refinement."""
@@ -38,7 +48,7 @@ Refined: TypeAlias = "tuple[Step, Values] | None"
 
 @dataclass
 class PaperCall:
-    """One planning call: the compiled problem, memory, constants and limits, stored refinements, and counts."""
+    """One planning call: the compiled problem, the memory, the constants, the limits, the stored refinements and the counts."""
 
     model: Model
     grounds: Mapping[int, tuple[GroundBehavior, ...]]
@@ -56,7 +66,7 @@ class PaperCall:
 
 
 def unproved(problem: Problem, states: int, deadline: float | None) -> None:
-    """Return None: no proof is tried."""
+    """Return None without attempting a proof."""
 
 
 def plan(
@@ -68,7 +78,7 @@ def plan(
     leave_levels: bool = True,
     proof: Proof = unproved,
 ) -> Outcome:
-    """Plan in the paper's mode: A* with eq. (5) on each level, refined level by level.
+    """Plan as the paper does, with A* and eq. (5) on each level, and a refinement of each step on the next level.
 
     Parameters
     ----------
@@ -79,11 +89,11 @@ def plan(
     limits : Limits
         Maximum number of expansions of each search, and seconds of the whole call.
     grounds : mapping of level to quantified behaviours, optional
-        Results of `confab.reasoner.reading.quantification`; by default the behaviours are quantified from the problem's classes.
+        Results of `confab.reasoner.reading.quantification`; by default the arguments are computed from the problem's classes.
     leave_levels : bool
-        Whether the level below gets the goal if a level has no plan that can be refined.
+        Whether the planner searches the level below for the goal if a level has no plan with refinements.
     proof : Proof
-        Called after `DOUBT` expansions and repeatedly later, each time with a larger number of states.
+        Function that tries to prove unsolvability, after `DOUBT` expansions and again later with a larger number of states.
 
     Returns
     -------
@@ -120,7 +130,10 @@ def flat(
     constants: PaperConstants = PAPER,
     limits: Limits = Limits(),  # noqa: B008 - frozen
 ) -> Outcome:
-    """Search one level with the same f as in the paper's mode, but without refinement, for comparison."""
+    """Search one level without refinement, with the same function f as the hierarchical planner.
+
+    The result serves as a comparison with the hierarchical planner.
+    """
     begin = perf_counter()
     call = _call(problem, (level,), links, constants, limits, None, unproved)
     return _outcome(call, task(call, level), perf_counter() - begin)
@@ -148,7 +161,7 @@ def _call(
 
 
 def task(call: PaperCall, level: int) -> list[Step] | None:
-    """Return steps of one level to the goal, refined down to primitives, or None if no plan of the level can be refined."""
+    """Return a plan of one level, refined down to primitives; None if the level has no plan with refinements."""
     problem, start = call.model.problem, call.model.values(call.model.problem.initial)
     goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
     found = solve(call, level, start, target(call.model, 0, level, start, goal))
@@ -159,27 +172,30 @@ def task(call: PaperCall, level: int) -> list[Step] | None:
 class Target:
     """The goal of a sequence of steps of one level.
 
-    `values` have to hold in the end. `restless` has the symbols that were not at rest in the beginning, with their rest values:
-    each of them either stays unchanged or has to end at rest.
+    `values` are the required values at the end of the sequence. `restless` contains the symbols that aren't at rest in the
+    beginning, each with its rest value. Such a symbol must stay unchanged or end at rest.
     """
 
     values: Goal
     restless: Goal
 
     def marks(self, before: Values, after: Values, marks: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the marks of the restless symbols after a step, given the states before and after it and the marks before it."""
+        """Return the marks of the restless symbols after a step, given both states and the marks before the step."""
         return tuple(
             SETTLED if after[i] == rest else mark if after[i] == before[i] else UNSETTLED
             for (i, rest), mark in zip(self.restless.items(), marks, strict=True)
         )
 
     def reached(self, state: Values, marks: tuple[str, ...]) -> bool:
-        """Return whether a state with its marks reaches the target."""
+        """Return whether a state has the required values and no mark is unsettled."""
         return not mismatches(state, self.values) and UNSETTLED not in marks
 
 
 def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
-    """Return the target of a level: the values `said` by the level above, and rest values of symbols that appear on this level."""
+    """Return the target of a level.
+
+    The target contains the values `said` by the level above, and the rest values of symbols that the level above doesn't see.
+    """
     values, restless = dict(said), dict[int, str]()
     for i, symbol in enumerate(model.symbols):
         rest = model.problem.domain.situations[symbol.situation].rest
@@ -189,9 +205,10 @@ def target(model: Model, above: int, level: int, before: Values, said: Goal) -> 
 
 
 def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[list[Step], Values] | None:
-    """Return refined steps of one level and the state after them, or None if there are none.
+    """Return refined steps of one level that reach a target, and the state after the steps.
 
-    Each pass either succeeds or stores the result of a behaviour in a state that has no stored result. So the loop ends.
+    Return None if the search finds no such steps. Each pass of the loop either succeeds or stores a new result of refining a
+    behaviour in a state. Therefore the loop ends.
     """
     while True:
         found = search(call, level, start, wanted)
@@ -215,7 +232,10 @@ def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[l
 
 
 def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -> Refined:
-    """Return a step with its refinement, and the state after it; None if the behaviour isn't applicable or has no refinement."""
+    """Return a step with its refinement, and the state after the refinement.
+
+    Return None if the behaviour isn't applicable or has no refinement.
+    """
     if (state, ground) in call.known:
         return call.known[state, ground]
     applied = call.model.apply(ground, state)
@@ -237,9 +257,9 @@ def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -
 
 
 def search(call: PaperCall, level: int, start: Values, wanted: Target) -> SearchResult:
-    """Search one level with eq. (5), without behaviours that are known to have no refinement in a state.
+    """Search one level with eq. (5); behaviours that have no refinement in a state are excluded in this state.
 
-    A searched state is a state of the model, followed by the marks of the target.
+    The search appends the marks of the target to each state of the model.
     """
     grounds, size = call.grounds[level], len(start)
     rank = ranker(call, level)
@@ -274,7 +294,10 @@ def search(call: PaperCall, level: int, start: Values, wanted: Target) -> Search
 
 
 def timely(grounds: Iterable[GroundBehavior], deadline: float | None) -> Iterator[GroundBehavior]:
-    """Yield quantified behaviours; raise `OutOfTimeError` at the deadline, since one state of a large problem can take minutes."""
+    """Yield quantified behaviours; raise `OutOfTimeError` at the deadline.
+
+    The deadline is tested for each behaviour, because one state of a large problem can take minutes.
+    """
     for one in grounds:
         if deadline is not None and perf_counter() > deadline:
             raise OutOfTimeError("the time limit")
@@ -288,7 +311,7 @@ def ranker(call: PaperCall, level: int) -> Callable[[Values], Callable[[Applied]
 
     def of_state(values: Values) -> Callable[[Applied], float]:
         if not learned:
-            return lambda applied: 1.0 / len(conclusions)  # all tie for the first rank
+            return lambda applied: 1.0 / len(conclusions)  # all conclusions share the first rank
         problem = call.model.problem
         ranks = ranking(cogencies(call.links, conclusions, call.model.state(values), problem, level))
         return lambda applied: ranks[applied.ground.behavior, applied.ground.arguments]

@@ -1,4 +1,7 @@
-"""Learning from an executed plan: eq. (2) for each behaviour of each level, in the situation in which the behaviour was chosen."""
+"""Learning from an executed plan by eq. (2) of the paper.
+
+Eq. (2) is applied to each behaviour of each level, in the situation in which the behaviour was chosen.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +22,9 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
     Parameters
     ----------
     problem : Problem
-        Its initial state is the state before the plan.
+        The problem whose initial state is the state before the plan.
     plan : Plan
-        A plan of any depth; a demonstration of the abstract level alone teaches that level.
+        A plan of any depth; a plan without refinements teaches only the level of its steps.
     links : Links
     constants : PaperConstants
         λ of eq. (2).
@@ -29,7 +32,7 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
     Raises
     ------
     LearningError
-        A step's preconditions don't hold in the state before it.
+        The preconditions of a step don't hold in the state before the step.
     """
     learned = Links({c: {s: dict(t) for s, t in symbols.items()} for c, symbols in links.tables.items()})
     model = Model(problem)
@@ -52,20 +55,20 @@ def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Link
 def reinforce(
     links: Links, conclusion: Conclusion, state: State, problem: Problem, level: int, learning: float
 ) -> None:
-    """Apply eq. (2): raise p of the facts that hold by λ, then normalise each symbol's distribution.
+    """Apply eq. (2): raise the probability of each present fact by λ, then normalise the distribution of each symbol.
 
     Parameters
     ----------
     links : Links
-        Changed in place.
+        The links to change in place.
     conclusion : Conclusion
         The behaviour that was planned and executed successfully.
     state : State
-        The situation in which the behaviour was chosen; the paper does not specify which state that is.
+        The situation in which the behaviour was chosen; the paper doesn't specify the state.
     problem : Problem
         Defines the values that each symbol can have.
     level : int
-        The behaviour's level; symbols and values of lower levels aren't part of the situation.
+        The behaviour's level; the situation excludes symbols and values of lower levels.
     learning : float
         λ of eq. (2).
     """

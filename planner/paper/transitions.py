@@ -1,4 +1,4 @@
-"""Transitions by quantified behaviours between states, which are tuples of values in the order of `Model.symbols`."""
+"""Transitions by quantified behaviours; a state is a tuple of values in the order of `Model.symbols`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Values = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Applied:
-    """An applicable quantified behaviour, the individuals of its variables, and the state after it."""
+    """An applied quantified behaviour, the individuals of its variables, and the state after the behaviour."""
 
     ground: GroundBehavior
     bindings: Mapping[str, str]
@@ -24,12 +24,13 @@ class Applied:
 
 
 class Model:
-    """The behaviours of one problem over states that are tuples.
+    """The behaviours of one problem as functions of states that are tuples.
 
     Parameters
     ----------
     problem : Problem
-        The symbols are those of its initial state and all boolean symbols, followed by the defined symbols of its goal.
+        The problem determines the symbols: the symbols of the initial state, all boolean symbols, and the defined symbols of
+        the goal.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -89,7 +90,7 @@ class Model:
         return Applied(ground, bindings, self.completed(tuple(after)))
 
     def cost(self, values: Values, applied: Applied) -> float:
-        """Return the cost of an applied behaviour, given the state before it."""
+        """Return the cost of a behaviour that is applied in the state `values`."""
         name = applied.ground.behavior
         if name not in self.prices:
             return self.problem.domain.behaviors[name].cost
@@ -98,7 +99,10 @@ class Model:
         return float(self.prices[name](*applied.ground.arguments, *variables))
 
     def successors(self, grounds: Iterable[GroundBehavior], values: Values) -> Iterator[Applied]:
-        """Yield the application of each quantified behaviour that is applicable and changes the state, in the given order."""
+        """Yield the application of each quantified behaviour that is applicable and changes the state.
+
+        The applications have the order of `grounds`.
+        """
         for ground in grounds:
             applied = self.apply(ground, values)
             if applied is not None and applied.after != values:
@@ -106,7 +110,7 @@ class Model:
 
 
 def _symbols(problem: Problem) -> tuple[Symbol, ...]:
-    """Return every symbol of the problem, in a fixed order."""
+    """Return the symbols of the problem in a fixed order, without defined symbols."""
     found = set(problem.initial)
     for situation in problem.domain.situations.values():
         if situation.boolean and situation.name not in problem.domain.rules:
@@ -118,8 +122,8 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
     """Return all quantified behaviours of a level in the order of their IDs.
 
-    The SPARQL queries of `confab.reasoner.reading.quantification` return the same behaviours; here they are computed from the
-    problem's classes.
+    The arguments are computed from the classes of the problem. The SPARQL queries of
+    `confab.reasoner.reading.quantification` return the same behaviours.
     """
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []
