@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import Problem
+
+TRIFLE = 2.0**-20
+"""Cost added to each step when plans are compared, so that the shorter of two equally cheap plans is the cheaper one."""
+
+
+class Primitive(Protocol):
+    """A step of the lowest level: a behaviour and its arguments."""
+
+    @property
+    def behavior(self) -> str:
+        """The name of the behaviour."""
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The individuals of its parameters."""
 
 
 def cost_of(problem: Problem, plan: Plan) -> float:
@@ -14,7 +30,12 @@ def cost_of(problem: Problem, plan: Plan) -> float:
     return sum(costs(problem, plan.primitives))
 
 
-def costs(problem: Problem, primitives: Sequence[Step]) -> list[float]:
+def compared(problem: Problem, primitives: Sequence[Primitive]) -> float:
+    """Return what shortening minimises: the cost of primitives; among equal costs, their number."""
+    return sum(costs(problem, primitives)) + TRIFLE * len(primitives)
+
+
+def costs(problem: Problem, primitives: Sequence[Primitive]) -> list[float]:
     """Return the cost of each primitive of a sequence, executed from the initial state."""
     behaviors = [problem.domain.behaviors[step.behavior] for step in primitives]
     if all(behavior.price is None for behavior in behaviors):

@@ -15,11 +15,13 @@ techniques for satisficing and optimal numeric planning", JAIR 68 (2020).
 
 from __future__ import annotations
 
+import heapq
+import math
 from collections import defaultdict
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from confab.planner.grounded.amounts import Exact, Linear, pushes
+from confab.planner.grounded.amounts import Exact, Linear, Vector, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
@@ -130,6 +132,70 @@ def heuristic(task: Task) -> Evaluate:
         return Evaluation(len(plan), plan, applicable, 1 + round(number * each))
 
     return evaluate
+
+
+def cost_left(task: Task) -> Callable[[int], float]:
+    """Return the cost of a relaxed plan with the cheapest supporters, as a function of a state; infinite if there is none."""
+    needs, adds, owners, repeated = _relaxed(task)
+    costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
+    missing = [len(bits) for bits in needs]
+    always = [o for o, number in enumerate(missing) if not number]
+    needed_by: list[list[int]] = [[] for _ in range(task.size)]
+    for o, bits in enumerate(needs):
+        for bit in bits:
+            needed_by[bit].append(o)
+    low, goal = (1 << task.size) - 1, bits_of(task.goal)
+
+    def priced(vector: Vector) -> list[float]:
+        """Return the costs with repetitions; infinite for an operator that can't make its comparison true."""
+        price = costs[:]
+        for (difference, sign, push), found in repeated.items():
+            times = _times(difference.of(vector), sign, push) or math.inf
+            for o in found:
+                price[o] = times * costs[o] if costs[o] or times < math.inf else math.inf
+        return price
+
+    def left(state: int) -> float:
+        price = priced(task.amounts.vector(state)) if task.amounts is not None else costs
+        open_, reached, supporter = missing[:], [math.inf] * task.size, [-1] * task.size
+        queue: list[tuple[float, int]] = []
+        wanted = set(goal)
+
+        def reach(o: int) -> None:
+            total = price[o] + sum([reached[bit] for bit in needs[o]])
+            for bit in adds[o]:
+                if total < reached[bit]:
+                    reached[bit], supporter[bit] = total, o
+                    heapq.heappush(queue, (total, bit))
+
+        for bit in bits_of(state & low):
+            reached[bit] = 0.0
+            queue.append((0.0, bit))
+        for o in always:
+            reach(o)
+        while queue and wanted:
+            cost, bit = heapq.heappop(queue)
+            if cost > reached[bit]:
+                continue
+            wanted.discard(bit)
+            for o in needed_by[bit]:
+                open_[o] -= 1
+                if not open_[o]:
+                    reach(o)
+        if wanted:
+            return math.inf
+        chosen: dict[int, float] = {}
+        waiting, seen = goal[:], set(goal)
+        while waiting:
+            o = supporter[waiting.pop()]
+            if o >= 0:
+                chosen[owners[o]] = max(chosen.get(owners[o], 0.0), price[o])
+                fresh = [bit for bit in needs[o] if bit not in seen]
+                seen.update(fresh)
+                waiting += fresh
+        return sum(chosen.values())
+
+    return left
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:

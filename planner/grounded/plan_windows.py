@@ -1,11 +1,12 @@
-"""Shorter plans: a window of steps is replaced if a bounded search finds fewer steps with the effects that later steps need.
+"""Cheaper plans: a window of steps is replaced if a bounded search finds cheaper steps with the effects that later steps need.
 
 window:     consecutive steps; a replacement starts in the same state and sets the bits that the later steps and the goal require,
             with amounts that still let the later steps reach the goal
 operators:  the operators nearest to the window: reachable in few steps from its start, and useful in few steps before its end
-search:     A* with h_FF on these operators (`confab.planner.grounded.shortest`); states from which h allows no shorter plan are cut
+search:     A* with h_FF on these operators (`confab.planner.grounded.shortest`); states from which h allows no cheaper plan are cut
 whole:      in the end the remaining work is spent on the whole plan as one window, with all operators and a greater weight of h
 order:      windows are tried on the given plan and on a regrouped plan, where a step follows a step that it depends on
+cost:       of two equally cheap plans, the one with fewer steps is the cheaper one (`TRIFLE`); so equal costs count steps
 
 Work is counted in operators examined and never in seconds, so that the same plan is shortened in the same way on any machine.
 
@@ -15,9 +16,9 @@ Action elimination (`shortened`): Nakhost and Müller, "Action elimination and p
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import chain
 from time import perf_counter
@@ -25,11 +26,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.grounded.amounts import Amounts
-from confab.planner.grounded.hff import heuristic
+from confab.planner.grounded.amounts import Amounts, Linear
+from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
+from confab.planner.plan_costs import TRIFLE
 
 STATES, STEPS = 400, 12
 """Maximum number of states, and of steps of the given plan, for a search of a cheapest plan before windows are tried."""
@@ -60,25 +62,28 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     deadline : float, optional
         On the clock of `time.perf_counter`.
     """
-    best = shortened(task, plan, deadline)
-    if task.prices and task.cost_of(best) > task.cost_of(plan):
-        best = list(plan)
+    if task.prices or len(set(task.costs)) > 1 or not any(task.costs):
+        prices = {operator: price.plus(Linear((), Fraction(TRIFLE))) for operator, price in task.prices.items()}
+        task = replace(task, costs=[cost + TRIFLE for cost in task.costs], prices=prices)
+    best = cheaper(task, plan, shortened(task, plan, deadline))
     if len(best) <= STEPS:
         best, proved = cheapest(task, best, work, deadline)
         if proved:
             return best
-    if task.prices:
-        return best  # fewer steps may cost more, depending on the state
     windows = _Windows(task, work, deadline)
     while True:
-        before = len(best)
+        before = task.cost_of(best)
         for size in SIZES:
             best = windows.pass_over(best, size)
-            best = windows.pass_over(regrouped(task, best), size)
-        best = shortened(task, best, deadline)
-        if len(best) == before or windows.over:
-            best = windows.restarted(best)
-            return best if task.cost_of(best) <= task.cost_of(plan) else list(plan)  # fewer steps may cost more
+            best = windows.pass_over(cheaper(task, regrouped(task, best), best), size)
+        best = cheaper(task, best, shortened(task, best, deadline))
+        if task.cost_of(best) == before or windows.over:
+            return cheaper(task, windows.restarted(best), plan)
+
+
+def cheaper(task: Task, plan: Sequence[int], other: Sequence[int]) -> list[int]:
+    """Return the cheaper of two plans; the first if their costs are equal."""
+    return list(other if task.cost_of(other) < task.cost_of(plan) else plan)
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
@@ -190,8 +195,13 @@ class _Windows:
     task: Task
     work: int
     deadline: float | None
-    failed: set[tuple[int, int, int]] = field(default_factory=set)
-    """Windows without a shorter replacement: state, required bits, number of steps."""
+    failed: set[tuple[int, int, float]] = field(default_factory=set)
+    """Windows without a cheaper replacement: state, required bits, cost."""
+
+    @cached_property
+    def cut(self) -> float:
+        """The share of h_FF by which states are cut: h_FF may be too large, if a dear step serves many others."""
+        return min(self.task.costs) / max(self.task.costs)
 
     @property
     def over(self) -> bool:
@@ -209,12 +219,15 @@ class _Windows:
         start = 0
         while start < len(plan) - 1 and not self.over:
             end = min(start + size, len(plan))
-            found = self.replacement(plan[start:end], states[start], needed[end] & states[end])
+            spent = sum(map(self.task.spent, states[start:end], plan[start:end]))
+            found = self.replacement(plan[start:end], states[start], needed[end] & states[end], spent)
             if found is not None and _leads(self.task, states[start], [*found, *plan[end:]]):
-                plan[start:end] = found
-                states, needed = _states(self.task, plan), self.needed(plan)
-                start = max(0, start - size // 2)
-                continue
+                other = [*plan[:start], *found, *plan[end:]]
+                if not self.task.prices or self.task.cost_of(other) < self.task.cost_of(plan):
+                    plan[start:end] = found
+                    states, needed = _states(self.task, plan), self.needed(plan)
+                    start = max(0, start - size // 2)
+                    continue
             if end == len(plan):
                 break
             start += size // 2
@@ -236,15 +249,15 @@ class _Windows:
             found.append(wanted)
         return found[::-1]
 
-    def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
-        """Search for fewer steps from a state to the required bits, with operators near the window; None if none are found."""
-        if (state, wanted, len(steps)) in self.failed:
+    def replacement(self, steps: list[int], state: int, wanted: int, spent: float) -> list[int] | None:
+        """Search for steps from a state to the required bits that cost less than `spent`, with operators near the window."""
+        if (state, wanted, spent) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
         task, operators = self.part(operators, state, wanted)
-        found = self.search(task, sum(self.task.costs[step] for step in steps))
+        found = self.search(task, spent)
         if found is None:
-            self.failed.add((state, wanted, len(steps)))
+            self.failed.add((state, wanted, spent))
             return None
         return [operators[operator] for operator in found]
 
@@ -257,13 +270,7 @@ class _Windows:
 
     def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
         """Search for a plan cheaper than `upper` by A*; states whose cost plus h_FF reaches `upper` are cut."""
-        evaluate, costs = heuristic(task), task.costs
-
-        def left(state: int) -> float:
-            evaluation = evaluate(state)
-            return math.inf if evaluation is None else sum(costs[operator] for operator in evaluation.plan)
-
-        found = shortest(task, left, upper, deadline=self.deadline, known=most, weight=weight)
+        found = shortest(task, cost_left(task), upper, deadline=self.deadline, known=most, weight=weight, cut=self.cut)
         self.work -= len(found.states) * len(task.owners)
         return None if found.plan is None else list(found.plan)
 
@@ -399,6 +406,7 @@ class _Windows:
             initial=state,
             goal=wanted,
             costs=[task.costs[operator] for operator in operators],
+            prices={place[operator]: price for operator, price in task.prices.items() if operator in place},
             owners=[place.get(task.owners[r], -1) for r in rows],
             needs=_grouped([task.needs[r] for r in rows]),
             adds=_grouped([task.adds[r] for r in rows]),

@@ -5,7 +5,7 @@ h:       estimated cost from a state to the goal, infinite if the goal is unreac
          one. Lower bounds are `nothing` (breadth-first search), `ways` (each goal alone) and LM-cut
          (`confab.planner.hierarchical.bounds`).
 f:       g + weight · h; the state with the least f is expanded next. With weight 1, no plan is cheaper than the least open f.
-upper:   the cost that a plan must stay below; states with g + h at or above it are dropped
+upper:   the cost that a plan must stay below; states with g + cut · h at or above it are dropped
 """
 
 from __future__ import annotations
@@ -46,8 +46,10 @@ def nothing(state: int) -> float:
 class Cheapest:
     """The search order of A* by a bound on the remaining cost; `lower` is the proved lower bound, `counts` is updated."""
 
-    def __init__(self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1) -> None:
-        self.task, self.bound, self.upper, self.weight, self.counts = task, bound, upper, weight, counts
+    def __init__(
+        self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
+    ) -> None:
+        self.task, self.bound, self.upper, self.weight, self.cut, self.counts = task, bound, upper, weight, cut, counts
         self.reached: dict[int, Candidate] = {}
         self.work, self.turn, self.bytes, self.lower = 0, 1, 0, 0.0
         self.open = OpenList[tuple[float, Candidate]]()
@@ -59,7 +61,7 @@ class Cheapest:
         while (drawn := self.open.first()) is not None:
             self.open.drop(0)
             h, (_, _, state, cost) = drawn[1]
-            if cost > self.reached[state].cost or cost + h >= self.upper:
+            if cost > self.reached[state].cost or cost + self.cut * h >= self.upper:
                 continue  # the state was reached more cheaply since, or a plan of at most this cost was found
             self.lower = max(self.lower, cost + self.weight * h)
             self.work += 1
@@ -75,7 +77,7 @@ class Cheapest:
         """Rank a state by f, or drop it if no plan through it is cheaper than `upper`; a goal state lowers `upper`."""
         cost = candidate.cost
         h = self.bound(candidate.state)
-        if cost + h >= self.upper:
+        if cost + self.cut * h >= self.upper:
             return
         if candidate.state & self.task.goal == self.task.goal:
             self.upper, self.best = cost, candidate.state
@@ -92,6 +94,7 @@ def shortest(
     counts: Counts | None = None,
     known: float = math.inf,
     weight: int = 1,
+    cut: float = 1.0,
 ) -> Shortest:
     """Return a cheapest plan among the plans cheaper than `upper`; at a limit, a lower bound and the cheapest plan found so far.
 
@@ -110,8 +113,10 @@ def shortest(
         Maximum number of states reached.
     weight : int
         Weight of h in f. With a weight above 1, a plan is found sooner but may cost more, and the returned bound is meaningless.
+    cut : float
+        Weight of h when states are dropped; below 1 if h may be too large.
     """
-    order = Cheapest(task, bound, upper, counts or Counts(), weight)
+    order = Cheapest(task, bound, upper, counts or Counts(), weight, cut)
     expanded, lower = 0, None
     for work in explore(task, order):
         expanded += work

@@ -81,7 +81,7 @@ class Call:
         self.redone = 0
         """Number of times that all steps were replaced, from the initial state on."""
         self.saving: float | None = None
-        """Number of primitives that the last round of shortening saved, per second."""
+        """Cost that the last round of shortening saved, per second."""
         self.settled = False
         """Whether steps of lower levels have been tried to bring symbols to rest that aren't at rest initially."""
 

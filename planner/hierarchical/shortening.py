@@ -1,12 +1,12 @@
 """Shortening of a plan, with at most half the effort of finding it.
 
 orders:   run the agenda with other orders of the goals, which decide what has to be moved away; known refinements are reused
-windows:  on each level, from the top, replace consecutive steps by fewer steps (`confab.planner.hierarchical.windows`)
+windows:  on each level, from the top, replace consecutive steps by cheaper steps (`confab.planner.hierarchical.windows`)
 detours:  remove steps whose changes cancel out (`confab.planner.hierarchical.detours`)
 
 Orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of the levels
-between first and lowest are tried only if the plan moves an object away. The shortest plan is kept. Steps of the first level
-explain the steps below, so they are dropped only if this saves enough primitives.
+between first and lowest are tried only if the plan moves an object away. The cheapest plan is kept; of equally cheap plans, the
+one with the fewest primitives. Steps of the first level explain the steps below, so they are dropped only if this saves enough.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
 from confab.planner.hierarchical.refinement import RefinedStep
-from confab.planner.hierarchical.windows import abstract, broken, length, windowed, worth
+from confab.planner.hierarchical.windows import improves, primitives, windowed
 from confab.planner.plan import Plan
+from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
@@ -37,8 +38,6 @@ DOING, BEGINNING = 20, 1_000
 """Work of replaying a primitive, and of beginning a call, in states times operators."""
 MANY = 1.25
 """Number of first-level steps per goal above which other orders of the goals are tried."""
-KEPT = 1.5
-"""Factor by which the number of primitives must decrease before many first-level steps are dropped."""
 
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
@@ -60,9 +59,9 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
     while rounds < max(1, 2 * useful):
-        before, begin = length(call.steps), perf_counter()
+        before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)
-        rounds, saved = rounds + 1, before - length(call.steps)
+        rounds, saved = rounds + 1, before - cost(call)
         call.saving = saved / max(perf_counter() - begin, 1e-6)
         useful = rounds if saved else useful
         if call.space.deadline is None or not useful:
@@ -80,8 +79,19 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
         for level in levels[1:-1]:
             windowed(call, level, work)
         drop_detours(call, levels[-2])
-    if leave_levels and (drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1):
+    if leave_levels and (drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1 or lasting(call)):
         windowed(call, levels[-1], work)
+
+
+def lasting(call: Call) -> bool:
+    """Return whether the cost of a refinement depends on the steps before it, or on a choice of primitives of different costs."""
+    primitives = call.problem.domain.at_level(call.program.levels[-1])
+    return call.refiner.drifting or len({(one.cost, one.price) for one in primitives}) > 1
+
+
+def cost(call: Call) -> float:
+    """Return what shortening minimises: the cost of a call's primitives; among equal costs, their number."""
+    return compared(call.problem, primitives(call.steps))
 
 
 def puts_aside(call: Call) -> bool:
@@ -134,10 +144,10 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
         other.advice = None
         agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, solvable=True, forward=True)
         with suppress(LimitError):
-            if agenda.achieve_all() and length(other.steps) <= length(call.steps):
+            if agenda.achieve_all() and cost(other) <= cost(call):
                 order[:] = other.kept
-                call.steps = other.steps if length(other.steps) < length(call.steps) else call.steps
-        work -= other.space.effort + DOING * length(other.steps)
+                call.steps = other.steps if cost(other) < cost(call) else call.steps
+        work -= other.space.effort + DOING * len(primitives(other.steps))
 
 
 def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
@@ -156,22 +166,10 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Drop steps of a level that cancel out unless that violates more conditions of upper levels; return whether any were dropped.
-
-    If dropping primitives removes steps of the most abstract level, or if more than half of these are lost, the number of
-    primitives must decrease by the factor `KEPT`.
-    """
+    """Drop steps of a level that cancel out, if that improves the plan; return whether any were dropped."""
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)
-    new = call.tree()
-    lost = abstract(call.problem, old) - abstract(call.problem, new)
-    dear = lost > 0 and (level == call.program.levels[-1] or 2 * lost > abstract(call.problem, old))
-    saved = len(old.primitives) > (KEPT if dear else 1.0) * len(new.primitives)
-    if (
-        saved
-        and worth(len(old.primitives) - len(new.primitives), lost)
-        and broken(call.problem, new) <= broken(call.problem, old)
-    ):
+    if improves(call.problem, call.tree(), old, level):
         return True
     call.steps = steps
     return False

@@ -1,4 +1,4 @@
-"""Windows: consecutive steps of a level are replaced by fewer steps, which are searched on the grounded level.
+"""Windows: consecutive steps of a level are replaced by cheaper steps, which are searched on the grounded level.
 
 The preconditions of upper levels apply to the new steps, too (`confab.planner.hierarchical.inherited_preconditions`). The new
 steps are refined on the table and grouped under steps of the upper levels wherever a run has the effect of such a step.
@@ -18,6 +18,7 @@ from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, Step, UngroundableError
+from confab.planner.plan_costs import compared
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
 
@@ -25,14 +26,16 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""A shortened plan must lose fewer than this number of level-1 steps for each primitive that it saves."""
+"""A shortened plan must lose fewer than this number of level-1 steps for each primitive of mean cost that it saves."""
+KEPT = 1.5
+"""Factor by which the cost must decrease before primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
 """Maximum number of rows of a join when a level is grounded to shorten a plan: in total, and per step of the plan."""
 
 
 def windowed(call: Call, level: int, work: int) -> None:
-    """Replace steps of a level in a call's plan by fewer steps, unless the new plan violates more conditions of upper levels."""
-    new = fewer(call, level, work)
+    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`)."""
+    new = cheaper(call, level, work)
     if new is None:
         return
     other = fresh_call(call, call.problem)
@@ -45,15 +48,13 @@ def windowed(call: Call, level: int, work: int) -> None:
         Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level):
-        lost = abstract(problem, old) - abstract(problem, plan)
-        shorter = worth(len(old.primitives) - len(plan.primitives), lost)
-        if shorter and not validate(problem, plan) and broken(problem, plan) <= broken(problem, old):
+        if improves(problem, plan, old, level) and not validate(problem, plan):
             call.steps = refined(call, plan.steps)
             return
 
 
-def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
-    """Return a shorter sequence of unrefined steps of a level for a call's plan; None if none is found or the level is large."""
+def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
+    """Return a cheaper sequence of unrefined steps of a level for a call's plan; None if none is found or the level is large."""
     steps = [part for step in call.steps for part in parts(step, level)]
     if any(step.level != level for step in steps):
         return None
@@ -66,7 +67,11 @@ def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
     if task is None or operators is None:
         return None
     found = shorter(task, operators, work, call.space.deadline)
-    return [task.describe(operator)[:2] for operator in found] if len(found) < len(operators) else None
+
+    def cost(plan: Sequence[int]) -> tuple[float, int]:
+        return task.cost_of(plan), len(plan)
+
+    return [task.describe(operator)[:2] for operator in found] if cost(found) < cost(operators) else None
 
 
 def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
@@ -106,9 +111,9 @@ def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
     ]
 
 
-def length(steps: Sequence[RefinedStep]) -> int:
-    """Return the number of primitives in steps."""
-    return sum(length(step.steps) if step.steps else 1 for step in steps)
+def primitives(steps: Sequence[RefinedStep]) -> list[RefinedStep]:
+    """Return the primitives of steps."""
+    return [one for step in steps for one in (primitives(step.steps) if step.steps else (step,))]
 
 
 def abstract(problem: Problem, plan: Plan) -> int:
@@ -116,9 +121,20 @@ def abstract(problem: Problem, plan: Plan) -> int:
     return sum(step.level == problem.domain.levels[0] for step in plan.steps)
 
 
-def worth(saved: int, given_up: int) -> bool:
-    """Return whether saved primitives are worth the steps of the most abstract level that are given up for them."""
-    return saved > max(given_up, 0) / PER_PRIMITIVE
+def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
+    """Return whether a plan is cheaper than the old one, and violates no more conditions of upper levels.
+
+    The plan may lose `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If it loses such steps
+    to primitives, that is if `level` is the lowest of several, it must be cheaper by the factor `KEPT`.
+    """
+    price, before = compared(problem, new.primitives), compared(problem, old.primitives)
+    lost = abstract(problem, old) - abstract(problem, new)
+    dear = lost > 0 and problem.domain.levels[0] != level == problem.domain.levels[-1]
+    return (
+        before > price * (KEPT if dear else 1.0)
+        and PER_PRIMITIVE * (before - price) * len(old.primitives) > lost * before
+        and broken(problem, new) <= broken(problem, old)
+    )
 
 
 def broken(problem: Problem, plan: Plan) -> int:

@@ -1,6 +1,7 @@
 """What behaviours cost is worked out from relations and amounts: cheapest plans are cheapest, whoever adds up."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -18,8 +19,9 @@ from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem
+from confab.reasoner.symbols import TRUE, Problem, RelationCondition, SituationType
 from worlds.numbers import jugs, rounds
+from worlds.writing import becomes, behavior, has, lacks, world
 
 
 @pytest.mark.parametrize("make", [jugs, rounds])
@@ -33,6 +35,72 @@ def test_a_plan_said_to_be_cheapest_is(seed: int, make: Callable[[Random], tuple
     assert found.plan is not None
     assert validate(problem, found.plan) == []
     assert found.bound == least == cost_of(problem, found.plan)
+
+
+def tour(stops: int) -> Problem:
+    """Return a round of stops: a walk to the next one costs 4, a ride 0.5, and the ticket for all rides 5, at one stop."""
+    names = tuple(f"stop{i}" for i in range(stops))
+    here, there, joined = (
+        has("AT", "me", "?from"),
+        becomes("AT", "me", "?to"),
+        RelationCondition("street", ("?from", "?to")),
+    )
+    walk = behavior("WALK", 1, "?to:Stop", [here, joined], [there], "?from:Stop")
+    ride = behavior("RIDE", 1, "?to:Stop", [here, joined, has("PAID", "me", TRUE)], [there], "?from:Stop")
+    buy = behavior("BUY", 1, "", [has("AT", "me", "stop2"), lacks("PAID", "me", TRUE)], [becomes("PAID", "me", TRUE)])
+    look = behavior("LOOK", 1, "?at:Stop", [has("AT", "me", "?at")], [becomes("SEEN", "?at", TRUE)])
+    return world(
+        [
+            SituationType("AT", ("Me",), "Stop"),
+            SituationType("SEEN", ("Stop",), "Truth", boolean=True),
+            SituationType("PAID", ("Me",), "Truth", boolean=True),
+        ],
+        [replace(walk, cost=4.0), replace(ride, cost=0.5), replace(buy, cost=5.0), look],
+        {"Stop": names, "Me": ("me",)},
+        {"AT me": "stop0"},
+        {f"SEEN {name}": TRUE for name in names},
+        {"street": [pair for i in range(stops) for pair in ((names[i - 1], names[i]), (names[i], names[i - 1]))]},
+    )
+
+
+def lift(ways: list[tuple[int, int]], floors: int) -> Problem:
+    """Return a lift that people enter and leave, which level 1 sees, and that goes from floor to floor, which it doesn't see."""
+    people, names = tuple(f"person{i}" for i in range(len(ways))), tuple(f"floor{i}" for i in range(floors))
+    inside, entered, left = has("IN", "?p", "lift"), becomes("IN", "?p", "lift"), becomes("IN", "?p", "?f")
+    waits, there = has("IN", "?p", "?f"), has("LIFT_AT", "lift", "?f")
+    steps = [
+        behavior("L1_ENTER", 1, "?p:Person", [waits], [entered], "?f:Floor"),
+        behavior("L1_LEAVE", 1, "?p:Person ?f:Floor", [inside], [left]),
+        behavior("L2_ENTER", 2, "?p:Person", [waits, there], [entered], "?f:Floor"),
+        behavior("L2_LEAVE", 2, "?p:Person ?f:Floor", [inside, there], [left]),
+        behavior(
+            "L2_GO", 2, "?to:Floor", [there, RelationCondition("next", ("?f", "?to"))],
+            [becomes("LIFT_AT", "lift", "?to")], "?f:Floor",
+        ),
+    ]  # fmt: skip
+    return world(
+        [SituationType("IN", ("Person",), "Holder"), SituationType("LIFT_AT", ("Lift",), "Floor", level=2)],
+        steps,
+        {"Person": people, "Floor": names, "Lift": ("lift",), "Holder": ("lift", *names)},
+        {"LIFT_AT lift": "floor0", **{f"IN {one}": names[begin] for one, (begin, _) in zip(people, ways, strict=True)}},
+        {f"IN {one}": names[end] for one, (_, end) in zip(people, ways, strict=True)},
+        {"next": [pair for i in range(1, floors) for pair in ((names[i - 1], names[i]), (names[i], names[i - 1]))]},
+    )
+
+
+def test_a_default_plan_buys_what_makes_the_later_steps_cheap() -> None:
+    problem = tour(9)
+    found = solve(Request(problem)).plan
+    assert found is not None
+    assert {"BUY", "RIDE"} <= {step.behavior for step in found.steps}
+    assert cost_of(problem, found) == 2 * 4 + 5 + 6 * 0.5 + 9
+
+
+def test_a_default_plan_takes_people_along_in_one_round() -> None:
+    """Up and down once: twice five floors, and each of six people enters and leaves."""
+    found = solve(Request(lift([(0, 4), (2, 5), (1, 3), (5, 1), (4, 0), (3, 2)], 6)))
+    assert found.plan is not None
+    assert found.plan.length == {1: 12, 2: 22}
 
 
 DELIVERY = """@prefix : <https://example.org/van#> .
