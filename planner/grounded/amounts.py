@@ -313,6 +313,12 @@ class Amounts:
         number = self.numbered(tuple(changed), self._masks[number], new)
         return after & self.keep | self._masks[number] | number << self.size
 
+    def stated(self, state: int, values: State) -> int:
+        """Return a state with the amounts that `values` states."""
+        vector = tuple(simplified(Fraction(values[symbol])) for symbol in self.symbols)
+        number = self.numbered(vector, 0, range(len(vector)))
+        return state & self.keep | self._masks[number] | number << self.size
+
     def facts(self, state: int) -> list[Fact]:
         """Return the amounts of a state as facts."""
         found = zip(self.symbols, self.vector(state), strict=True)

@@ -102,4 +102,5 @@ def _state(task: Task, values: State) -> int:
     """Return the state of a level's task in which the symbols have the given values."""
     facts = sum(1 << bit for bit, fact in enumerate(task.facts) if values.get(fact.symbol, FALSE) == fact.value)
     absent = sum(1 << bit for bit, fact in task.complements.items() if values.get(fact.symbol, FALSE) != fact.value)
-    return task.derived.completed(facts | absent)
+    state = facts | absent
+    return task.derived.completed(state if task.amounts is None else task.amounts.stated(state, values))

@@ -163,3 +163,8 @@ def test_a_price_of_what_changes_survives_pddl_and_the_file_made_of_it(tmp_path:
     found = imported(parse(exported.domain, exported.problem))
     again.write_text(turtle(found.problem, "van", "a van", found.said))
     assert confab.load(again).plan(optimal=True).outcome.cost == 8.0
+
+
+def test_a_cheaper_plan_with_amounts_keeps_the_steps_of_level_1() -> None:
+    plan = confab.load("carts-small").plan()
+    assert (plan.cost, plan.plan.length) == (34.0, {1: 5, 2: 7})
