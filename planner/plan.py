@@ -266,10 +266,9 @@ class Outcome:
     `misses` count the refinements found in the cache and those that had to be searched. `cost` is the cost of the plan if some
     behaviour has a price; `bound` a lower bound on the cost of every lowest-level plan for the same goals, if proved; `engine`
     the other planner that found the plan. `given_up` has the levels that were given up, each with its goal. `left` has the runs
-    of lower-level steps in the plan, with the conditions of the level above that they violate. `saving` is the number of
-    primitives per second by which the plan was still being shortened in the end, None if it wasn't shortened. `certificate`
-    proves that a task is unsolvable; `confab.planner.solve` returns no such outcome without one. `forgone` has the soft goals
-    that are left unmet.
+    of lower-level steps in the plan, with the conditions of the level above that they violate. `saving` is the cost per second
+    by which the plan was still getting cheaper in the end, None if it wasn't shortened. `certificate` proves that a task is
+    unsolvable; `confab.planner.solve` returns no such outcome without one. `forgone` has the soft goals that are left unmet.
     """
 
     status: Status
