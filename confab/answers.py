@@ -1,4 +1,4 @@
-"""The answers of the tools for agents (`confab.agents`) as text, each computed in a separate process, within one folder."""
+"""Functions that compute the answers of the tools for agents (`confab.agents`) as text, from the files of one folder."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from confab.reasoner.limits import within
 from confab.scene import Scene, load
 
 ROWS, ROLLOUTS = 1_000, 20
-"""Maximum number of rows of a query, and of rollouts of a verification."""
+"""Maximum number of rows of a query, and maximum number of rollouts of a verification."""
 
 
 def inside(folder: Path, name: str) -> Path:
-    """Return the path of a named file in a folder.
+    """Return the path of a file in a folder.
 
     Raises
     ------
     KnowledgeError
-        There is no such file, or the name (an address, an absolute path, ``..`` or a link) leads out of the folder.
+        The file doesn't exist, or its name (a URL, an absolute path, ``..`` or a link) leads out of the folder.
     """
     path = (folder / name).resolve()
     if "://" in name or not path.is_relative_to(folder.resolve()):
@@ -43,7 +43,7 @@ def scene_of(folder: Path, name: str) -> Scene:
     Raises
     ------
     KnowledgeError
-        As for `inside`; or a catalog or an import leads out of the folder.
+        The file doesn't exist, or its name, a catalog or an import leads out of the folder.
     """
     from confab.reaching import with_current_reach
 
@@ -60,7 +60,7 @@ def scene_of(folder: Path, name: str) -> Scene:
         refuse_outside(catalog, catalog)
         for file in ontology.catalog(catalog).values():
             refuse_outside(catalog, file)
-    for file in sorted(path.parent.iterdir()):  # files that may be imported by name
+    for file in sorted(path.parent.iterdir()):  # files that the scene may import by name
         if file.suffix in ontology.SUFFIXES:
             refuse_outside(file, file)
     scene = load(path)
@@ -70,7 +70,7 @@ def scene_of(folder: Path, name: str) -> Scene:
 
 
 def scenes(folder: Path) -> str:
-    """Return the names of the available scenes."""
+    """Return the names of the shipped scenes, and the ontology files in a folder."""
     own = sorted(
         str(file.relative_to(folder))
         for file in folder.rglob("*")
@@ -80,14 +80,14 @@ def scenes(folder: Path) -> str:
 
 
 def planned(scene: Scene, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> Result:
-    """Return the result of planning in a scene, with some of its facts replaced."""
+    """Plan in a scene after a replacement of facts, and return the result."""
     return (scene.with_fact(*facts) if facts else scene).plan(
         list(goals), mode=mode, time_limit=seconds, engine=None if mode == "paper" else NO_ENGINE
     )
 
 
 def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> str:
-    """Return a plan as a tree of steps, or the reason why there is none."""
+    """Return a plan as an indented tree of steps, or the reason why there is no plan."""
     result = planned(scene_of(folder, name), goals, facts, mode, seconds)
     if not result.solved:
         return "\n".join([repr(result), *map(str, result.explain().proof)])
@@ -95,7 +95,7 @@ def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mo
 
 
 def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
-    """Return the rows of a query, tab-separated, below the names of its columns."""
+    """Return the result of a query: the column names and the rows as tab-separated lines."""
     from confab.reasoner.graph.query_process import QueryLimits
 
     if "{" not in sparql:
@@ -108,7 +108,7 @@ def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
 
 
 def validate(folder: Path, name: str) -> str:
-    """Return the findings in a file with their remedies; the list is empty if there are none."""
+    """Return the number of errors in a scene, and each error with its cause and its remedy."""
     from confab.reasoner.validation.validate import validate as found
 
     path = ontology.scenes()[name] if name in ontology.scenes() else scene_of(folder, name).knowledge.path
@@ -122,7 +122,7 @@ def validate(folder: Path, name: str) -> str:
 
 
 def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float) -> str:
-    """Return why a step, or each step, is in the plan; without a plan, why there is none."""
+    """Return why a step (by default each step) is in the plan; if there is no plan, return the reason."""
     with within(seconds):
         result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
         return (
@@ -137,7 +137,7 @@ def why_not(folder: Path, name: str, goals: Sequence[str], instead: str, seconds
 
 
 def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: int, seconds: float) -> str:
-    """Return the results of executing the plan in physics, rollout by rollout."""
+    """Execute the plan in physics; return a summary, the primitives of one rollout with verdicts, and the success rate."""
     if not 1 <= rollouts <= ROLLOUTS:
         raise KnowledgeError(f"got {rollouts} rollouts; wanted 1 to {ROLLOUTS}")
     with within(seconds):

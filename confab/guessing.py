@@ -36,7 +36,7 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "execution": {"episode": "episode"},
     "problem": {"domain": "domain"},
 }
-"""The attribute, or the call, that leads from an object to another one."""
+"""The attribute or the call that leads from an object to another object, by the kinds of the two objects."""
 MEANINGS = """
 load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
 scenes examples datasets catalog list available builtin samples
@@ -108,7 +108,7 @@ board widget edit editor interactive gui ui
 show print pretty display summary table stats statistics
 __version__ version
 """
-"""Groups of words with the same meaning, one group per line."""
+"""Groups of words with similar meanings, one group per line."""
 FILLERS = frozenset(
     {
         "get",
@@ -132,24 +132,24 @@ FILLERS = frozenset(
     }
 )
 OF_ANY = frozenset({"plan", "planning", "search"})
-"""Words that are ignored beside other words: a plan's length is its length."""
+"""Words that are ignored if a name has other words."""
 OF_MODULE = frozenset({"scene", "ontology", "file"})
-"""The same for names of the module, all of whose functions are about scenes."""
+"""Words that are ignored in names of the module `confab` if a name has other words."""
 ENOUGH, FAR = 0.5, 0.1
-"""Minimum score of a suggested name; reduction of the score for each step that leads to the name."""
+"""Minimum score of a suggested name, and reduction of the score for each attribute or call that leads to the name."""
 MOST, NEAR = 3, 0.3
 """Maximum number of suggested names, and maximum difference of their scores from the best score."""
 
 
 @cache
 def stem(word: str) -> str:
-    """Return a word without its endings: ``simulat`` of ``simulators``."""
+    """Return the stem of a word: ``simulat`` for ``simulators``."""
     return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", word))
 
 
 @cache
 def meanings() -> Mapping[str, frozenset[int]]:
-    """Return the lines of `MEANINGS` that contain a word, by its stem."""
+    """Return the numbers of the lines of `MEANINGS` that contain a word, by the stem of the word."""
     lines = [[*map(stem, line.split())] for line in MEANINGS.strip().splitlines()]
     words = {word for line in lines for word in line}
     return {word: frozenset(i for i, line in enumerate(lines) if word in line) for word in words}
@@ -166,7 +166,7 @@ def alike(one: str, other: str) -> float:
 
 
 def segments(run: str) -> tuple[str, ...]:
-    """Return the known words that are written together in a text, the longest first; nothing if it has other parts.
+    """Split a text without separators into known words; return an empty tuple if this is impossible.
 
     >>> segments("simulateplan"), segments("xyzzy")
     (('simulate', 'plan'), ())
@@ -181,7 +181,7 @@ def segments(run: str) -> tuple[str, ...]:
 
 @cache
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the significant words of a name: ``plan`` and ``length`` of ``getPlanLength``."""
+    """Return the significant words of a name: ``plan`` and ``length`` for ``getPlanLength``."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
     words = tuple(word for run in re.findall(r"[^\W_]+", apart) for word in segments(run) or (run,))
     return tuple(word for word in words if word not in FILLERS) or words
@@ -189,10 +189,10 @@ def words_of(name: str) -> tuple[str, ...]:
 
 @cache
 def described(kind: str) -> Mapping[str, str]:
-    """Return the public names of a class, or of the module `confab`, each with the first line of its description."""
+    """Return the public names of a class, or of the module `confab`, each with the first line of its docstring."""
     if kind == "confab":
         module = import_module("confab")
-        names = ["Memory", *(n for n in module.__all__ if n.islower())]  # of classes only a memory is made by hand
+        names = ["Memory", *(n for n in module.__all__ if n.islower())]  # users call the constructor of no other class
         return {**{n: (getattr(module, n).__doc__ or "").split("\n")[0] for n in names}, "__version__": ""}
     home, _, name = CLASSES[kind].rpartition(".")
     cls = getattr(import_module(home), name)
@@ -203,7 +203,7 @@ def described(kind: str) -> Mapping[str, str]:
 
 
 def places(kind: str) -> Iterator[tuple[str, str, int]]:
-    """Yield each reachable class, with the expression before its names, and the number of steps to it."""
+    """Yield the kinds of objects that are reachable from a kind, each with the expression that leads to it and its distance."""
     waiting, seen = [(kind, "confab." if kind == "confab" else "", 0)], {kind}
     while waiting:
         here, before, far = waiting.pop(0)
@@ -218,7 +218,7 @@ def places(kind: str) -> Iterator[tuple[str, str, int]]:
 
 
 def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
-    """Return the score of a name, with its description, for some wanted words, from 0 to 1."""
+    """Return how well a name and its docstring match the wanted words; 1 is the maximum."""
     has, said = words_of(name), set(re.findall(r"[a-z]+", doc.lower()))
     met = [max(alike(word, one) for one in has) for word in wanted]
     told = [
@@ -230,7 +230,7 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 
 
 def guessed(kind: str, name: str) -> str:
-    """Return the names that may be meant by a wrong name, the best first; an empty text if there are none.
+    """Return the names that a wrong name of a kind of object may mean, the most likely name first, as text.
 
     >>> guessed("result", "planning_time"), guessed("plan", "xyzzy")
     ('seconds, timed, or outcome.seconds', '')
@@ -249,7 +249,7 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return the known name that a wrong name means; an empty text if there is none. A mapping gives descriptions, too.
+    """Return the known name that a wrong name most likely means, or an empty text. The values of a mapping are descriptions.
 
     >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
     ('time_limit', '')

@@ -1,4 +1,4 @@
-"""Knowledge about a scene: reading, SPARQL queries, edits."""
+"""The knowledge in a scene: its objects, behaviours, facts and goals, SPARQL queries, and edits."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ S = TypeVar("S", bound="Known")
 @right_names("a scene", "confab.hints", "SCENE")
 @dataclass
 class Known:
-    """Reading, querying and editing a scene; `confab.scene.Scene` adds planning and acting.
+    """A scene that can be read, queried and edited. The subclass `confab.scene.Scene` adds planning and acting.
 
     Attributes
     ----------
     knowledge : KnowledgeGraph
-        The store with its triples.
+        The store with the triples of the scene.
     seconds : mapping of stage to seconds
-        Statistics of loading.
+        The durations of the stages of loading.
     """
 
     knowledge: KnowledgeGraph
 
     def __post_init__(self) -> None:
-        """Refuse a name or a path, which belong to `confab.load`."""
+        """Raise `TypeError` if the argument is no knowledge graph, for instance the name of a scene."""
         if not isinstance(self.knowledge, KnowledgeGraph):
             raise TypeError(
                 f"a scene is made of a knowledge graph; got {self.knowledge!r}: use confab.load({self.knowledge!r})"
@@ -64,19 +64,19 @@ class Known:
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying: the knowledge graph. Values are read from it again."""
+        """Return the state for pickling and copying. Cached values are left out; they are read from the graph again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
     def __getitem__(self, name: object) -> NoReturn:
-        """Raise `TypeError` with the names of the scene's mappings; iteration and ``in`` call this, too."""
+        """Raise `TypeError`, whose message names the properties to use. Iteration and ``in`` also call this method."""
         raise TypeError("a scene has no items; use objects, facts, goals or behaviors")
 
     @cached_property
     def reading(self) -> Reading:
-        """The whole scene as a problem, and the table of its names and IRIs.
+        """The whole scene as a problem, with its schema, names and IRIs.
 
-        `plan` doesn't use it: it reads only the individuals that the task can need.
+        The method `plan` normally reads only the individuals that the task can need.
         """
         self.settle()
         self.knowledge.require_whole()
@@ -89,12 +89,12 @@ class Known:
 
     @property
     def problem(self) -> Problem:
-        """Objects, behaviours, facts and goals."""
+        """The planning problem of the whole scene: objects, behaviours, facts and goals."""
         return self.reading.problem
 
     @cached_property
     def names(self) -> Names:
-        """Short names and their IRIs; if the scene can't be read, the names of all terms in its files."""
+        """The table of short names and IRIs. If the scene can't be read as a problem, the table has all terms in its files."""
         try:
             if "reading" in self.__dict__:
                 return self.reading.names
@@ -127,7 +127,7 @@ class Known:
 
     @property
     def behaviors(self) -> dict[str, Behavior]:
-        """The behaviours by name, in declared order, with their parameters, conditions and effects; `update_of` writes one out.
+        """The behaviours by name, in the order of their declaration, with parameters, conditions and effects.
 
         Examples
         --------
@@ -140,7 +140,7 @@ class Known:
 
     @property
     def facts(self) -> Stated:
-        """The initial facts, in the form that `with_fact` takes.
+        """The initial facts as texts, in the notation of `with_fact`.
 
         Examples
         --------
@@ -154,7 +154,7 @@ class Known:
 
     @property
     def goals(self) -> Stated:
-        """The goals, in the form that `with_goal` and `plan` take.
+        """The goals as texts, in the notation of `with_goal` and `plan`.
 
         Examples
         --------
@@ -166,12 +166,12 @@ class Known:
         return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items()))
 
     def with_fact(self: S, *facts: Facts) -> S:
-        """Return a scene with some facts replaced, each given as a text or by its words; this scene is unchanged.
+        """Return a copy of the scene with some facts replaced. A fact is given as a text or by its words.
 
         Raises
         ------
         KnowledgeError
-            A word is unknown, or the store is a remote one.
+            A term of a fact is unknown, or the scene is at a SPARQL endpoint.
 
         Examples
         --------
@@ -184,12 +184,12 @@ class Known:
         return self._restated(with_facts, facts)
 
     def with_goal(self: S, *goals: Facts) -> S:
-        """Return a scene with some goals replaced; this scene is unchanged.
+        """Return a copy of the scene with some goals replaced. A goal is given as a text or by its words.
 
         Raises
         ------
         KnowledgeError
-            As `with_fact`.
+            A term of a goal is unknown, or the scene is at a SPARQL endpoint.
 
         Examples
         --------
@@ -213,7 +213,7 @@ class Known:
 
     @cached_property
     def graph(self) -> rdflib.Graph:
-        """The scene's triples as an rdflib graph; changes of the graph take effect in `query` and `plan` at once."""
+        """The scene's triples as an rdflib graph. Changes of the graph take effect in `query` and `plan`."""
         from confab.reasoner.graph.rdflib_graph import rdflib_graph
 
         self.settle()
@@ -221,14 +221,14 @@ class Known:
 
     @cached_property
     def embodiment(self) -> Embodiment:
-        """The embodiment in the ontology: robot, furniture, shapes, skills and perceivers.
+        """The embodiment of the scene: robots, furniture, shapes, skills and perceivers.
 
         Raises
         ------
         KnowledgeError
-            The scene is symbolic only.
+            The scene is declared to have no geometry.
         EmbodimentError
-            A statement that physics needs is missing; the message names it.
+            A statement that physics needs is missing. The message names the statement.
         """
         from confab.reasoner.embodiment.reading import read_embodiment
 
@@ -247,17 +247,17 @@ class Known:
 
     @property
     def owl(self) -> World:
-        """The scene as an owlready2 world; changes to it take effect in `query` and `plan`."""
+        """The scene as an owlready2 world. Changes of the world take effect in `query` and `plan`."""
         return self._mirror.world
 
     def _forget(self) -> None:
-        """Discard the values read before an edit."""
+        """Discard the values that were read before an edit."""
         for name in ("reading", "names", "embodiment"):
             self.__dict__.pop(name, None)
         self._edited = True
 
     def settle(self) -> None:
-        """Transfer edits made through `owl`, and infer again after any edit."""
+        """Transfer edits of the owlready2 world into the graph, and infer again after any edit."""
         if "_mirror" in self.__dict__ and self._mirror.pull():
             self.__dict__.pop("graph", None)
             self._forget()
@@ -266,19 +266,21 @@ class Known:
             infer(self.knowledge)
 
     def query(self, sparql: str | Path, limits: QueryLimits | None = None) -> Table:
-        """Return the result of a SPARQL 1.1 query as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
+        """Return the result of a SPARQL 1.1 query (SELECT, ASK or CONSTRUCT) as a table.
 
-        The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
+        The query is given as text, as a ``.rq`` file, or by the name of a shipped query (``ontology/questions``).
 
-        Prefixes are those of the scene's file, then those of its imports. ``:name`` denotes a term of the core if the scene's
-        own namespace has no such name. The query is answered in a separate process: see `confab.reasoner.graph.query_process`.
+        A query can use the prefixes of the scene's file and of its imports. If two files declare a prefix, the scene's file has
+        precedence. ``:name`` denotes a term of the core ontology if the scene's namespace has no such name. The query runs in a
+        separate process (`confab.reasoner.graph.query_process`).
 
         Raises
         ------
         KnowledgeError
-            The query isn't SPARQL; the message has line and column. Or it queries another endpoint without permission.
+            The query isn't valid SPARQL (the message states line and column), or it queries another endpoint without
+            permission.
         LimitError
-            The query takes more time, rows or memory than the limits allow.
+            The query exceeds a limit of time, rows or memory.
 
         Examples
         --------
@@ -302,12 +304,12 @@ class Known:
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
 
     def with_episodes(self: S, *files: str | Path) -> S:
-        """Return the scene with saved episodes in it, so that `query` covers all of them.
+        """Add saved episodes to the scene for queries, and return the scene.
 
         Raises
         ------
         KnowledgeError
-            A file holds no episode, or two hold one of the same name.
+            A file contains no episode, or two files contain episodes of the same name.
         """
         from confab.reasoner.memory.episodes import read_episodes
 
@@ -315,7 +317,7 @@ class Known:
         return self
 
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
-        """Return the graph for a query; missing imports are reported once."""
+        """Return the graph for a query, with the derived facts that the query names; missing imports are reported once."""
         from confab.following import write_following
         from confab.reasoner.graph.query_process import QueryLimits
         from confab.reasoner.reading.affordance import SITUATION, write_situation
@@ -324,10 +326,8 @@ class Known:
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
         if not self.knowledge.remote:
-            with (
-                suppress(KnowledgeError),
-                within((limits or QueryLimits()).seconds),
-            ):  # a scene that can't be planned in can still be queried
+            # A scene without a valid planning problem can be queried.
+            with suppress(KnowledgeError), within((limits or QueryLimits()).seconds):
                 write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:
             log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
@@ -343,12 +343,12 @@ class Known:
     def construct(
         self, sparql: str, path: str | Path | None = None, limits: QueryLimits | None = None
     ) -> rdflib.Graph | int:
-        """Return the triples of a CONSTRUCT query; or write them into a file that imports this scene, and return their number.
+        """Return the triples of a CONSTRUCT query, or write them into a file that imports this scene and return their number.
 
         Raises
         ------
         KnowledgeError, LimitError
-            As for `query`; also if the query returns rows and not triples.
+            The query fails as described in `query`, or is no CONSTRUCT query.
         """
         sparql = sparql_of(sparql)
         if path is not None:
@@ -360,9 +360,9 @@ class Known:
         return rdflib.Graph().parse(data=self.query(sparql, limits).turtle(self.knowledge.spoken), format="turtle")
 
     def applicable_query(self, behavior: str) -> str:
-        """Return the SPARQL query for the individuals with which a behaviour is applicable.
+        """Return the SPARQL query for the arguments with which a behaviour is applicable.
 
-        `query` answers it on the initial situation.
+        The method `query` answers this query for the initial state.
         """
         from confab.reasoner.graph.query_process import standing_alone
         from confab.reasoner.reading.affordance import applicable_query
@@ -372,12 +372,12 @@ class Known:
         return standing_alone(self.knowledge, query)
 
     def update_of(self, behavior: str) -> str:
-        """Return a behaviour as a SPARQL update, as it can be written in an ontology (docs/authoring.md).
+        """Return a behaviour as a SPARQL update, a notation that ontologies may contain (docs/authoring.md).
 
         Raises
         ------
         KnowledgeError
-            There is no such behaviour, or it has parts that an update can't express.
+            The behaviour doesn't exist, or has parts that an update can't express.
         """
         from confab.reasoner.reading.quantification import behavior_named
         from confab.reasoner.updates.converting import update_of
@@ -389,19 +389,19 @@ class Known:
             raise KnowledgeError(f"{name} can't be shown as an update: {error}") from error
 
     def quantifying_query(self, behavior: str) -> str:
-        """Return the SPARQL query that quantifies a behaviour: a row for each assignment of individuals to its parameters."""
+        """Return the SPARQL query that quantifies a behaviour, with a row for each assignment of individuals to its parameters."""
         from confab.reasoner.graph.query_process import standing_alone
         from confab.reasoner.reading.quantification import behavior_named, query_for
 
         return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))
 
     def affordances(self, of: str | None = None) -> Table:
-        """Return what objects afford in the initial situation: object, behaviour, arguments, situation, effect.
+        """Return a table of the behaviours that objects afford in the initial state.
 
         Raises
         ------
         KnowledgeError
-            There is no object of that name; ``all`` and None denote every object.
+            The object doesn't exist. The names ``all`` and None denote all objects.
         """
         from confab.reasoner.reading.affordance import affordances
 

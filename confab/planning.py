@@ -1,4 +1,4 @@
-"""Planning in a scene: from options to a result."""
+"""Planning in a scene: the function `plan`, and its result."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ if TYPE_CHECKING:
     from confab.why import Account, Because, WhyNot
 
 OURS = 0.6
-"""Share of a time limit for our own search if an installed engine is tried afterwards."""
+"""Share of the time limit for Confab's own search if an installed engine is tried after the search."""
 OURS_WORK = 10_000_000
-"""The same limit without a time limit, as work (states times operators); the last resort gets the same work.
+"""Work limit of Confab's own search (number of states times operators) if an engine is tried and there is no time limit.
 
-Together this takes about twenty seconds.
+The search exhausts this limit after about twenty seconds.
 """
 
 
@@ -80,51 +80,56 @@ def plan(
     *,
     goal: Facts = (),
 ) -> Result:
-    """Plan in a scene; as a method of `confab.scene.Scene`, in this one.
+    """Plan in a scene, and return the result.
 
     Parameters
     ----------
     scene : Scene
     goals, goal : str or iterable of str
-        Each like ``cup2 LOCATION location8``; replaces the goal of that symbol. One may be given by either name.
+        Facts like ``cup2 LOCATION location8``, each of which replaces the scene's goal for the same symbol.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
-        The memory; none if left out.
+        The memory that guides the search; by default none.
     mode : str
-        ``paper``: A* with eq. (5) on each level, over all behaviours quantified in the scene. ``guarded``,
-        ``leading`` and ``strict``: the default planner, over the individuals that the task can need; experience leads it if
-        it has proved useful, always, or never. IDs then number the recognised individuals. ``optimal``: see `optimal`.
+        ``paper`` is A* with eq. (5) on each level, with all behaviours quantified in the scene. ``guarded``, ``leading`` and
+        ``strict`` are modes of the default planner, which reads only the individuals that the task can need. In these modes,
+        learned rules guide the search if they have proved useful, always, and never, respectively. ``optimal`` is described at
+        the parameter `optimal`.
     time_limit : float or Deadline, optional
-        Seconds until the call gives up, or its deadline; `OPTIMAL_SECONDS` if `optimal` is requested without a limit.
+        Time limit of the call in seconds, or its deadline. The optimal search has the default `OPTIMAL_SECONDS`.
     optimal : bool
-        Improve the plan until it is proved optimal or a limit is reached, and report the bound; without memory.
+        Improve the plan until it is proved optimal or the time limit is reached. The result has the proved bound. A memory
+        can't be used.
     observed : str or Path, optional
-        File of observed facts, which replace the scene's.
+        File of observed facts, which replace the scene's facts.
     engine : str, optional
-        Another planner known to unified-planning, e.g. ``fast-downward``. If left out, an installed one is tried where ours
-        gives up and levels may be left: with the rest of the time limit, at least two fifths of it; without a limit after
-        some twenty seconds of work, and ours continues if it finds no plan. With ``none`` no other planner is tried.
+        An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is tried if
+        Confab's own search gives up and `leave_levels` is true. The own search then has three fifths of the time limit. Without
+        a time limit, the engine is tried after about twenty seconds of search; if the engine finds no plan, the search starts
+        again without a limit. With ``none``, no engine is tried.
     level : int, optional
-        The level that the engine plans; the lowest if left out.
+        The level on which the engine plans; by default the lowest level.
     leave_levels : bool
-        Whether steps of a lower level may take the place of a level that has no refinable plan; the outcome says where, and
-        which conditions of the upper level they violate.
+        Whether steps of a lower level may replace steps of a level without a refinable plan. The outcome names the replaced
+        parts and the violated conditions of the upper level.
     minimise : str, optional
-        ``makespan``: the plan gets a schedule (`Result.timed`), with its turns taken by any of the actors that could. ``cost``:
-        the same as `optimal`. ``steps``: the same, with every step at a cost of 1. If left out, steps are few, without a proof.
+        With ``makespan``, the plan gets a schedule (`Result.timed`), in which equivalent actors may be exchanged. ``cost`` is
+        the same as `optimal`. ``steps`` is the optimal search with a cost of 1 for every step. By default, no minimum is
+        proved.
 
     Raises
     ------
     KnowledgeError
         A goal mentions terms that the scene doesn't have, the mode is unknown, or options exclude each other.
     LimitError
-        The time limit passed before the search began; if it passes later, the outcome says so.
+        The time limit passed before the search began. If the limit passes during the search, the status of the outcome is "gave
+        up".
     """
     options = PlanOptions(memory, mode, time_limit, optimal, observed, engine, level, leave_levels, minimise)
     return plan_by(scene, [*several(goals), *several(goal)], options)
 
 
 def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
-    """Plan in a scene, as `plan` does, by options that were checked."""
+    """Plan in a scene with validated options."""
     scene.settle()
     scene.knowledge.require_whole()
     with within(options.limit) as deadline, paused_collection():
@@ -167,7 +172,7 @@ def _plan(
         return with_goals(scene.problem, goals)
 
     faulty = [*never_done(problem)]
-    if faulty and not seen.whole:  # an individual that was left out may have the value
+    if faulty and not seen.whole:  # an individual that wasn't read may have the value
         problem = whole()
         faulty = [*never_done(problem)]
 
@@ -241,7 +246,7 @@ def _plan(
     if in_part and (
         outcome.status is Status.UNSOLVABLE
         or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
-    ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
+    ):  # the whole scene is read, since it may have a plan or invalidate the plan
         anew = whole()
         if anew != seen.problem:
             in_part = False
@@ -257,13 +262,13 @@ def _plan(
 
 
 def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether half of the time left suffices to prove that no plan solves a task, even if it leaves levels."""
+    """Return whether half of the remaining time suffices to prove that a task has no plan, even without steps of some levels."""
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
     return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the plan of an installed engine, or the reason that it found none; None if no engine is installed."""
+    """Return the outcome of an installed engine that found a plan, otherwise the reason; None if no engine is installed."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
@@ -284,16 +289,17 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
 
 
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
-"""The notations of a step of a plan; see `Result.why`."""
+"""The notations of a step of a plan, as `Result.why` describes them."""
 
 
 @right_names("a result", "confab.hints", "RESULT")
 @dataclass
 class Result:
-    """The result of planning: the outcome, and the scene in which it holds.
+    """The result of planning: the outcome, with the plan if one was found, and the scene of the call.
 
-    `problem` has the individuals that the task can need; `queries` is the number of queries to the store. `part` is the part of the
-    scene that the problem was read from, if it isn't the whole scene, and `goals` are those that replaced some of the task's.
+    `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
+    the scene from which the problem was read, or None for the whole scene. `goals` are the goals that replaced goals of the
+    task.
     """
 
     scene: Known
@@ -306,7 +312,7 @@ class Result:
     timed: TimedPlan | None = None
 
     def faults(self, plan: Plan) -> list[Fault]:
-        """Return the faults of a plan for the same task in the whole scene; empty if the plan is valid."""
+        """Return the faults of a plan for the same task in the whole scene; the list is empty if the plan is valid."""
         faults = validate(self.problem, plan)
         if faults or self.part is None:
             return faults
@@ -314,7 +320,7 @@ class Result:
 
     @property
     def plan(self) -> Plan:
-        """The plan; raises `KnowledgeError` with the reason if there is none."""
+        """The plan; without a plan, a `KnowledgeError` with the reason is raised."""
         if self.outcome.plan is None:
             reason = self.outcome.reason.text if self.outcome.reason else ""
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
@@ -337,12 +343,12 @@ class Result:
         return self.plan[index]
 
     def in_order(self, *ids: int) -> Plan:
-        """Return the plan with its steps of the first level in another order, for example that of a demonstration.
+        """Return the plan with its first-level steps in another order, for example the order of a demonstration.
 
         Raises
         ------
         KnowledgeError
-            The numbers aren't the IDs of all steps of the first level, each once; or the plan can't be executed in that order.
+            `ids` aren't the IDs of all first-level steps, each given once, or the plan can't be executed in this order.
 
         Examples
         --------
@@ -363,7 +369,7 @@ class Result:
         return plan
 
     def verify(self, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
-        """Execute the plan in PyBullet: see `confab.physics.verify`."""
+        """Verify the plan in PyBullet (`confab.physics.verify`)."""
         from confab.physics import verify
 
         self.scene.settle()
@@ -371,7 +377,7 @@ class Result:
         return verify(self.scene, self.plan, rollouts, seed, **options)
 
     def execute(self, interventions: Facts = (), **options: Unpack[execution.Options]) -> Execution:
-        """Execute the task in a closed loop, beginning with this plan: see `Scene.execute`."""
+        """Execute the task in a closed loop, beginning with this plan (`Scene.execute`)."""
         from confab.execution import carry_out
 
         return carry_out(self.scene, self, interventions, **options)
@@ -395,13 +401,13 @@ class Result:
         return purposes(self.problem, self.plan)
 
     def why(self, step: AnyStep) -> Because:
-        """Return why a step is in the plan: its effects, and what needs them.
+        """Return why a step is in the plan: its effects, and the steps and goals that need these effects.
 
         Parameters
         ----------
         step : Step, int, str or path
-            Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words,
-            also as a tuple.
+            The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12
+            of level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.
 
         Examples
         --------
@@ -420,16 +426,18 @@ class Result:
     def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
         """Return why an alternative isn't in the plan.
 
-        The failing conditions, or the plan with the alternative and its additional cost.
+        The answer has the failing conditions of the alternative, or a plan with the alternative and its additional cost.
 
         Parameters
         ----------
         asked : str
-            ``cup2 LOCATION location8``, also with ``by left_hand``; or ``B2_PICK right_hand cup1``, ``B2_PICK hand=right_hand``.
+            The alternative: a goal like ``cup2 LOCATION location8``, also followed by ``by left_hand``, or a behaviour like
+            ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
-            The step to be replaced; if left out, the most similar step in whose place it is applicable.
+            The step to be replaced by the behaviour; by default the most similar step in whose place the behaviour is
+            applicable.
         seconds : float, optional
-            Limit of the whole call.
+            Time limit of the whole call.
         """
         from confab.why import BY, find_step, why_not
 
@@ -444,26 +452,27 @@ class Result:
             return other.problem, other.outcome, other.labels
 
         with within(seconds):
-            choice = BY.search(asked) is not None  # other individuals are looked up in the whole scene
+            choice = BY.search(asked) is not None  # the individual may only be in the whole scene
             if choice and self.part is not None:
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
             told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
-            own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors  # `replan` checks the others
+            # Plans for other goals come from `replan`, which has checked them.
+            own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors
             if not own or self.part is None or told.plan is None or not self.faults(told.plan):
                 return told
             return self.in_whole_scene().why_not(asked, instead)
 
     def in_whole_scene(self) -> Result:
-        """Return the same result with the problem of the whole scene instead of the part that was read for the task."""
+        """Return the same result with the problem of the whole scene instead of the problem of a part."""
         if self.part is None:
             return self
         whole = with_goals(self.scene.problem, self.goals)
         return replace(self, problem=whole.only(self.outcome.unmet), part=None)
 
     def explain(self) -> Account:
-        """Return why each step of the plan is there; without a plan, why there is none."""
+        """Return why each step is in the plan; without a plan, return the reason why there is no plan."""
         from confab.show import summary
         from confab.why import Account, account, proved
 
@@ -474,15 +483,15 @@ class Result:
 
     @property
     def certificate(self) -> Certificate | None:
-        """The certificate that there is no plan, verified by `confab.planner.certificate_checks`.
+        """The certificate that the task has no plan, which `confab.planner.certificate_checks` has verified.
 
-        None unless the task is unsolvable.
+        The value is None if the task isn't proved to be unsolvable, or without a certificate.
         """
         return self.outcome.certificate
 
     @property
     def cost(self) -> float:
-        """The cost of the plan on its lowest level: the sum of the costs of its primitives.
+        """The sum of the costs of the plan's primitives.
 
         Examples
         --------
@@ -495,9 +504,9 @@ class Result:
         return float(cost_of(self.problem, self.plan))
 
     def dearer(self) -> str:
-        """Return the known bound on cheaper plans, and the option that searches for one.
+        """Return a remark on possible cheaper plans, and the option that searches for one.
 
-        An empty text if no cheaper plan is possible.
+        The text is empty if there is no reason to expect a cheaper plan, or if the search has proved a bound.
 
         Examples
         --------
@@ -532,14 +541,14 @@ class Result:
         return data
 
     def save(self, path: str | Path) -> Path:
-        """Write the result as JSON and return the path."""
+        """Write the result into a JSON file, and return the path."""
         from confab.reasoner.files import write_whole
 
         write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
         return Path(path)
 
     def __rich__(self) -> PlanTree | str:
-        """Return a tree for rich."""
+        """Return the plan as a tree for rich; without a plan, return the summary."""
         from confab.show import plan_tree, summary
 
         if not self.solved:
@@ -548,7 +557,7 @@ class Result:
         return plan_tree(self.plan, "\n".join((summary(self.outcome), *more)))
 
     def __repr__(self) -> str:
-        """Return the summary and the steps of the most abstract level."""
+        """Return the summary and the first-level steps."""
         from confab.show import summary
 
         steps = self.outcome.plan.steps if self.outcome.plan else ()
@@ -556,7 +565,7 @@ class Result:
         return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps), *more])
 
     def report(self, path: str | Path) -> Path:
-        """Write the plan, with its reasons, as one HTML page, and return the path."""
+        """Write the plan, with the reasons for its steps, as one HTML page, and return the path."""
         from confab.page.data import page_data
         from confab.page.frozen import write_page
 

@@ -1,4 +1,4 @@
-"""A scene: knowledge (`confab.known`) with planning and acting; each method leads to its module in a few lines."""
+"""The class `Scene`, which adds planning, verification and execution to the knowledge in `confab.known`."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ if TYPE_CHECKING:
 
 @right_names("a scene", "confab.hints", "SCENE")
 class Scene(Known):
-    """A scene of the ontology with all its imports.
+    """A scene: an ontology file with all its imports.
 
     Attributes
     ----------
     knowledge : KnowledgeGraph
-        The store with its triples.
+        The store with the triples of the scene.
     seconds : mapping of stage to seconds
-        Statistics of loading.
+        The durations of the stages of loading.
     """
 
     plan = planning.plan
-    """Return the result of planning in this scene. Takes the parameters of `confab.planning.plan` but the first."""
+    """Plan in this scene, with the parameters of `confab.planning.plan`."""
 
     @overload
     def picture(self, path: None = None, behavior: str | None = None, classes: bool = False) -> Image: ...
@@ -65,17 +65,17 @@ class Scene(Known):
     def picture(
         self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False
     ) -> Path | Image:
-        """Draw the table with its places, a behaviour, or the classes: into a file, or as an image that a notebook shows.
+        """Draw the table with its places, a behaviour, or the classes into a file, or return the picture for a notebook.
 
         Returns
         -------
         Path or PIL.Image.Image
-            The file's path if one was given.
+            The path of the file if a path is given, otherwise the picture.
 
         Raises
         ------
         KnowledgeError
-            As `confab.picturing.draw`.
+            The format isn't supported, the behaviour is unknown, or the scene has no geometry.
         """
         from confab.picturing import draw
 
@@ -90,12 +90,12 @@ class Scene(Known):
             return image.copy()
 
     def board(self) -> anywidget.AnyWidget:
-        """Return the page for a notebook: map, timeline, plan, queries; facts, goals and interventions can be changed on it.
+        """Return the page of the scene as a widget for a notebook, on which users change facts, goals and interventions.
 
         Raises
         ------
         KnowledgeError
-            anywidget isn't installed (the extra `notebook` brings it).
+            anywidget isn't installed. The extra `notebook` contains anywidget.
         """
         from confab.page.widget import board
 
@@ -106,9 +106,9 @@ class Scene(Known):
     def verify(
         self, plan: AnyPlan | None = None, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]
     ) -> Report:
-        """Execute the primitives of a plan, or of an object with a plan, in PyBullet: see `confab.physics.verify`.
+        """Verify a plan, or the plan of a result, in PyBullet (`confab.physics.verify`).
 
-        Without a plan, the scene is planned in first.
+        Without the argument `plan`, a new plan is made and verified.
         """
         from confab.physics import verify
 
@@ -132,11 +132,11 @@ class Scene(Known):
         time_limit: float | None = None,
         **options: Unpack[execution.Options],
     ) -> Execution:
-        """Execute the task in a closed loop: see `confab.execution.execute`.
+        """Execute the task in a closed loop of action and observation (`confab.execution.execute`).
 
-        It begins with `plan`: a plan, a result, or the name of a file that ``confab plan --json`` wrote. New plans are made
-        with `memory`; `Memory.live` learns from the outcome. `watch` shows the execution in a notebook or a terminal;
-        `observer` is a custom observer of events. After `time_limit` seconds the episode gives up.
+        The first plan is `plan`: a plan, a result, or the name of a plan file. New plans are made with `memory`. `Memory.live`
+        learns from the returned execution. With `watch`, a notebook or a terminal shows the execution. `observer` is called
+        with each event. After `time_limit` seconds the execution gives up.
 
         Examples
         --------
@@ -146,7 +146,7 @@ class Scene(Known):
         """
         from confab.execution import carry_out
 
-        if plan is None and self.problem.weights:  # the plan decides which soft goals are left unmet
+        if plan is None and self.problem.weights:  # the plan determines the soft goals to reach
             chosen = self.plan(several(goals), memory, mode, time_limit)
             plan = chosen if chosen.solved else None
         return carry_out(
@@ -155,7 +155,7 @@ class Scene(Known):
 
     @contextmanager
     def serve(self, port: int = 0, limits: QueryLimits | None = None) -> Iterator[str]:
-        """Serve this scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block; yield its URL.
+        """Serve the scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block; yield the endpoint's URL.
 
         Raises
         ------
@@ -174,7 +174,7 @@ class Scene(Known):
             yield f"{server.url}sparql"
 
     def read_plan(self, path: str | Path) -> Plan:
-        """Return the plan in a file that `Result.save` or ``confab plan --json`` wrote, read for this scene.
+        """Return the plan in a JSON file of `Result.save` or ``confab plan --json``.
 
         Raises
         ------
@@ -184,36 +184,36 @@ class Scene(Known):
         return plan_of(path, self.problem)
 
     def read_episode(self, path: str | Path) -> Execution:
-        """Return the execution in a JSON file that `Execution.save` or ``confab execute --json`` wrote.
+        """Return the execution in a JSON file of `Execution.save` or ``confab execute --json``.
 
         Raises
         ------
         KnowledgeError
-            As `confab.saved.read_episode`.
+            The file contains no episode of this scene, or mentions terms that the scene doesn't have.
         """
         from confab.saved import read_episode
 
         return read_episode(self, Path(path))
 
     def read_report(self, verdicts: str | Path, plan: AnyPlan) -> Report:
-        """Return the verification of a plan in a JSON file that ``confab verify --json`` or ``confab run`` wrote.
+        """Return the verification of a plan in a JSON file of ``confab verify --json`` or ``confab run``.
 
         Raises
         ------
         KnowledgeError
-            As `confab.saved.read_report`.
+            The file contains no verdicts, or verdicts on another plan.
         """
         from confab.saved import read_report
 
         return read_report(self, Path(verdicts), plan_of(plan, self.problem))
 
     def to_pddl(self, level: int | None = None) -> tuple[str, str]:
-        """Return one level, the lowest if none is given, as the texts of a PDDL domain and problem; `export` writes them.
+        """Return a level, by default the lowest, as the texts of a PDDL domain and a PDDL problem.
 
         Raises
         ------
         KnowledgeError
-            There is no such level, or it has parts that PDDL can't express.
+            The scene has no such level, or the level has parts that PDDL can't express.
         """
         from confab.pddl_commands import exported
 
@@ -221,36 +221,36 @@ class Scene(Known):
         return found.domain, found.problem
 
     def to_unified_planning(self, level: int | None = None) -> unified_planning.model.Problem:
-        """Return one level, the lowest if none is given, as a problem of unified-planning (the extra `pddl` brings it).
+        """Return a level, by default the lowest, as a problem of unified-planning, which is in the extra `pddl`.
 
         Raises
         ------
         KnowledgeError
-            unified-planning isn't installed, or can't read the problem: it doesn't support derived predicates.
+            unified-planning isn't installed, or can't read the problem. For example, it doesn't support derived predicates.
         """
         from confab.engines import unified
 
         return unified(*self.to_pddl(level))
 
     def export(self, folder: str | Path, level: int | None = None) -> tuple[Path, Path]:
-        """Write one level, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder, and return the paths.
+        """Write a level, by default the lowest, as ``domain.pddl`` and ``problem.pddl`` into a folder, and return the paths.
 
         Raises
         ------
         KnowledgeError
-            There is no such level, or the folder can't be written.
+            The scene has no such level, or the folder can't be written.
         """
         from confab.pddl_commands import export_pddl
 
         return export_pddl(self.problem, level, Path(folder))
 
     def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[plan_options.Options]) -> Account:
-        """Plan, and return why each step is there; without a plan, why there is none. Takes the parameters of `plan`.
+        """Plan with the parameters of `plan`, and return why each step is in the plan, or why there is no plan.
 
         Raises
         ------
         confab.reasoner.limits.OutOfTimeError
-            The time limit for both is over before the reason is found.
+            The time limit for planning and explaining is over before the explanation is complete.
         """
         limit = options.get("time_limit")
         if not isinstance(limit, Deadline):
@@ -276,21 +276,22 @@ class Scene(Known):
 
 @right_arguments
 def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene: str | None = None) -> Scene:
-    """Load a scene: a shipped name, a file of RDF or several, a graph of rdflib, or the URL of a SPARQL 1.1 endpoint.
+    """Load a scene from a shipped name, one or several RDF files, an rdflib graph, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
     ----------
     source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
-        Of several files, the scene is the first that no other imports. A scene is returned unchanged. A graph is copied, and
-        may import shipped ontologies.
+        The source of the scene. Of several files, the scene is the first file that no other file imports. A scene is returned
+        unchanged. A graph is copied, and may import shipped ontologies.
     scene : str, optional
-        IRI of the scene in an endpoint that holds several.
+        IRI of the scene at an endpoint with several scenes.
 
     Raises
     ------
     KnowledgeError
-        There is no such scene, its syntax is invalid, or the endpoint is down, slow, or no endpoint. A file whose imports can't
-        be found, or that declares no ontology, can be queried; planning in it reports the missing parts.
+        The scene doesn't exist, its syntax is invalid, or the endpoint is down, too slow, or no SPARQL endpoint. A file with
+        missing imports or without an ontology declaration can be loaded and queried. Planning in such a scene raises an error
+        that names the missing parts.
 
     Examples
     --------
@@ -313,7 +314,7 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene
 
 
 def _read(source: object) -> KnowledgeGraph:
-    """Return the content of files, or of an rdflib graph."""
+    """Return the knowledge graph with the content of files or of an rdflib graph."""
     if isinstance(source, str | PathLike):
         return load_graph(_local(source), tolerant=True)
     if isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source):
@@ -332,12 +333,14 @@ def _read(source: object) -> KnowledgeGraph:
 
 
 def load_text(content: bytes) -> Scene:
-    """Load a scene from its text: RDF/XML, JSON-LD or Turtle, recognised by its first characters. It may import shipped ontologies.
+    """Load a scene from text in RDF/XML, JSON-LD or Turtle, recognised by its first characters.
+
+    The text may import shipped ontologies.
 
     Raises
     ------
     KnowledgeError
-        Broken syntax.
+        The syntax is invalid.
     """
     from tempfile import TemporaryDirectory
 
@@ -362,7 +365,7 @@ def load_text(content: bytes) -> Scene:
 
 
 def _local(address: str | PathLike[str]) -> str | Path:
-    """Return the path of an address ``file:///…``; return any other text unchanged."""
+    """Return the path of a URL ``file:///…``; return any other text unchanged."""
     if not isinstance(address, str) or not address.startswith("file:"):
         return address if isinstance(address, str) else Path(address)
     from urllib.parse import urlsplit
@@ -372,7 +375,7 @@ def _local(address: str | PathLike[str]) -> str | Path:
 
 
 def scenes() -> list[str]:
-    """Return the names of the shipped scenes, which `load` takes.
+    """Return the names of the shipped scenes, which `load` accepts.
 
     Examples
     --------
