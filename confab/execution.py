@@ -346,7 +346,11 @@ class Execution:
             )
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
-        return text + (f"; didn't take place: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
+        return text + (
+            f"; the step or time of an intervention wasn't reached: {', '.join(i.text for i in episode.missed)}"
+            if episode.missed
+            else ""
+        )
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives; an edge leads to a primitive that depends on its predecessor."""

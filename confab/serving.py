@@ -27,8 +27,10 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from math import inf
 from pathlib import Path
 from string import Template
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs
 
@@ -68,6 +70,8 @@ LARGEST, SLOWEST = 1_000_000, 20.0
 """Maximum size of a request's body in bytes, and maximum time of receiving a request or sending an answer in seconds."""
 MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
 """Maximum number of open connections."""
+LAST_STATE = 2.0
+"""Maximum time in seconds for which a server that ends waits for a page to receive the last state of an execution."""
 LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
@@ -124,6 +128,7 @@ class Service:
         self.scene, self.limits, self.change = scene, limits, 0
         self.sheet, self.following = Sheet(scene), Following(scene)
         self.planning = threading.Lock()
+        self.page_version, self.page_asked = -1, -inf
         self.lanes: list[LifoQueue[Worker]] = [LifoQueue() for _ in LANES]
         self.workers = [Worker(self, nice=5 * lane) for lane in range(len(LANES)) for _ in range(AT_ONCE)]
         self.threads = ThreadPoolExecutor(len(self.workers))
@@ -176,9 +181,17 @@ class Service:
 
     def page_json(self, after: int) -> bytes | None:
         """Return the content of the page about a running execution or the scene; None if the page has the newest version."""
+        self.page_version, self.page_asked = after, monotonic()
         if not self.following.begun:
             return json.dumps(self.sheet.scene_data).encode()
         return None if self.following.version <= after else json.dumps(self.following.data()).encode()
+
+    def wait_for_page(self) -> None:
+        """Wait until a page that follows an execution has received its last state, for `LAST_STATE` seconds at most."""
+        end = monotonic() + LAST_STATE
+        followed = self.following.begun and end - self.page_asked < 2 * LAST_STATE
+        while followed and self.page_version < self.following.version and monotonic() < end:
+            sleep(0.05)
 
     def turned_json(self, content: bytes) -> bytes:
         """Return the content of the page after a user's changes; only one plan is made at a time."""
@@ -477,6 +490,7 @@ def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -
     server.thread.start()
     try:
         yield server
+        service.wait_for_page()
     finally:
         server.should_exit = True
         server.thread.join()

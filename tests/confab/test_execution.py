@@ -52,7 +52,9 @@ def test_interventions_that_never_came_are_said() -> None:
     execution = confab.load("beverage-serving").execute(interventions=never)
     assert execution.reached
     assert execution.json()["never_came"] == never
-    assert execution.summary().endswith("didn't take place: after=999 remove cup2, at=9999 remove cup2")
+    assert execution.summary().endswith(
+        "the step or time of an intervention wasn't reached: after=999 remove cup2, at=9999 remove cup2"
+    )
 
 
 def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:

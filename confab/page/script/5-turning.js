@@ -89,7 +89,7 @@ class Turning {
         if (!answer.problem) { this.page.update({ ...this.page.data, alarm: undefined, ...answer }, this.page.data.steps.length > 0 || this.page.asked);
           this.page.asked = true; this.interventions(); }
       } catch (error) {
-        this.state.textContent = `nothing answers: ${error.message}`;
+        this.state.textContent = `the server doesn't answer: ${error.message}`;
         this.state.classList.add("bad");
       }
     }

@@ -14,7 +14,7 @@ const asking = (page) => {
         clear(out, made("p", { class: "note" }, `${answer.rows.length} row${answer.rows.length === 1 ? "" : "s"} in ${seconds} s`),
           made("div", { class: "scroll" }, made("table", {}, made("thead", {}, made("tr", {}, answer.columns.map((name) => made("th", { scope: "col" }, name)))), made("tbody", {}, lined(answer.rows, line, answer.columns.length || 1, MANY)))));
       }
-    } catch (error) { clear(out, made("p", { class: "bad", role: "alert" }, `nothing answers: ${error.message}`)); }
+    } catch (error) { clear(out, made("p", { class: "bad", role: "alert" }, `the server doesn't answer: ${error.message}`)); }
   };
   text.addEventListener("keydown", (event) => { if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) { event.preventDefault(); ask(); } });
   const choose = made("select", { "aria-label": "ready queries", onchange: () => { const one = ready[choose.value]; if (one) { text.value = one.text; ask(); } } },

@@ -24,7 +24,7 @@ const start = async (element) => {
   const link = served("");
   let data = null;
   while (!data) {
-    try { data = await link.json("GET"); } catch (error) { element.textContent = `nothing answers yet: ${error.message}`; await new Promise((done) => { setTimeout(done, 500); }); }
+    try { data = await link.json("GET"); } catch (error) { element.textContent = `waiting for the server: ${error.message}`; await new Promise((done) => { setTimeout(done, 500); }); }
   }
   document.title = data.title;
   const page = show(element, data, link);
@@ -39,7 +39,7 @@ const start = async (element) => {
       const next = await answer.json();
       version = next.version;
       page.update(next);
-    } catch { state.textContent = "over: nothing answers any more; this is what was seen last"; return; }
+    } catch { state.textContent = "The program has ended. The page shows the last state that it received."; return; }
   }
 };
 
