@@ -1,1 +1,1 @@
-"""Benchmarks whose results the documentation quotes; `python -m benchmarks` runs them."""
+"""Benchmarks whose results the documentation quotes, run by `python -m benchmarks`."""

@@ -125,7 +125,7 @@ def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
 
 
 def code() -> str:
-    """Return the identity of the committed code and bodies: Git's hashes of their contents."""
+    """Return Git's hashes of the committed files on which a rollout depends."""
     command = ["git", "rev-parse", *(f"HEAD:{path}" for path in MEASURED)]
     found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
     return "-".join(name[:7] for name in found)

@@ -44,7 +44,7 @@ CORRUPTED = 50
 MOST_STATES = 600
 """Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
 LIMITS = Limits(expansions=20_000, seconds=20.0)
-"""Limits of planning for problems that are values."""
+"""Limits of planning for problems without a scene file."""
 SAMPLE = 20
 """Number of reachable states that are changed to refute a certificate."""
 SECONDS = 20.0

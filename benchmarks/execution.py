@@ -55,8 +55,8 @@ def served(objects: int) -> Problem:
 def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
     """Return a plausible intervention in a state.
 
-    Of the two situation types with values on the first level, the type of places has a value of a lower level (in the hand). The
-    other type is the type of contents.
+    Two situation types of the first level have values: the places of objects and the contents of vessels. The type for places
+    has a value that exists only on lower levels, such as an object in the hand.
     """
     first = [s for s in problem.domain.situations.values() if s.level == 1 and not s.boolean]
     where = next(s for s in first if problem.value_levels.keys() & set(problem.classes[s.range]))
@@ -102,7 +102,7 @@ def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]
 
 
 def timed(intervention: Intervention, trial: Trial, position: int, inside: bool, second: float) -> Intervention:
-    """Return an intervention with a time, a second inside a primitive or after a step; goals change after steps."""
+    """Return an intervention that happens at a time inside a primitive or after a step; goals change only after steps."""
     if inside and intervention.of_world:
         return replace(intervention, at=second)
     return replace(intervention, after=trial.plan.primitives[position].path)
@@ -180,7 +180,7 @@ def physical() -> None:
 
 
 def physical_intervention(trial: Trial, seed: int) -> Intervention:
-    """Return the intervention of an episode in PyBullet, at a second for half of the episodes."""
+    """Return the intervention of an episode in PyBullet, which for half of the seeds may happen inside a primitive."""
     random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
     position = random.randrange(len(trial.plan.primitives))
     intervention = random_intervention(trial.problem, trial.states[position], random, kind)

@@ -10,8 +10,8 @@
     python -m benchmarks.figures NAME …     update the named blocks
 
 A block contains the output of its command, or the table of the stated number in the output. Several blocks may share a command,
-which is then run once. A block marked `prose` was edited by hand. Its new figures are written to confab-out/figures/NAME.md,
-for another edit by hand.
+which is then run once. A block marked `prose` was edited by hand. The new figures of a `prose` block are written to
+confab-out/figures/NAME.md, for another edit by hand.
 """
 
 from __future__ import annotations

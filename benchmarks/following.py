@@ -3,9 +3,9 @@
 python -m benchmarks following
 CONFAB_SIZES=66,333 …   numbers of cups; each scene has two places for each cup, and two rooms
 
-Cups stand at places of rooms. Three facts are derived: the room of a cup, a taken place, and a servable cup (clean and in the
-hall). They are defined by a property chain and two classes, or updated by the effects of each behaviour. A tenth of the cups must
-become servable. Calls of both forms alternate.
+Cups stand at places of rooms. Three situations are derived: the room of a cup, whether a place is taken, and whether a cup is
+servable (clean and in the hall). Either a property chain and two classes define these situations, or the effects of each
+behaviour update them. A tenth of the cups must become servable. Calls of both forms alternate.
 """
 
 from __future__ import annotations

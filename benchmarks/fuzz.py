@@ -5,10 +5,10 @@
     python -m benchmarks.fuzz --again memory:17        run one case again, and keep its files
     python -m benchmarks.fuzz --table                  print the table of docs/figures/promises.md
 
-A case is a door and a number, which is the seed of all random choices. A process with limits of time and memory runs `BATCH`
-cases one after the other. A case that breaks is run again in a separate process. ``fuzz-tried.json`` has the number of cases,
-and ``fuzz-seeds.txt`` has the cases that broke, with their corrections. `tests/confab/test_fuzz.py` runs these cases and some
-new cases.
+A case is a kind of input (a door) and a number, which is the seed of all random choices. A process with limits of time and
+memory runs `BATCH` cases one after the other. A case that breaks is run again in a separate process. ``fuzz-tried.json`` has
+the number of cases, and ``fuzz-seeds.txt`` has the cases that broke, with their corrections. `tests/confab/test_fuzz.py` runs
+these cases and some new cases.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ DOORS = {**broken_inputs.DOORS, **broken_worlds.DOORS}
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
 CASES, ROUND, BATCH = 100_000, 1_000, 100
 SECONDS, WAITING, MEGABYTES = 30, 600, 4_000
-"""Limits of a case: CPU seconds, seconds by the clock (for busy machines), and memory in megabytes."""
+"""Limits of a case in CPU seconds, in seconds by the clock (for busy machines), and in megabytes of memory."""
 TIME_IS_OVER = {signal.SIGPROF: f"{SECONDS} s of CPU time", signal.SIGALRM: f"{WAITING} s"}
 KEPT, ALIKE = 2, 70
 """Maximum number of kept cases with the same message, and number of characters compared."""
@@ -402,7 +402,7 @@ def table() -> None:
 
 
 def main() -> int:
-    """Run the requested cases; return 1 if one broke."""
+    """Run the requested cases; return 1 if a case broke."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int)
     parser.add_argument("--door", choices=DOORS, action="append")

@@ -83,7 +83,7 @@ def hopeless(meant: Interpreter) -> bool:
 
 
 def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before: set[str]) -> set[str] | None:
-    """Return the complaints with a changed text of a module: all, or the first new complaint; None if the process fails."""
+    """Return the complaints with a changed text of a module: all, or the first new complaint, or None if the process fails."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns about forks with threads

@@ -7,8 +7,8 @@
 
 The faults are mutations of cosmic-ray (`pip install cosmic-ray`). A separate process runs the module's tests with one fault
 until the first test fails. Mutations of annotations and docstrings are left out. ``mutants.json`` has the results, with a hash
-of the module. After a change of the module, its record begins again. A reader who finds that a survivor changes nothing moves
-its entry from ``survived`` to ``same``, with the reason.
+of the module. After a change of the module, its record begins again. The entry of a surviving fault that changes nothing is
+moved by hand from ``survived`` to ``same``, with the reason.
 """
 
 from __future__ import annotations
@@ -140,14 +140,14 @@ class Instead(Loader):
         self.name, self.file, self.text = within + file.removesuffix(".py").replace("/", "."), ROOT / file, text
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        """Return the specification of the module if the name is its name."""
+        """Return the import specification if `name` is the name of the module, otherwise None."""
         return spec_from_loader(name, self, origin=str(self.file)) if name == self.name else None
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Return None, so that Python creates the module."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Execute the other text in the module."""
+        """Execute the replacement text as the module."""
         module.__file__ = str(self.file)
         exec(compile(self.text, str(self.file), "exec"), module.__dict__)
 

@@ -34,13 +34,13 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres on short lines. It is less than `MARGIN`, since the load may have slipped after the ends were chosen."""
+"""Margin in metres on short lines. The margin is less than `MARGIN`, since the load may have slipped after the ends were chosen."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Minimum missing distance in metres of a pose that no level hand can take."""
+"""Distance out of reach, in metres, above which a pose was marked as impossible because the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
@@ -82,7 +82,7 @@ class Attempt:
 
     @classmethod
     def begin(cls, world: Engine, hand: str) -> Attempt:
-        """Return a new attempt of a hand."""
+        """Return a new attempt of a hand, with the present state of the world."""
         before = {}
         for name in world.bodies:
             carrier = world.carried_by(name)
@@ -190,7 +190,7 @@ class Attempt:
     ) -> None:
         """Drive the arm along sampled postures at a share `speed` of the hand's speed, or until `stop` returns true.
 
-        The path begins at the present posture. Its corners are rounded over `corners` samples.
+        The path begins at the present posture. The corners of the path are rounded over `corners` samples.
         """
         with self.planning():
             q, limits = np.concatenate([self.hand.posture[None], q[1:]]), self.limits

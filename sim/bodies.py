@@ -2,8 +2,8 @@
 
 `KINDS` maps each kind of shape to the function that creates the body in PyBullet, and to the cylinder that represents the body
 in motion planning. A vessel is a solid of revolution. The collision shape of a vessel is a bottom cylinder and a ring of flat
-boxes for each segment of the profile. Its visual shape is a smooth mesh. The origin of a body's frame is the middle of its
-base, with z up. Units are metres and kilograms.
+boxes for each segment of the profile. The visual shape of a vessel is a smooth mesh. The origin of a body's frame is the middle
+of its base, with z up. Units are metres and kilograms.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ SIDES = 40
 
 @dataclass(frozen=True)
 class ShapeKind:
-    """A kind of shape: `make` creates a body; `outer` and `height` return radius and height of the cylinder around a shape."""
+    """A kind of shape, with a function that creates a body, and functions for radius and height of the cylinder around a shape."""
 
     make: Callable[[int, Shape, Array, Array], int]
     outer: Callable[[Shape], float]

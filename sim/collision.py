@@ -92,7 +92,7 @@ class Surroundings:
         return sum(solid.kind != "cylinder" for solid in self.solids)
 
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
-        """Return the surroundings and the spheres of `owner`."""
+        """Return the surroundings with the spheres of `owner` added."""
         return replace(
             self,
             centers=np.concatenate([self.centers, spheres.centers]),

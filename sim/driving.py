@@ -73,7 +73,7 @@ class Roller:
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
-        """Return x, y and yaw of the base along poses; None if the robot collides with an obstacle."""
+        """Return x, y and yaw of the base along poses, or None if the robot collides with an obstacle."""
         q = poses[:, BASE]
         return q if self.free(q).all() else None
 

@@ -71,7 +71,7 @@ class Thing:
 
 @dataclass(frozen=True)
 class Bead:
-    """A small ball that represents a drop of a beverage; `filling` names the beverage."""
+    """A small ball that represents a drop of the beverage `filling`."""
 
     body: int
     filling: str
@@ -217,7 +217,7 @@ class Engine:
         return found - {""}
 
     def name_of(self, body: int, part: int) -> str:
-        """Return the name of a moving link `part` of a mechanism, or otherwise of the body; an empty string without a name."""
+        """Return the name of a mechanism's moving link `part`, or of the whole body; an empty string if the body has no name."""
         links = (name for name, one in self.links.items() if (one.body, one.joints.get(name)) == (body, part))
         return next(links, self.names.get(body, ""))
 
@@ -314,7 +314,7 @@ class Engine:
         return frame @ turned, origin + frame @ base
 
     def _cameras(self) -> Array:
-        """Return the positions (n, 3) of the scene's cameras; without any, of two cameras over the shoulders of each robot."""
+        """Return the positions (n, 3) of the scene's cameras, or by default of two cameras over the shoulders of each robot."""
         if self.embodiment.cameras:
             return np.array(self.embodiment.cameras)
         found = []
@@ -374,7 +374,7 @@ class Engine:
         return turned, origin + self.shift(self.links[name]) if sensed else origin
 
     def place(self, name: str, sensed: bool = False) -> Array:
-        """Return a place's present position (3,); with `sensed`, from the perceived pose of its carrier."""
+        """Return a place's present position (3,), given the true or, with `sensed`, the perceived pose of its carrier."""
         place = self.embodiment.places[name]
         turned, origin = self.carrier(place.carrier, sensed)
         point: Array = origin + turned @ np.array(place.position)

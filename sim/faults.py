@@ -210,7 +210,7 @@ def slippery(world: Engine, body: str, friction: float = 0.022) -> None:
 
 @fault
 def sealed(world: Engine, vessel: str, radius: float = 0.0235, height: float = 0.075) -> None:
-    """Put a ball into a vessel, too large for the vessel's neck, which blocks the neck when the vessel is tilted."""
+    """Put a ball that is larger than a vessel's neck into the vessel, where the ball blocks the neck during pouring."""
     rotation, base = world.truth(vessel)
     ball = pybullet.createMultiBody(
         0.01,
@@ -356,7 +356,7 @@ def lets_go(world: Engine, hand: str, step: int, seconds: float) -> None:
 
 @fault
 def arm_at(world: Engine, hand: str, point: tuple[float, float, float], yaw: float, step: int) -> None:
-    """Place an arm at once so that its hand is at a point and points along `yaw`."""
+    """Set an arm's joints directly, so that the hand is at a point and points along `yaw`."""
 
     def go(world: Engine) -> None:
         arm = world.hands[hand].arm

@@ -65,7 +65,7 @@ class Ways:
     swivel: Array
 
     def pick(self, i: int) -> Ways:
-        """Return the candidate of number `i`."""
+        """Return candidate number `i`."""
         return Ways(self.first[i : i + 1], self.last[i : i + 1], self.swivel[i : i + 1])
 
 

@@ -44,7 +44,7 @@ VIEWS = (
     *((around, DOWN) for around in (0.8, -0.8, 1.6, -1.6, 2.2, -2.2)),
     *((around, 0.08) for around in (1.6, -1.6, 2.2, -2.2)),
 )
-"""Cameras: radians around the tables, and the tangent of the angle downwards.
+"""Directions of cameras: the angle in radians around the tables, and the tangent of the downward angle.
 
 A primitive is shown by the camera that sees most of its objects.
 """

@@ -66,7 +66,7 @@ def knock(world: PhysicsWorld, name: str, numbers: Sequence[float] = ()) -> None
 
 
 def put_box(world: PhysicsWorld, name: str, place: str, size: Sequence[float]) -> None:
-    """Put a box that no fact mentions at a place; `size` is its width, depth and height in metres."""
+    """Put a box that no fact mentions at a place, with width, depth and height `size` in metres."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", 0.2, size[2] / 2, numbers=numbers, color=(0.8, 0.6, 0.4, 1.0))
     body = KINDS["box"].make(world.client, shape, world.place(place), np.array(UPRIGHT))

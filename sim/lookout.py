@@ -1,8 +1,8 @@
 """Discoveries of a live world: objects that no fact mentions, and spots that are no places of the scene.
 
 A *spot* is a new place for an object that stands at none of the scene's places, or a free place on the furniture at which an
-object can be put down. A spot belongs to the classes that all places of the scene share. Its static facts are those of the
-place beside the spot, and its reach facts are computed.
+object can be put down. A spot belongs to the classes that all places of the scene share. A spot has the static facts of the
+place beside the spot. The reach facts of a spot are computed.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ HEIGHTS = (0.06, 0.12, 0.18)
 
 @dataclass
 class Lookout:
-    """Discovers objects and spots in a world, and adds them to `problem`; `reaching` is the relation of reach facts or empty."""
+    """Discovers objects and spots in a world, and adds them to a problem with the relation of reach facts `reaching`, if any."""
 
     world: PhysicsWorld
     problem: Problem
@@ -145,7 +145,7 @@ class Lookout:
         return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
 
     def _covered(self, name: str, own: str) -> tuple[str, ...]:
-        """Return the places, except `own`, at which a thing leaves other objects no room by the margins of motion planning."""
+        """Return the places, except `own`, at which no other object fits beside a thing with the margins of motion planning."""
         world = self.world
         base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
         least = (

@@ -18,7 +18,7 @@ Measure = Callable[[Engine, str, str], "float | None"]
 
 
 def _pose(world: Engine, name: str) -> tuple[Array, Array] | None:
-    """Return the perceived rotation and base of a body, place or link; None if the pose is unknown."""
+    """Return the perceived rotation and base of a body, place or link, or None if the pose is unknown."""
     if name in world.embodiment.places:
         return np.eye(3), world.place(name)
     if name in world.links:
@@ -27,7 +27,7 @@ def _pose(world: Engine, name: str) -> tuple[Array, Array] | None:
 
 
 def _between(measure: Callable[[Engine, str, tuple[Array, Array], tuple[Array, Array]], float]) -> Measure:
-    """Return the measure of two individuals that calls `measure` with the world, the second individual's name and both poses."""
+    """Return a function of two individuals that calls `measure` with the world, the second individual's name and both poses."""
 
     def measured(world: Engine, one: str, other: str) -> float | None:
         poses = _pose(world, one), _pose(world, other)
@@ -99,7 +99,7 @@ def observe_measured(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
 
 
 def _hold(world: Engine, use: PerceiverUse, one: str, other: str) -> bool | None:
-    """Return whether all bounds hold between two individuals; None if a quantity can't be measured."""
+    """Return whether all bounds hold between two individuals, or None if a quantity can't be measured."""
     known = dict(use.numbers)
     if one in world.links and any(guard.quantity == "joint" for guard in use.holds):
         link = world.links[one].link(one)

@@ -129,7 +129,7 @@ def check(run: Run, phase: Phase, guard: Guard) -> None:
 
 
 def until(run: Run, phase: Phase) -> Callable[[], bool] | None:
-    """Return a function that tests whether a guard ends the motion of a phase; None if the phase has no such guard."""
+    """Return a function that tests whether a guard ends the motion of a phase, or None if the phase has no such guard."""
     if not phase.until:
         return None
     return lambda: any(_holds(run, guard)[0] for guard in phase.until)

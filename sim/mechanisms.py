@@ -20,7 +20,7 @@ from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, w
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the range from `opened` to the upper limit: a latching joint trips at the first, and is held at the second."""
+"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which its latch holds it."""
 
 
 SLIGHT = 0.0002
@@ -29,7 +29,7 @@ SLIGHT = 0.0002
 
 @dataclass
 class Mechanic:
-    """A mechanism in a physics world: PyBullet body, model at the zero posture, and number of each link's joint."""
+    """A mechanism in a physics world, with its PyBullet body, its model at the zero posture, and the numbers of its joints."""
 
     client: int
     body: int

@@ -27,7 +27,7 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
 def triangles(file: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Array:
-    """Return the triangles (n, 3, 3), in metres, of a mesh in an OBJ or STL file; `scale` converts the file's unit to metres.
+    """Return the triangles (n, 3, 3), in metres, of a mesh in an OBJ or STL file, given the `scale` of the file's unit.
 
     Raises
     ------

@@ -205,7 +205,7 @@ def polyline(corners: Array) -> Array:
 def connect(
     reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int = 400
 ) -> tuple[int, Array] | None:
-    """Return the number of a goal and the corner poses of a free path to it; None if none is found.
+    """Return the index of a goal and the corner poses of a collision-free path to the goal, or None if no path is found.
 
     The path is a line, a detour, or the result of RRT-Connect.
 
@@ -272,7 +272,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree by the free part of the line to `target`; return the new pose or None. Without `greedy`, it is limited."""
+    """Extend a tree along the free part of the line to `target`, unless `greedy` only a short way; return the new pose or None."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:
@@ -365,7 +365,7 @@ def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array,
 
 
 def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities at `rate` hertz along samples `q`; `rows` obey the speeds `top` and accelerations `most`."""
+    """Return positions and velocities at `rate` hertz along samples `q`, with `rows` within limits of speed and acceleration."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
     push = most / 2

@@ -136,7 +136,7 @@ def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the position to which a hand has moved: `raised`, an object, or a place.
+    """Return the position to which a hand has moved, which is `raised`, an object, or a place.
 
     Return None if the hand was stopped on its way, or if the object at its position has moved away without the hand.
     """

@@ -1,8 +1,8 @@
 """Pictures of the world without a screen or graphics card.
 
-PyBullet's software renderer draws the robot, furniture and solid objects. It has no translucency, and is slow with hundreds of
-small spheres. Therefore ray casting against PyBullet's depth image draws drops (spheres) and vessels (surfaces of revolution),
-in a fifth of the time. Lengths are in metres. Images are arrays (height, width, 3) of uint8.
+PyBullet's software renderer draws the robot, furniture and solid objects. The renderer has no translucency, and is slow with
+hundreds of small spheres. Therefore ray casting against PyBullet's depth image draws drops (spheres) and vessels (surfaces of
+revolution), in a fifth of the time. Lengths are in metres. Images are arrays (height, width, 3) of uint8.
 """
 
 from __future__ import annotations

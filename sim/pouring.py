@@ -47,9 +47,9 @@ SUFFICIENT = 0.9
 """Share of the wanted amount that suffices when the flow stops."""
 
 SURPLUS = 0.25
-"""Fraction of a serving that should stay in the source in addition to whole servings: half of the tolerance of rounding.
+"""Fraction of a serving that should stay in the source in addition to whole servings: half of the rounding tolerance.
 
-Too little can be corrected by another tilt. Too much can't be put back, and beads that are stuck in a neck come all at once.
+Another tilt can pour a missing amount. A surplus can't be put back, and beads that are stuck in a neck leave all at once.
 """
 
 
@@ -205,7 +205,7 @@ class _Way:
 
 
 def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
-    """Return the path of the roll about the lip from the present pose, to the side with the lip nearest to its goal."""
+    """Return the path of the roll about the lip from the present pose, to the side on which the lip is nearer to its goal."""
     now, angles = attempt.hand.pose, np.linspace(0.0, numbers["pour_angle"], 64)
     ways = []
     for side in SIDES:
@@ -230,7 +230,7 @@ def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]
 
 
 def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _Way:
-    """Return a path back on which the lip stays in place, or nearly in place if the arm can't reach the exact path."""
+    """Return a path that rolls back with the lip in place, or nearly in place if the arm can't reach the exact path."""
     for share in SHARES:
         moved = poses.copy()
         moved[:, :3] += share * shifts

@@ -30,9 +30,9 @@ CLOSING = 0.12
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """The object or place at which a hand is, and the target's position when the hand arrived; `point` is None for a raised hand.
+    """The object or place at which a hand is, and the target's position when the hand arrived; a raised hand has no position.
 
-    `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped on its way.
+    `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped during a motion.
     """
 
     target: str = ""

@@ -45,7 +45,7 @@ def require_screen() -> None:
 
 
 class Screen:
-    """The camera, caption and pace of a window; the argument `watch` of `confab.sim.verify.verify`, with ``gui=True``.
+    """Camera, caption and pace of PyBullet's window, to be passed to `confab.sim.verify.verify` as `watch` with ``gui=True``.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Visibility of bodies from cameras.
 
-A body is hidden if each camera sees too small a share of the body. The robot then believes its last known position. Rays are
-cast from each camera to points on the body's surface. Furniture, links and robots are always known, and beads are not checked.
+A body is hidden if each camera sees too small a share of the body. The robot then assumes the last known position of the body.
+Rays are cast from each camera to points on the body's surface. Furniture, links and robots are always known, and beads are not
+checked.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Sought:
-    """A body to look for: PyBullet number (-1 for a removed body), shape, true pose and believed pose."""
+    """A body to look for, with its PyBullet number (-1 for a removed body), shape, true pose and believed pose."""
 
     name: str
     body: int

@@ -24,7 +24,7 @@ ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""
 
 FLOWING = {"tilt", "stand_upright"}
-"""Skills that count spilled beads. Only one runs at a time, since a skill would also count the beads of another skill."""
+"""Skills that count spilled beads. Two such skills never run at once, since both would count the beads of the other skill."""
 
 LOOKING = 6
 """Number of simulation steps between checks for contact between the arms."""

@@ -41,8 +41,8 @@ AFTER = 1.0
 class Tape:
     """The commands of one hand.
 
-    A posture belongs to the simulation step that ends at its entry of `steps`. A gripper command or grasp has the number of the
-    step at whose beginning it holds. A grasp also has the name of the held object, and the object's rotation and base in the
+    `steps` has the number of simulation steps at which each posture was recorded. A gripper command or grasp has the number of
+    simulation steps at which it began. A grasp also has the name of the held object, and the object's rotation and base in the
     hand's frame.
     """
 

@@ -1,4 +1,4 @@
-"""Verification of a plan: its primitives are executed in a simulated world, and the perceived facts are compared."""
+"""Verification of a plan: its primitives are executed in a simulated world, and perceived facts must equal expected facts."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ LEVEL = 0.01
 """Maximum difference in metres between the height of a place and the base of an object that stands at the place."""
 
 MOVED = 0.03
-"""Distance in metres; a hand that is stopped after a longer motion counts as lost."""
+"""Length in metres of a motion after which a stopped hand counts as lost."""
 
 
 def point_of(world: Engine, name: str) -> Array:

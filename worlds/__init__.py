@@ -1,1 +1,1 @@
-"""Worlds for tests and benchmarks: problems as values, exhaustive searches of the problems, and independent programs."""
+"""Worlds for tests and benchmarks: random problems, exhaustive searches of the problems, and independent programs."""

@@ -3,7 +3,7 @@
 Derived predicates are arranged in strata. An axiom may use predicates of its own stratum, and the truth or negation of lower
 predicates. Axioms, preconditions, conditions of effects and goals contain random formulas over constants, equality and
 predicates with up to two arguments. A task is text, so that every planner parses it with its own parser. `Plain` evaluates the
-tasks directly by the semantics of PDDL. It selects reachable goals, and serves as an independent reference.
+tasks directly by the semantics of PDDL. `Plain` selects reachable goals, and serves as an independent reference.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Formulas:
         return self.rng.choice(free) if free and self.rng.random() < 0.93 else self.rng.choice(CONSTANTS[kind])
 
     def formula(self, bound: Mapping[str, str], depth: int = 2, helps: bool = True) -> str:
-        """Return a formula over bound variables; `helps` is true if the formula occurs positively."""
+        """Return a random formula over bound variables that occurs positively if `helps` is true, otherwise negatively."""
         rng, deeper = self.rng, depth - 1
         match rng.choice((*("atom",) * 8, "same", "and", "or", "not", "imply", "exists", "forall")):
             case "same":
@@ -169,7 +169,7 @@ def _said(row: Fact) -> str:
 
 
 class Plain:
-    """A plain evaluator of these domains, which tries all individuals and evaluates all axioms in every state."""
+    """A plain evaluator of PDDL tasks, which tries all individuals and evaluates all axioms in every state."""
 
     def __init__(self, domain: str) -> None:
         parts = parsed(domain)[2:]

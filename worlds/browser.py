@@ -1,4 +1,4 @@
-"""A browser for tests and pictures: Chromium, controlled over its DevTools pipe without a driver program."""
+"""A browser for tests and pictures, Chromium, which is controlled over its DevTools pipe without a driver program."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
 """Entailments of the reasoner HermiT, which are the reference for definitions.
 
-`python -m worlds.entailed` reads JSON from stdin: ``logic`` and ``states`` in Turtle, and the requested ``classes`` and
-``properties``. For each state the command prints the entailments ``[class, individual]`` and ``[property, one, other]``. The
-command runs in a separate process, since a JVM can't be stopped. `random_state` returns random states of `LOGIC`. In OWL an
-unstated fact may be true, in planning it is false, so `asserted` adds axioms that exclude further facts.
+The command `python -m worlds.entailed` reads a JSON object from stdin, with ``logic`` and ``states`` in Turtle, and with the
+requested ``classes`` and ``properties``. For each state the command prints the entailments ``[class, individual]`` and
+``[property, one, other]``. The command runs in a separate process, since a JVM can't be stopped. `random_state` returns random
+states of `LOGIC`. In OWL an unstated fact may be true, in planning it is false, so `asserted` adds axioms that exclude further
+facts.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def implies(head: str, *body: str) -> str:
 
 
 def two(filler: str, many: str) -> str:
-    """Return a qualified cardinality restriction; ``many`` is a text such as ``min 2``."""
+    """Return a qualified cardinality restriction for a text such as ``min 2``."""
     name, number = many.split()
     capital = "qualifiedCardinality" if name == "exactly" else f"{name}QualifiedCardinality"
     return f'owl:{capital} "{number}"^^xsd:nonNegativeInteger ; owl:onClass {filler}'

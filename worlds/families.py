@@ -1,4 +1,4 @@
-"""Tabletop problems of any size as values, for tests and benchmarks, of the families that `confab generate` writes."""
+"""Tabletop problems of any size, for tests and benchmarks, of the families that `confab generate` writes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAMILIES = ("served", "swap", "rotate", "full", "packed", "handover", "blocked")
 
 @lru_cache(maxsize=1)
 def tabletop() -> Problem:
-    """Return the problem of the shipped scene, which gives the domain and the classes."""
+    """Return the problem of the shipped scene, whose domain and classes the tables share."""
     return read(load("beverage-serving")).problem
 
 
@@ -32,7 +32,7 @@ def table(
     drinks: dict[str, str] | None = None,
     filled: dict[str, str] | None = None,
 ) -> Problem:
-    """Return a problem of a table; `at` has the numbers of the bottles' places, and then of the cups' places."""
+    """Return a problem of a table, on which bottles and then cups stand at the places numbered in `at`."""
     base = tabletop()
     bottle_names = tuple(f"bottle{i + 1}" for i in range(bottles))
     cup_names = tuple(f"cup{i + 1}" for i in range(cups))

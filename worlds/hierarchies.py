@@ -44,7 +44,7 @@ def hierarchy(seed: int) -> Problem:
 
 
 def states(problem: Problem) -> int:
-    """Return the number of combinations of values, reachable or not, without a separate count of what a hand holds."""
+    """Return the number of states, reachable or not, with a simplified count of what hands hold."""
     held = len(problem.classes["Hand"])
     return prod(
         2 if problem.domain.situations[s.situation].boolean

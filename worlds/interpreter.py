@@ -175,7 +175,7 @@ class Interpreter:
         return _joined([self.condition(one, terms, kinds) for one in conditions], "and", "True", "False")
 
     def some(self, conditions: Sequence[Condition], terms: Terms, kinds: Terms) -> str:
-        """Return the expression that a conjunction holds for some binding of its unbound variables."""
+        """Return the Python expression that is true if a conjunction holds for some binding of its unbound variables."""
         ways = [self.all_of(conditions, trial, kinds) for trial in self.bindings(conditions, kinds, terms)]
         return _joined(ways, "or", "False", "True")
 
@@ -350,7 +350,7 @@ class Interpreter:
                     yield "" if when == "True" else f" if {when}:", symbol, said
 
     def limits(self) -> Iterator[str]:
-        """Yield the expressions that sums and counts are within their bounds."""
+        """Yield Python expressions that are true if sums and counts are within their bounds."""
         for name, one in self.problem.domain.aggregates.items():
             quantity = self.kinds[name].quantity
             if one.kept and quantity is not None and (quantity.least, quantity.most) != (None, None):
@@ -358,7 +358,7 @@ class Interpreter:
                     yield self.limit(symbol, f"t[{self.slots[symbol]}]")
 
     def prevented(self) -> Iterator[str]:
-        """Yield the expressions that no step violates a constraint on a symbol that held before the step."""
+        """Yield Python expressions that are false if a step violates a constraint that held before the step."""
         for one in self.problem.domain.constraints.values():
             wanted = TRUE if one.always else FALSE
             for symbol, slot in self.slots.items():
@@ -366,7 +366,7 @@ class Interpreter:
                     yield f"t[{slot}] == {wanted!r} or s[{slot}] != {wanted!r}"
 
     def limit(self, symbol: Symbol, amount: str) -> str:
-        """Return the expression that an amount is within its bounds."""
+        """Return the Python expression that is true if an amount is within its bounds."""
         quantity = self.kinds[symbol.situation].quantity
         assert quantity is not None
         said = [
@@ -409,7 +409,7 @@ class Interpreter:
         return True
 
     def value(self, state: State, symbol: Symbol) -> Any:
-        """Return the value of a symbol in a state; None if the problem has no such symbol."""
+        """Return the value of a symbol in a state, or None if the problem has no such symbol."""
         return state[self.slots[symbol]] if symbol in self.slots else self.constants.get(symbol)
 
     def explored(self, level: int, most: int, rests: bool = True) -> Truth:

@@ -1,7 +1,7 @@
 """Planning of a small world in every mode, and comparison of the results with an exhaustive search.
 
-`worlds.interpreter` searches the problem as a value. The planner reads the same world from a scene file. Each call has its own
-limit of CPU time.
+`worlds.interpreter` searches the problem exhaustively. The planner reads the same world from a scene file. Each call has its
+own limit of CPU time.
 """
 
 from __future__ import annotations

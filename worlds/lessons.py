@@ -24,7 +24,7 @@ def as_it_is(text: str) -> str:
 
 
 def reading_of(text: str) -> Reading:
-    """Return the reading of a scene in Turtle."""
+    """Return a scene in Turtle as a `Reading`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(text)
@@ -35,7 +35,7 @@ def reading_of(text: str) -> Reading:
 def problem(
     family: str, objects: int, seed: int = 0, clutter: int = 0, edit: Callable[[str], str] = as_it_is, hands: int = 2
 ) -> Problem:
-    """Return the problem of a generated scene; `edit` changes the scene's Turtle."""
+    """Return the problem of a generated scene whose Turtle text the function `edit` may change."""
     return reading_of(edit(generate(family, objects, hands, clutter, seed))).problem
 
 

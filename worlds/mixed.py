@@ -1,9 +1,10 @@
 """Small random worlds that combine all constructs of domains.
 
-Situation types have one or several values per object, several arguments, or numbers, or are defined by rules or property axioms.
-Behaviours have one to three levels. Their effects may be conditional, and may concern named individuals or all members of a
-class. Rest values, values and situation types of lower levels, empty classes and unused individuals occur. Goals are drawn from
-one or several reachable states, or at random. Most worlds are small enough for an exhaustive search by `worlds.interpreter`.
+Situation types have one or several values per object, several arguments, or numbers, or are defined by rules or property
+axioms. Behaviours belong to one, two or three levels. Effects may be conditional, and may concern named individuals or all
+members of a class. Some worlds have rest values, values and situation types of lower levels, empty classes, or unused
+individuals. Goals are drawn from one or several reachable states, or at random. Most worlds are small enough for an exhaustive
+search by `worlds.interpreter`.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ EXCLUDED = 0.33
 """Share of worlds for which a goal that no reachable state satisfies is preferred."""
 TRIES = 8
 NEAR = 0.25
-"""Share of goals within one step that are kept."""
+"""Share of the goals reachable in one step that are kept."""
 AGGREGATED = 0.4
 """Share of worlds with derived sums, counts, maxima or minima."""
 ALTERNATIVES = 0.15
@@ -63,7 +64,7 @@ UPDATES = 0.15
 
 @dataclass(frozen=True)
 class RandomWorld:
-    """A problem as a value, with information on how its scene is written.
+    """A random problem, with information on how its scene is written.
 
     `pairs` are the situation types whose property takes several values. `owners` maps each situation type to the classes that
     have it. `axioms` has the property axioms that define situation types instead of rules. `updates` are the behaviours that are

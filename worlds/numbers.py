@@ -31,7 +31,7 @@ Next: TypeAlias = "Callable[[State], Iterator[tuple[Fraction, State]]]"
 
 
 def cheapest(start: State, after: Next, wanted: Callable[[State], bool]) -> Fraction | None:
-    """Return the least cost of a path to a goal state; None if no goal state is reachable."""
+    """Return the least cost of a path to a goal state, or None if no goal state is reachable."""
     best, waiting, count = {start: Fraction(0)}, [(Fraction(0), 0, start)], 0
     while waiting:
         spent, _, state = heapq.heappop(waiting)

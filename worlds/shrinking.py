@@ -183,7 +183,7 @@ def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
 
 
 def without_individual(world: RandomWorld, individual: str) -> RandomWorld | None:
-    """Return a world without an individual; None if the domain, the goal or a value refers to the individual."""
+    """Return a world without an individual, or None if the domain, the goal or a value refers to the individual."""
     problem = world.problem
     if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
         return None

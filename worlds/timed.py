@@ -150,7 +150,7 @@ def _drawn(rng: Random) -> TimedWorld:
 
 
 def least_makespan(world: TimedWorld) -> int | None:
-    """Return the least makespan of all plans; None if there is no plan.
+    """Return the least makespan of all plans, or None if there is no plan.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def _begun(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]
 def _passed(
     world: TimedWorld, facts: frozenset[int], running: frozenset[Running], order: tuple[int, ...]
 ) -> State | None:
-    """Return the state after one second in which actions end in an order; None if an action can't end."""
+    """Return the state after one second in which actions end in an order, or None if an action can't end."""
     left = frozenset((number, seconds - 1) for number, seconds in running)
     for number in order:
         action = world.actions[number]
@@ -291,7 +291,7 @@ def problem_of(world: TimedWorld) -> Problem:
 
 
 def rejected(world: TimedWorld, timed: TimedPlan) -> str | None:
-    """Return the fault of a timed plan in a world, found without the code of the plan checkers; None if the plan is valid."""
+    """Return the fault of a timed plan in a world, found without the code of the plan checkers, or None if the plan is valid."""
     if any(slot.begin.denominator != 1 for slot in timed.slots):
         return "a step begins between two seconds"
     for slot in timed.slots:

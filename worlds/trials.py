@@ -1,4 +1,4 @@
-"""Plans with the states before their primitives, and the rests of plans."""
+"""Plans with the states before their primitives, and the remaining steps of plans."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Enumeration of reachable states without code of the planner, as the reference for random tables.
 
-The plan checker's interpreter (`confab.planner.validation.BehaviorReader`) computes the effects of behaviours. It is called once
-for every combination of values of the symbols that it reads. Its results form a decision tree for each grounded behaviour, by
-which arrays of states are processed.
+The plan checker's interpreter (`confab.planner.validation.BehaviorReader`) computes the effects of behaviours. For every
+combination of values of the symbols that the interpreter reads, the interpreter is called once. The results form a decision
+tree for each grounded behaviour, by which arrays of states are processed.
 
 code    a state as one integer, with a field of bits for each symbol
 tree    maps the values of a symbol to trees; a leaf has the assigned values, or is None (not applicable)
@@ -61,7 +61,7 @@ class Asked(Facts):
 
 @dataclass
 class Node:
-    """A node of a decision tree, with the symbol that the interpreter reads next; `after` maps its values to trees."""
+    """A node of a decision tree, with the symbol that the interpreter reads next and a tree for each value of the symbol."""
 
     symbol: int
     known: NDArray[np.int8]

@@ -89,7 +89,7 @@ class _Walk:
         return end
 
     def as_said(self, level: int, before: State, said: State, end: State) -> bool:
-        """Return whether a refinement gives the symbols that a level sees the values that the step determines."""
+        """Return whether, after a refinement, all symbols visible on a level have the values that the refined step determines."""
         for slot in range(self.of.stated):
             symbol = self.of.symbols[slot]
             seen = self.problem.first_level(symbol) <= level

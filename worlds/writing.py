@@ -1,4 +1,4 @@
-"""Short functions that create parts of problems as values."""
+"""Short functions that create problems and their parts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from confab.reasoner.symbols import (
 
 
 def has(situation: str, *terms: str) -> ValueCondition:
-    """Return the condition that a situation type of all terms but the last has the last term as its value."""
+    """Return the condition that a situation type has the last term as its value for the other terms."""
     return ValueCondition(situation, terms[:-1], terms[-1])
 
 
@@ -31,7 +31,7 @@ def lacks(situation: str, *terms: str) -> ValueCondition:
 
 
 def becomes(situation: str, *terms: str, when: tuple[Condition, ...] = ()) -> ValueEffect:
-    """Return the effect that makes the condition of `has` true; `when` has the effect's conditions."""
+    """Return the effect that makes the condition of `has` true if the conditions `when` hold."""
     return ValueEffect(situation, terms[:-1], terms[-1], when)
 
 
@@ -43,7 +43,7 @@ def behavior(
     effects: Iterable[ValueEffect],
     variables: str = "",
 ) -> Behavior:
-    """Return a behaviour; terms are given in the form ``"?b:Book ?p:Place"``."""
+    """Return a behaviour with terms that are given in the form ``"?b:Book ?p:Place"``."""
 
     def parameters(text: str) -> tuple[Parameter, ...]:
         return tuple(Parameter(*term.split(":")) for term in text.split())
@@ -60,7 +60,7 @@ def world(
     relations: Mapping[str, Iterable[tuple[str, ...]]] = {},
     value_levels: Mapping[str, int] = {},
 ) -> Problem:
-    """Return a problem; facts are given in the form ``{"AT book": "shelf"}``."""
+    """Return a problem with facts given as a mapping of texts such as ``AT book`` to values such as ``shelf``."""
 
     def facts(stated: Mapping[str, str]) -> dict[Symbol, str]:
         return {Symbol(key.split()[0], tuple(key.split()[1:])): value for key, value in stated.items()}

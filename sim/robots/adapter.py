@@ -1,4 +1,4 @@
-"""The world of an external robot: an interface describes calls and readings, and a transport performs them.
+"""The world of an external robot; an interface describes calls and readings, and a transport performs them.
 
 Rule 1: only facts that the robot's world model shows are believed. Facts that the scene doesn't know are ignored.
 Rule 2: an action that exceeds its time limit, or that is stopped, is cancelled. The result of a cancelled action is ignored.
@@ -143,7 +143,7 @@ class InterfaceWorld:
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
-        """Stop the running action, which `execute` then cancels; if `execute` no longer waits, cancel the action here."""
+        """Stop the running action, which `execute` cancels while it waits, and `stop` itself otherwise."""
         with self.changed:
             self.stopping = self.running is not None
             abandoned = self.stopping and not self.waiting
@@ -229,7 +229,7 @@ class InterfaceWorld:
 
 
 def _amount(shown: Any, step: str | None) -> str | None:
-    """Return the text of a number as an amount, rounded down to a multiple of `step`; None if the number isn't finite."""
+    """Return the text of a number as an amount, rounded down to a multiple of `step`, or None if the number isn't finite."""
     if isinstance(shown, bool) or not isinstance(shown, int | float) or not math.isfinite(shown):
         return None
     exact = Fraction(str(shown))

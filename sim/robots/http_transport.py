@@ -3,10 +3,10 @@
 ========================  ===================================================  ==========================================
 request                   body                                                 answer
 ========================  ===================================================  ==========================================
-``GET  {address}/model``                                                       the world model: ``{entity: {field: …}}``
+``GET  {address}/model``                                                       the world model ``{entity: {field: …}}``
 ``POST {address}/action``  ``{"action": name, "arguments": {name: text}}``     ``{"status": text, "message": text}``, when
                                                                                the action has ended
-``POST {address}/cancel``  ``{}``                                              anything; ``/action`` then answers
+``POST {address}/cancel``  ``{}``                                              anything, and ``/action`` then answers
 ========================  ===================================================  ==========================================
 """
 
@@ -26,7 +26,7 @@ ANSWERS_WITHIN = 5.0
 """Maximum time in seconds until a server answers a request for its world model or a cancellation."""
 
 ACTION_WITHIN = 3600.0
-"""Seconds after which the connection of an action is closed. The time limit of the action usually ends it long before."""
+"""Seconds after which the connection of an action is closed. The time limit of the action usually ends the action much earlier."""
 
 MOST_BYTES = 20_000_000
 """Maximum size in bytes of an answer."""

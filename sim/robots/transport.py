@@ -14,7 +14,7 @@ class RobotError(Exception):
 
 
 class Transport(Protocol):
-    """The connection to a robot; `call` and `cancel` may run in different threads, and all other functions in one thread."""
+    """The connection to a robot. The functions `call` and `cancel` may run in different threads; all others run in one thread."""
 
     def call(self, action: str, arguments: Mapping[str, str]) -> tuple[str, str]:
         """Execute an action, and return its status and a message after its end; raise `RobotError` if there is no answer."""
