@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, terms
+from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, terms, times
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
@@ -29,13 +29,23 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "repeated-name": contradictions.repeated_names,
     "amount-out-of-reach": quantities.amounts_out_of_reach,
     "unit-mismatch": quantities.unlike_units,
+    "duration-unit": times.durations_in_other_units,
+    "window-too-short": times.windows_too_short,
     "product-of-amounts": quantities.multiplied_amounts,
     "conclusion-outside-class": definitions.conclusions_outside_class,
     "number-missing": quantities.numbers_missing,
     "defined": definitions.defined,
 }
 WARNINGS = frozenset(
-    {"axiom-not-watched", "crowded", "number-missing", "other-kind", "product-of-amounts", "repeated-name"}
+    {
+        "axiom-not-watched",
+        "crowded",
+        "number-missing",
+        "other-kind",
+        "product-of-amounts",
+        "repeated-name",
+        "window-too-short",
+    }
 )
 """Rules whose findings don't prevent planning."""
 REMARKS = frozenset({"defined"})

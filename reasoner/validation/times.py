@@ -1,0 +1,104 @@
+"""Validation rules on times: windows in which a behaviour doesn't fit, and durations that aren't in seconds."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
+from confab.reasoner.symbols import Behavior, Problem, Timing
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.vocabulary import CORE
+
+SECONDS = ("", "s", "sec", "second", "seconds")
+"""Notations of the unit of a duration; durations may have no unit."""
+
+
+def windows_too_short(case: Case) -> Iterator[Fault]:
+    """Find individuals none of whose windows is as long as a behaviour that names them."""
+    if case.reading is None or case.reading.problem.times is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    for individual, windows in case.reading.problem.times.windows.items():
+        closed = [high - low for low, high in windows if high is not None]
+        if len(closed) < len(windows):
+            continue
+        longest = max(closed)
+        for behavior in problem.domain.behaviors.values():
+            lasts = (behavior.timing or Timing()).duration
+            if isinstance(lasts, Fraction) and lasts > longest and _names(problem, behavior, individual):
+                yield (
+                    names.iri(individual),
+                    f"{individual} is available for at most {float(longest):g} s at a time; {behavior.name} takes {float(lasts):g} s",
+                    f"no plan contains {behavior.name} with {individual}",
+                    "make a :Window of it longer, or the :duration shorter",
+                )
+
+
+def _names(problem: Problem, behavior: Behavior, individual: str) -> bool:
+    """Return whether a step of a behaviour can have an individual as an argument or actor."""
+    actors = () if behavior.timing is None else behavior.timing.actors
+    kinds = [p.kind for p in behavior.parameters] + [
+        behavior.kinds[actor] for actor in actors if actor in behavior.kinds
+    ]
+    return individual in actors or any(individual in problem.members(kind) for kind in kinds)
+
+
+def durations_in_other_units(case: Case) -> Iterator[Fault]:
+    """Find calculated durations whose unit isn't the second."""
+    if case.reading is None:
+        return
+    reading = case.reading
+    units = {name: s.quantity.unit for name, s in reading.problem.domain.situations.items() if s.quantity}
+    units |= {reading.names.short(iri): node.get(CORE + "unit", [""])[0] for iri, node in reading.schema.nodes.items()}
+    for name, behavior in reading.problem.domain.behaviors.items():
+        duration = (behavior.timing or Timing()).duration
+        unit = None if duration is None else unit_of(duration, units)
+        if unit is not None and unit not in SECONDS:
+            yield (
+                reading.names.iri(name),
+                f"the duration of {name} is calculated in {unit}",
+                "durations are read as seconds",
+                "multiply by a number that leads from this unit to seconds, or correct a :unit",
+            )
+
+
+def unit_of(expression: Expression, units: Mapping[str, str]) -> str | None:
+    """Return the unit of an expression; None if a unit isn't stated, or a number of the expression may convert units.
+
+    >>> unit_of(Calculation("/", Measure("way", ()), Measure("speed", ())), {"way": "m", "speed": "m/min"})
+    'min'
+    """
+    powers = _powers(expression, units)
+    if powers is None:
+        return None
+    over, under = ("·".join(sorted(u for u, n in powers.items() for _ in range(sign * n))) for sign in (1, -1))
+    return f"{over or 1}/{under}" if under else over
+
+
+def _powers(expression: Expression, units: Mapping[str, str]) -> Mapping[str, int] | None:
+    """Return the powers of the basic units of an expression; None if they are unknown."""
+    match expression:
+        case Calculation(sign, left, right):
+            one, other = _powers(left, units), _powers(right, units)
+            if sign in "+-":
+                return one if other is None else other
+            if one is None or other is None:
+                return None
+            found = Counter(one)
+            for unit, power in other.items():
+                found[unit] += power if sign == "*" else -power
+            return {unit: power for unit, power in found.items() if power}
+        case Amount(name) | Measure(name):
+            stated = units.get(name, "")
+            if not stated:
+                return None
+            found = Counter[str]()
+            for place, part in enumerate(stated.split("/")):
+                for unit in filter(None, re.split(r"[*·\s]", part)):
+                    found[unit] += -1 if place else 1
+            return {unit: power for unit, power in found.items() if power and unit != "1"}
+        case Fraction():
+            return None
