@@ -31,7 +31,7 @@ def windows_too_short(case: Case) -> Iterator[Fault]:
             if isinstance(lasts, Fraction) and lasts > longest and _names(problem, behavior, individual):
                 yield (
                     names.iri(individual),
-                    f"{individual} is available for at most {float(longest):g} s at a time; {behavior.name} takes {float(lasts):g} s",
+                    f"{individual} is available for {float(longest):g} s at most; {behavior.name} takes {float(lasts):g} s",
                     f"no plan contains {behavior.name} with {individual}",
                     "make a :Window of it longer, or the :duration shorter",
                 )
