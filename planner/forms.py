@@ -1,4 +1,4 @@
-"""Exports of a plan: a graph of networkx, Graphviz' language, HTML."""
+"""Exports of a plan: a networkx graph, Graphviz text and HTML."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PLAN = {
     "to_dataframe()": "dataframe df to_pandas table",
     "to_records()": "json to_json to_dict as_dict dict to_list to_csv",
 }
-"""Attributes of a plan, and other names under which users look for them."""
+"""Attributes of a plan, each with other names that users try."""
 STEP = {
     "behavior": "name action operator action_name behaviour",
     "arguments": "args parameters params objects actual_parameters",
@@ -41,11 +41,14 @@ STEP = {
     "walk()": "iter traverse descendants",
     "id": "number index key",
 }
-"""Attributes of a step, and other names under which users look for them."""
+"""Attributes of a step, each with other names that users try."""
 
 
 def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
-    """Return a directed graph of paths with ``label``, ``level`` and ``id``; edges have a ``kind``, ``refines`` or ``then``."""
+    """Return a plan as a directed graph whose nodes are the paths of the steps.
+
+    Nodes have the attributes ``label``, ``level`` and ``id``. Edges have the attribute ``kind``: ``refines`` or ``then``.
+    """
     import networkx
 
     graph: networkx.DiGraph[Path] = networkx.DiGraph()
@@ -57,7 +60,10 @@ def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
 
 
 def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
-    """Yield the pairs of a step and its sub-step, and of a step and its successor."""
+    """Yield the edges of a plan's graph, each with its kind.
+
+    An edge leads from a step to a sub-step (``refines``) or to the next step (``then``).
+    """
     paths = {node.path for node in nodes}
     for *above, place in sorted(paths):
         path = (*above, place)
@@ -68,7 +74,7 @@ def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
 
 
 def dot(nodes: Sequence[Node]) -> str:
-    """Return Graphviz' text of a plan: sub-steps below their step, dashed arrows to the next step."""
+    """Return a plan as Graphviz text: sub-steps are drawn below a step, and dashed arrows lead to the next step."""
     lines = ["digraph plan {", "  node [shape=box, style=rounded];"]
     lines += [f"  {_named(node.path)} [label={_quoted(node.label)}];" for node in nodes]
     style = {"refines": "", "then": " [style=dashed, constraint=false]"}
@@ -85,7 +91,7 @@ def _quoted(text: str) -> str:
 
 
 def html(headline: str, nodes: Sequence[Node]) -> str:
-    """Return a plan as HTML: its steps as a collapsible tree."""
+    """Return a plan as HTML with a collapsible tree of steps."""
     above = {node.path[:-1] for node in nodes}
     parts, depth = [f"<div>{escape(headline)}"], 1
     for node in nodes:

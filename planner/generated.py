@@ -1,4 +1,4 @@
-"""Names of terms, keys and functions in generated Python, and its compilation."""
+"""Names of terms, keys and functions in generated Python code, and compilation of this code."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from types import CodeType
 
 
 def identifier(prefix: str, name: str) -> str:
-    """Return an ASCII identifier for a term, since Python identifies µ with μ; distinct terms get distinct identifiers."""
+    """Return an ASCII identifier for a term; distinct terms have distinct identifiers.
+
+    Identifiers are ASCII because Python treats some different Unicode letters, for example µ and μ, as equal.
+    """
     clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
     return f"{prefix}_{clean}"
 
@@ -20,16 +23,16 @@ def written(term: str) -> str:
 
 
 def tuple_written(items: Iterable[str]) -> str:
-    """Return the tuple of some expressions as a Python expression."""
+    """Return the Python expression of a tuple with the given elements."""
     return "(" + "".join(f"{item}, " for item in items) + ")"
 
 
 def key_written(arguments: Sequence[str]) -> str:
-    """Return the key of some terms as a Python expression."""
+    """Return the Python expression of the table key for the arguments of a symbol."""
     return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
 
 
 @lru_cache(maxsize=256)
 def code(source: str) -> CodeType:
-    """Return compiled source."""
+    """Return the compiled code of Python source."""
     return compile(source, "<compiled behaviours>", "exec")

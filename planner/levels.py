@@ -1,12 +1,12 @@
-"""Conditions that a plan violates where it leaves a level (docs/levels.md).
+"""Conditions of a level that a plan violates while steps of a lower level replace steps of this level (docs/levels.md).
 
-If no plan of a level can be refined, steps of the level below take the place of its steps. These steps satisfy the conditions
-of their own level, but may violate conditions of the level above ("a filled cup isn't moved"). This module lists the
-violations.
+If a level has no plan with refinements, steps of the level below replace the steps of the level. The lower-level steps satisfy
+the conditions of their level, but may violate conditions of the level above, such as "a filled cup isn't moved". This module
+lists the violations.
 
-An abandoned level is treated as an observer. It sees a change when a symbol of the level gets another value of the level; it
-doesn't see values in between (a cup in a hand). For each change that it sees and that persists, some behaviour of the level
-should have been applicable that makes the change, possibly together with the changes just before it.
+A level sees a change if a symbol of the level gets another value of the level. A level doesn't see intermediate values of lower
+levels, such as a cup in a hand. Each visible change that persists requires an applicable behaviour of the level that makes the
+change. The behaviour may also make the visible changes just before the change.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ from confab.reasoner.symbols import (
 )
 
 MOST_LACKING = 4
-"""Maximum number of conditions left out together to find the failing conditions of a behaviour."""
+"""Maximum number of conditions that are removed together to find the failing conditions of a behaviour."""
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return the runs of steps by which a valid plan leaves a level, with the conditions of the level that they violate.
+    """Return the runs of lower-level steps in a valid plan, each with the conditions that the run violates.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        One that `confab.planner.validation.validate` accepts.
+        A plan that `confab.planner.validation.validate` accepts.
     """
     return list(_Watch(problem).carried_out(plan.steps, 0))
 
 
 class _Watch:
-    """A plan under execution, as each level sees it."""
+    """The execution of a plan, with the state that each level sees."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.rules = BehaviorReader(problem)
         self.facts = Facts(problem, problem.initial)
         self.views = {level: Facts(problem, _seen(problem, level)) for level in problem.domain.levels}
-        self.left: dict[int, list[Broken]] = {}  # for each abandoned level, the violations so far
+        self.left: dict[int, list[Broken]] = {}  # the violations so far, by replaced level
         self.history: dict[
             int, list[tuple[Cell, str | None]]
-        ] = {}  # and the changes that it saw, with the values before
+        ] = {}  # the visible changes, with the values before, by replaced level
 
     def carried_out(self, steps: Sequence[Step], above: int) -> Iterator[Left]:
         level = next((level for level in self.problem.domain.levels if level > above), above)
@@ -73,7 +73,7 @@ class _Watch:
                 self.step(part[0])
 
     def broken(self, level: int) -> Iterator[Broken]:
-        """Yield the violations of a finished run of steps; a change that was undone doesn't count."""
+        """Yield the violations of a finished run of steps, except those of changes that the run undid."""
         before: dict[Cell, str | None] = {}
         for cell, old in self.history.pop(level):
             before.setdefault(cell, old)
@@ -100,7 +100,7 @@ class _Watch:
                     view.put(situation, arguments, value)
 
     def judged(self, level: int, step: Step, change: Fact) -> Iterator[Broken]:
-        """Yield the violation of a change, if no behaviour of the level could make the change in the current state."""
+        """Yield the violation of a change if no behaviour of the level could make the change in the current state."""
         best: Broken | None = None
         for behavior in self.problem.domain.at_level(level):
             for effect in behavior.every_effect:
@@ -115,10 +115,10 @@ class _Watch:
                 if best is None or len(asked) < len(best.conditions):
                     text = f"{change}: {' '.join((behavior.name, *arguments))} requires that {' and '.join(map(said, asked))}"
                     best = Broken(step.path, change, behavior.name, arguments, asked, text)
-        yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
+        yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level makes this change")
 
     def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
-        """Return the bindings of an effect's terms if the effect is this change."""
+        """Return the bindings with which an effect makes a change; None if there are none."""
         kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None
@@ -135,7 +135,7 @@ class _Watch:
     def could(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
     ) -> bool:
-        """Return whether a behaviour could make a change, alone or together with the changes just before it."""
+        """Return whether a behaviour could make a change, possibly together with the visible changes just before."""
         view = self.views[level]
         conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         if self.rules.satisfied(conditions, terms, kinds, view) is not None:
@@ -162,7 +162,7 @@ class _Watch:
         return possible
 
     def mixed(self, level: int, symbol: Symbol) -> Facts:
-        """Return the present state, except that one symbol has the value that the level saw last."""
+        """Return the current state in which one symbol has the last value that the level saw."""
         values = self.facts.state()
         seen = self.views[level].value(symbol.situation, symbol.arguments)
         return Facts(self.problem, values if seen is None else {**values, symbol: seen})
@@ -176,7 +176,10 @@ class _Watch:
         symbol: Symbol,
         most: int | None = None,
     ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return the fewest failing conditions of a behaviour, with individuals; more than `most` needn't be the fewest."""
+        """Return bindings of a behaviour's variables, and the smallest set of failing conditions.
+
+        A set of more than `most` conditions may not be the smallest.
+        """
         conditions = (*behavior.preconditions, *effect.when)
         views = self.mixed(level, symbol), self.views[level]
         return failing_conditions(self.rules, conditions, terms, behavior.kinds, views, most)
@@ -190,19 +193,22 @@ def failing_conditions(
     views: Sequence[Facts],
     most: int | None = None,
 ) -> tuple[Bindings, tuple[Condition, ...]]:
-    """Return the fewest conditions without which the others hold in one of some states, with individuals.
+    """Return the smallest set of failing conditions, and bindings with which the other conditions hold in one of the states.
 
-    Also return the bindings with which the others hold. If more than `most` conditions fail (`MOST_LACKING` by default), those
-    that fail by themselves in every state are returned.
+    If more than `most` conditions fail (`MOST_LACKING` by default), the set contains each condition that no individuals satisfy
+    in any of the states.
     """
 
     def gives(number: int) -> bool:
-        """Return whether a condition determines a variable; without it, the others would hold for individuals that don't exist."""
+        """Return whether a condition determines a variable.
+
+        Such a condition is removed last, because the other conditions could otherwise hold for nonexistent values.
+        """
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 
     def fewest(part: Sequence[int], facts: Facts, limit: int) -> tuple[int, ...] | None:
-        """Return the fewest of some conditions without which the rest of them hold, if they aren't more than a limit."""
+        """Return the smallest set of conditions in `part` without which the others hold; None if it exceeds `limit`."""
         for without in (c for size in range(min(len(part), limit) + 1) for c in combinations(part, size)):
             if rules.satisfied([conditions[i] for i in part if i not in without], terms, kinds, facts) is not None:
                 return without
@@ -228,7 +234,7 @@ def failing_conditions(
 
 
 def _independent(conditions: Sequence[Condition], order: Sequence[int], terms: Bindings) -> list[list[int]]:
-    """Return the numbers of conditions in groups without common variables; each group is ordered as given."""
+    """Return the positions of conditions in groups without common variables; each group has the given order."""
     groups: list[tuple[set[str], set[int]]] = []
     for number in order:
         free = {term for term in mentions(conditions[number]) if is_variable(term) and term not in terms}

@@ -36,11 +36,11 @@ class Status(Enum):
 @right_names("a step", "confab.planner.forms", "STEP")
 @dataclass(frozen=True)
 class Step:
-    """One behaviour of a plan, with the steps of the next level that refine it.
+    """One behaviour of a plan, with the steps of the next level that refine the behaviour.
 
-    `path` is the position in the tree; `bindings` are the individuals that the situation assigned to the behaviour's variables
-    (the object that GRASP grasps). `rank` is the cogency ranking score c_m of eq. (4) of the behaviour when it was chosen, if
-    computed.
+    `path` is the position of the step in the tree. `bindings` are the individuals that the situation assigns to the variables of
+    the behaviour, for example the object that GRASP grasps. `rank` is the cogency ranking score c_m of eq. (4) at the time when
+    the planner chose the behaviour; None if the score wasn't computed.
     """
 
     path: tuple[int, ...]
@@ -53,7 +53,7 @@ class Step:
     steps: tuple[Step, ...] = ()
 
     def walk(self) -> Iterator[Step]:
-        """Yield this step and all below it, each before its sub-steps."""
+        """Yield the step and all steps below it; each step comes before its sub-steps."""
         waiting = [self]
         while waiting:
             yield (step := waiting.pop())
@@ -67,7 +67,9 @@ class Step:
 @right_names("a plan", "confab.planner.forms", "PLAN")
 @dataclass(frozen=True, repr=False)
 class Plan(Sequence[Step]):
-    """A tree of steps that leads from one state to the goal; as a sequence, the steps of its first level.
+    """A tree of steps that leads from the initial state to the goal.
+
+    As a sequence, a plan contains the steps of its first level.
 
     Examples
     --------
@@ -90,7 +92,7 @@ class Plan(Sequence[Step]):
         return len(self.steps)
 
     def __bool__(self) -> bool:
-        """Return True: an empty plan is a plan, too."""
+        """Return True, because even a plan without steps is a plan."""
         return True
 
     @overload
@@ -100,7 +102,7 @@ class Plan(Sequence[Step]):
     def __getitem__(self, index: slice) -> tuple[Step, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Step | tuple[Step, ...]:
-        """Return one step of the first level, or several."""
+        """Return one step of the first level, or a slice of these steps."""
         return self.steps[index]
 
     def __repr__(self) -> str:
@@ -111,7 +113,7 @@ class Plan(Sequence[Step]):
         return "\n".join([f"Plan of {many} steps:", *(f"  {step}" for step in self.steps)])
 
     def walk(self) -> Iterator[Step]:
-        """Yield all steps, each before its sub-steps."""
+        """Yield all steps of the plan; each step comes before its sub-steps."""
         for step in self.steps:
             yield from step.walk()
 
@@ -121,7 +123,7 @@ class Plan(Sequence[Step]):
 
     @property
     def primitives(self) -> tuple[Step, ...]:
-        """The steps without sub-steps, which a robot executes."""
+        """The steps without sub-steps; a robot executes these steps."""
         return tuple(step for step in self.walk() if not step.steps)
 
     @property
@@ -131,22 +133,26 @@ class Plan(Sequence[Step]):
         return {level: levels.count(level) for level in sorted(set(levels))}
 
     def to_networkx(self) -> networkx.DiGraph[tuple[int, ...]]:
-        """Return the plan as a directed graph: a node for each step, by its path; edges to its sub-steps and to the next step.
+        """Return the plan as a directed graph whose nodes are the paths of the steps.
 
-        Nodes have ``label``, ``level`` and ``id``; an edge has a ``kind``, ``refines`` or ``then``.
+        Edges lead from each step to its sub-steps and to the next step. Nodes have the attributes ``label``, ``level`` and
+        ``id``. Edges have the attribute ``kind``: ``refines`` or ``then``.
         """
         from confab.planner.forms import digraph
 
         return digraph(self._nodes())
 
     def to_dot(self) -> str:
-        """Return the plan in Graphviz' language: sub-steps below their step, dashed arrows to the next step."""
+        """Return the plan as Graphviz text: sub-steps are drawn below a step, and dashed arrows lead to the next step."""
         from confab.planner.forms import dot
 
         return dot(self._nodes())
 
     def to_records(self) -> list[dict[str, object]]:
-        """Return one mapping per step, each step before its sub-steps: path, level, id, behavior, arguments, bindings."""
+        """Return a record for each step, with its path, level, ID, behaviour, arguments and bindings.
+
+        Each step comes before its sub-steps.
+        """
         return [
             {
                 "path": ".".join(map(str, step.path)),
@@ -160,7 +166,7 @@ class Plan(Sequence[Step]):
         ]
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return a pandas DataFrame with a row for each step, as in `to_records` (needs the extra `notebook`)."""
+        """Return a pandas DataFrame whose rows are the records of `to_records`; this needs the extra `notebook`."""
         import pandas
 
         return pandas.DataFrame(self.to_records())
@@ -178,7 +184,7 @@ class Plan(Sequence[Step]):
 
 @dataclass
 class Counts:
-    """Effort of a search: nodes generated, evaluated (scored) and expanded."""
+    """The effort of a search: the numbers of generated, evaluated (scored) and expanded nodes."""
 
     generated: int = 0
     evaluated: int = 0
@@ -193,7 +199,11 @@ class Counts:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why there is no plan: a sentence, its facts or terms, and the number of states if all states were examined."""
+    """The reason why a call returns no plan.
+
+    `text` is a sentence, and `terms` are the facts or terms in the sentence. `states` is the number of states if the planner
+    examined all states, otherwise zero.
+    """
 
     text: str
     terms: tuple[str, ...] = ()
@@ -205,12 +215,11 @@ OUT_OF_MEMORY = Reason("there isn't enough memory to go on")
 
 @dataclass(frozen=True)
 class Broken:
-    """A change for which a condition of the level above fails.
+    """A change by a lower-level step that no behaviour of the level above could make in the state.
 
-    `behavior` is the behaviour of that level that fails the fewest `conditions`.
-
-    `step` is the path of the primitive that makes the change. Without a behaviour: none of that level can make the change. `text`
-    is a sentence, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
+    `step` is the path of the primitive that makes the change. `behavior` is the behaviour of the level above with the fewest
+    failing `conditions`; None if no behaviour of the level has an effect that makes the change. `text` is a sentence, e.g.
+    ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
     """
 
     step: tuple[int, ...]
@@ -221,13 +230,16 @@ class Broken:
     text: str
 
     def __str__(self) -> str:
-        """Return it as a sentence."""
+        """Return the violation as a sentence."""
         return self.text
 
 
 @dataclass(frozen=True)
 class Left:
-    """A stretch of a plan below a level: the paths of its first and last steps, and the conditions that it violates."""
+    """A run of lower-level steps that replaces steps of a level.
+
+    `first` and `last` are the paths of the first and the last step; `broken` are the violated conditions of the level.
+    """
 
     level: int
     first: tuple[int, ...]
@@ -243,9 +255,9 @@ class Forgone:
     ----------
     fact : Fact
     weight : Fraction
-        The cost of leaving it unmet.
+        The cost of leaving the goal unmet.
     price : Fraction, optional
-        The additional cost of the plan that meets it, too; None if no such plan was found.
+        The additional cost of a plan that also meets the goal; None if no such plan was found.
     """
 
     fact: Fact
@@ -261,14 +273,14 @@ class Forgone:
 class Outcome:
     """The result of a planning call.
 
-    `plan` is present if and only if `status` is solved, `reason` if and only if it isn't. `search` counts per level, summed
-    over the calls at that level; `fallbacks` counts how often a level had no refinement for the level above; `hits` and
-    `misses` count the refinements found in the cache and those that had to be searched. `cost` is the cost of the plan if some
-    behaviour has a price; `bound` a lower bound on the cost of every lowest-level plan for the same goals, if proved; `engine`
-    the other planner that found the plan. `given_up` has the levels that were given up, each with its goal. `left` has the runs
-    of lower-level steps in the plan, with the conditions of the level above that they violate. `saving` is the cost per second
-    by which the plan was still getting cheaper in the end, None if it wasn't shortened. `certificate` proves that a task is
-    unsolvable; `confab.planner.solve` returns no such outcome without one. `forgone` has the soft goals that are left unmet.
+    If `status` is solved, the outcome has a `plan`; otherwise the outcome has a `reason`. `search` contains the effort of all
+    searches of each level. `fallbacks` counts how often a level had no refinement for the level above. `hits` counts refinements
+    found in the cache, and `misses` counts refinements found by search. `cost` is the cost of the plan if some behaviour has a
+    price. `bound` is a proved lower bound on the cost of every lowest-level plan for the same goals. `engine` names the external
+    planner that found the plan. `given_up` describes the levels that the planner gave up, each with its goal. `left` contains the
+    runs of lower-level steps in the plan, with the violated conditions of the level above. `saving` is the decrease of the plan's
+    cost per second at the end of shortening; None if the plan wasn't shortened. `certificate` proves that the task is unsolvable;
+    every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
     """
 
     status: Status
@@ -290,17 +302,18 @@ class Outcome:
 
     @property
     def unmet(self) -> frozenset[Symbol]:
-        """The symbols of the soft goals that are left unmet."""
+        """The symbols of the unmet soft goals."""
         return frozenset(one.fact.symbol for one in self.forgone)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a planning call: seconds for the whole call (None: no limit), expansions, and work.
+    """Limits of a planning call.
 
-    In the paper's mode expansions count per search; in the default mode they count over all searches before the last resort, and
-    separately for the last resort. Work limits only the last resort, in states times operators (about a microsecond each), and
-    only until a plan is found.
+    `seconds` limits the whole call; None means no limit. In the paper's mode, `expansions` limits each search. In the other
+    modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals together.
+    `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states times
+    operators, about a microsecond each.
     """
 
     expansions: int = 200_000
@@ -308,28 +321,27 @@ class Limits:
     work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
-        """Return the time, on the clock of `perf_counter`, at which a share of the remaining time is over; None without a limit.
+        """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`; None without a limit.
 
-        The remaining time ends with the seconds of these limits, or with the current deadline (`confab.reasoner.limits`) if
-        earlier.
+        The remaining time is the smaller of `seconds` and the time to the current deadline (`confab.reasoner.limits`).
         """
         left = min((seconds for seconds in (self.seconds, current().left) if seconds is not None), default=None)
         return None if left is None else perf_counter() + share * left
 
     def until(self, end: float | None) -> Limits:
-        """Return the same limits with the seconds left until a time, for a step of a longer call."""
+        """Return the limits with the seconds from now until the time `end`, for one part of a longer call."""
         return self if end is None else replace(self, seconds=max(end - perf_counter(), 0.0))
 
 
 class Planner(Protocol):
-    """A planning function within limits."""
+    """The interface of a planning function that respects limits."""
 
     def __call__(self, problem: Problem, /, *, limits: Limits) -> Outcome:
         """Return a plan, or the reason why there is none."""
 
 
 class UnsolvableError(Exception):
-    """A proof that there is no plan was found: the reason, and the certificate if there is one already."""
+    """The planner has proved that no plan exists; the error has the reason and, if available, the certificate."""
 
     def __init__(self, reason: Reason, certificate: Certificate | None = None) -> None:
         super().__init__(reason.text)
@@ -337,12 +349,15 @@ class UnsolvableError(Exception):
 
 
 class UngroundableError(Exception):
-    """A level can't be grounded: it is larger than allowed, or its amounts aren't linear; the message gives the cause."""
+    """A level can't be grounded, because the level is too large or its amounts aren't linear; the message gives the cause."""
 
 
 @contextmanager
 def paused_collection() -> Iterator[None]:
-    """Pause the garbage collector; reading and planning make no reference cycles, and collection took a third of their time."""
+    """Pause the garbage collector of Python while the context is active.
+
+    Reading and planning create no reference cycles, and garbage collection would take a third of their time.
+    """
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -353,12 +368,12 @@ def paused_collection() -> Iterator[None]:
 
 
 def changed(before: State, after: State) -> list[Fact]:
-    """Return the facts of `after` that `before` doesn't have, in order."""
+    """Return the sorted facts of `after` that `before` doesn't contain."""
     return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)
 
 
 def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
-    """Return steps with their paths counted from `first`."""
+    """Return steps with new paths; the first step below the path `above` has the number `first`."""
     return tuple(
         replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
         for i, step in enumerate(steps, first)

@@ -1,4 +1,8 @@
-"""Costs of plans, as the checker calculates them: each primitive's cost, or its price in the state before it."""
+"""Costs of plans, as the plan checker calculates them.
+
+A primitive whose behaviour has a price costs the price in the state before the primitive. Every other primitive costs the cost
+of its behaviour.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import Problem
 
 TRIFLE = 2.0**-20
-"""Cost added to each step when plans are compared, so that the shorter of two equally cheap plans is the cheaper one."""
+"""Cost added to each primitive when plans are compared; of two plans with equal costs, the shorter plan is then cheaper."""
 
 
 class Primitive(Protocol):
@@ -22,21 +26,21 @@ class Primitive(Protocol):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """The individuals of its parameters."""
+        """The individuals of the behaviour's parameters."""
 
 
 def cost_of(problem: Problem, plan: Plan) -> float:
-    """Return the cost of a plan's primitives."""
+    """Return the sum of the costs of a plan's primitives."""
     return sum(costs(problem, plan.primitives))
 
 
 def compared(problem: Problem, primitives: Sequence[Primitive]) -> float:
-    """Return what shortening minimises: the cost of primitives; among equal costs, their number."""
+    """Return the quantity that shortening minimises: the cost of primitives and, among equal costs, their number."""
     return sum(costs(problem, primitives)) + TRIFLE * len(primitives)
 
 
 def costs(problem: Problem, primitives: Sequence[Primitive]) -> list[float]:
-    """Return the cost of each primitive of a sequence, executed from the initial state."""
+    """Return the cost of each primitive of a sequence that starts in the initial state."""
     behaviors = [problem.domain.behaviors[step.behavior] for step in primitives]
     if all(behavior.price is None for behavior in behaviors):
         return [behavior.cost for behavior in behaviors]
@@ -50,13 +54,13 @@ def costs(problem: Problem, primitives: Sequence[Primitive]) -> list[float]:
 
 
 def in_circles(problem: Problem, plan: Plan) -> int:
-    """Return the number of superfluous primitives: those that lead from a state back to the same state.
+    """Return the number of superfluous primitives: primitives on a circle that leads from a state back to the same state.
 
-    Of nested circles only the outermost counts; steps that change more than they undo form no circle.
+    Only the outermost of nested circles counts. A sequence of primitives that leaves any symbol changed is no circle.
     """
     rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}
-    now, states = 0, [0]  # a state is the exclusive or of its facts' hashes
+    now, states = 0, [0]  # a state is represented by the exclusive or of the hashes of its facts
     for step in plan.primitives:
         for situation, key, value in (
             rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or ()
@@ -76,7 +80,7 @@ def in_circles(problem: Problem, plan: Plan) -> int:
 
 
 def costs_of_steps(problem: Problem, steps: Sequence[Step]) -> list[float]:
-    """Return the cost of each step, including all steps below it."""
+    """Return the cost of each step: the sum of the costs of the primitives below the step."""
     parts = [Plan((step,)).primitives for step in steps]
     each = iter(costs(problem, [step for part in parts for step in part]))
     return [sum(next(each) for _ in part) for part in parts]

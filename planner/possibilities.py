@@ -1,8 +1,8 @@
-"""Possible and necessary facts of a set of states of which only some values are known.
+"""Possible and necessary facts of a set of states whose values are only partly known.
 
-Conditions are evaluated with two bounds: `may` is true unless the condition is false in all of the states; `must` is true only
-if the condition holds in all of them. For a single, completely known state both bounds agree with `confab.planner.validation`.
-The checker of certificates depends on this module; no search does.
+Each condition has two bounds. The bound *may* is false only if the condition holds in no state of the set. The bound *must* is
+true only if the condition holds in every state of the set. For a single, completely known state, both bounds agree with
+`confab.planner.validation`. The checker of certificates uses this module; no search uses it.
 """
 
 from __future__ import annotations
@@ -51,48 +51,49 @@ Bound: TypeAlias = "Fraction | float"
 
 
 class WorkLimitError(Exception):
-    """A proof or a check needs more than the allowed work."""
+    """A proof or the check of a certificate needs more work than allowed."""
 
 
 class NoTimeLeftError(WorkLimitError):
-    """The deadline has passed."""
+    """The deadline has passed before the end of a proof or a check."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """The range of amounts of an expression; if `partial`, the expression may also have no value."""
+    """The range of an amount or an expression; if `partial`, the expression may have no value in some state."""
 
     low: Bound
     high: Bound
     partial: bool = False
 
     def hull(self, other: Range) -> Range:
-        """Return the smallest range that contains both."""
+        """Return the smallest range that contains both ranges."""
         return Range(min(self.low, other.low), max(self.high, other.high), self.partial or other.partial)
 
 
 LOOKS = 256
-"""Number of tests between two checks of the clock."""
+"""Number of tests between two looks at the clock."""
 ANYTHING = Range(-math.inf, math.inf, True)
 
 
 class Knowledge(Protocol):
-    """Knowledge about the symbols that exist and that behaviours change."""
+    """Interface of the knowledge about a set of states: the possible values of symbols that behaviours change."""
 
     def may(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol may have a value, that is, in some state."""
+        """Return whether a symbol may have the given value in some state."""
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol may have another value, that is, in some state."""
+        """Return whether a symbol may have a value other than the given value in some state."""
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the range of amounts of a symbol."""
+        """Return the range of the amount of a symbol over all states."""
 
 
 class Lowest:
-    """The lowest level of a problem, with its behaviours indexed by the symbols that they change.
+    """The lowest level of a problem, with its behaviours indexed by the situation types that they change.
 
-    `work` counts tests. `WorkLimitError` is raised when it exceeds `most`, `NoTimeLeftError` when the current deadline has passed.
+    `work` counts tests. `WorkLimitError` is raised when `work` exceeds `most`. `NoTimeLeftError` is raised when the current
+    deadline has passed.
     """
 
     def __init__(self, problem: Problem, most: float = math.inf) -> None:
@@ -120,18 +121,21 @@ class Lowest:
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
         self._inner: dict[int, tuple[Condition, ...]] = {}
         self._asked: dict[tuple[int, int], tuple[Condition, ...]] = {}
-        self._kept: list[object] = []  # keeps objects alive, so that no id is given twice
+        self._kept: list[object] = []  # keeps objects alive, so that Python reuses no id
 
     def spend(self, work: int = 1) -> None:
-        """Count work; raise `WorkLimitError` if it exceeds the limit."""
+        """Count work; raise `WorkLimitError` at the limit of work, and `NoTimeLeftError` after the deadline."""
         self.work += work
         if self.work > self.most:
             raise WorkLimitError(f"more than {self.most:.0f} tests")
         if self.work % LOOKS < work and perf_counter() > self.deadline:
-            raise NoTimeLeftError("more time than there is")
+            raise NoTimeLeftError("more time than is left")
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
-        """Return whether a symbol exists: it is stated, or it is boolean and its arguments are of the right classes."""
+        """Return whether a symbol exists.
+
+        A symbol exists if it has an initial value, or if it is boolean and its arguments belong to the right classes.
+        """
         if Symbol(situation, arguments) in self.problem.initial:
             return True
         kind = self.problem.domain.situations[situation]
@@ -151,7 +155,7 @@ class Lowest:
         return self.problem.domain.situations[situation].quantity
 
     def allowed(self, symbol: Symbol) -> Range:
-        """Return the range that the situation type of a symbol allows, extended by the initial amount."""
+        """Return the range that the situation type of a symbol allows, extended to contain the initial amount."""
         quantity, first = self.quantity(symbol.situation), number(self.initial(symbol))
         low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
         high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
@@ -206,10 +210,7 @@ class Lowest:
         return 5 + len(unknown)
 
     def asked(self, behavior: Behavior, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
-        """Return the preconditions of a behaviour and the conditions of an effect.
-
-        Parameters are bound before nested conditions.
-        """
+        """Return the preconditions of a behaviour, the conditions `when` of an effect, and the classes of the parameters."""
         key = id(behavior), id(when)
         if key not in self._asked:
             self._kept += [behavior, when]
@@ -218,7 +219,7 @@ class Lowest:
         return self._asked[key]
 
     def inside(self, witness: Witness) -> tuple[Condition, ...]:
-        """Return the conditions of a witness, including its class."""
+        """Return the conditions of a witness, including the class of its variable."""
         if id(witness) not in self._inner:
             self._kept.append(witness)
             self._inner[id(witness)] = (ClassCondition(witness.variable, witness.kind), *witness.conditions)
@@ -234,7 +235,7 @@ class Lowest:
 
 
 class Reading:
-    """Evaluates conditions and effects of the lowest level on a set of states, which it doesn't change."""
+    """Evaluation of conditions and effects of the lowest level on a fixed set of states."""
 
     def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
         self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
@@ -244,7 +245,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------- values
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
-        """Return whether a symbol may, or must, have a value."""
+        """Return whether a symbol has a value in every state if `must`; otherwise, whether it may have the value."""
         lowest = self.lowest
         lowest.spend()
         if not lowest.exists(situation, arguments):
@@ -275,7 +276,7 @@ class Reading:
         return False
 
     def between(self, situation: str, arguments: tuple[str, ...]) -> Range | None:
-        """Return the range of amounts of a symbol; None if the symbol doesn't exist."""
+        """Return the range of the amount of a symbol; None if the symbol doesn't exist."""
         if not self.lowest.exists(situation, arguments):
             return None
         symbol = Symbol(situation, arguments)
@@ -290,7 +291,10 @@ class Reading:
         return Range(max(known.low, total.low), min(known.high, total.high))
 
     def before(self, symbol: Symbol) -> Range | None:
-        """Return the range of an amount before an effect; that of a total without bounds isn't calculated, since it may change."""
+        """Return the range of an amount before an effect; None if the symbol doesn't exist.
+
+        The range of a total without bounds is taken from the knowledge, and not calculated by its definition.
+        """
         quantity = self.lowest.quantity(symbol.situation)
         free = symbol.situation in self.problem.domain.aggregates and quantity is not None and not quantity.bounded
         if free and self.lowest.exists(symbol.situation, symbol.arguments):
@@ -298,7 +302,10 @@ class Reading:
         return self.between(symbol.situation, symbol.arguments)
 
     def total(self, aggregate: Aggregate, arguments: tuple[str, ...]) -> Range:
-        """Return the range of a sum or a count by its definition: each solution that may hold may contribute its number."""
+        """Return the range of a sum or a count by its definition.
+
+        Solutions that must hold contribute their number. Solutions that may hold extend the range.
+        """
         key = aggregate.situation, arguments
         if key not in self._totals:
             conditions = self.lowest.over(aggregate)
@@ -315,7 +322,10 @@ class Reading:
         return self._totals[key]
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """Return whether an amount may, or must, satisfy a goal: a number, or bounds."""
+        """Return whether an amount satisfies a goal in every state if `must`; otherwise, whether it may satisfy the goal.
+
+        The goal is a number or a pair of bounds.
+        """
         found = self.between(symbol.situation, symbol.arguments)
         try:
             limits = bounds(wanted)
@@ -324,7 +334,10 @@ class Reading:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """Return whether a goal may, or must, hold; a symbol that doesn't exist counts as false."""
+        """Return whether a goal holds in every state if `must`; otherwise, whether the goal may hold.
+
+        A nonexistent symbol counts as false.
+        """
         if not self.lowest.exists(symbol.situation, symbol.arguments):
             return wanted == FALSE
         if self.lowest.quantity(symbol.situation) is not None:
@@ -334,7 +347,10 @@ class Reading:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """Return whether a condition may, or must, hold with the given individuals for its variables."""
+        """Return whether a condition holds in every state if `must`; otherwise, whether the condition may hold.
+
+        `env` contains the individuals of the variables.
+        """
         found: bool
         match condition:
             case ValueCondition(situation, arguments, value, negated):
@@ -366,7 +382,7 @@ class Reading:
     def solutions(
         self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
     ) -> Iterator[dict[str, str]]:
-        """Yield the bindings with which all conditions may, or must, hold."""
+        """Yield the bindings with which all conditions hold in every state if `must`; otherwise, may hold."""
         yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
 
     def _extended(
@@ -394,7 +410,7 @@ class Reading:
     def _candidates(
         self, condition: Condition, unknown: Sequence[str], env: dict[str, str], kinds: Mapping[str, str]
     ) -> Iterator[dict[str, str]]:
-        """Yield the bindings of unknown variables with which a condition may hold."""
+        """Yield bindings of the unknown variables; with any other binding, the condition certainly doesn't hold."""
         lowest, members = self.lowest, self.problem.members
         rows: Sequence[tuple[str, ...]] | None = None
         terms: tuple[str, ...] = ()
@@ -444,7 +460,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------ amounts
 
     def expression(self, expression: Expression, env: Env) -> Range | None:
-        """Return the range of an expression; None if it has no value."""
+        """Return the range of an expression; None if the expression has no value in any state."""
         match expression:
             case Amount(situation, arguments):
                 return self.between(situation, tuple(env.get(a, a) for a in arguments))
@@ -462,9 +478,9 @@ class Reading:
                 return Range(number, number)
 
     def amounts(self, behavior: Behavior, env: Env) -> dict[Symbol, tuple[Range, bool]] | None:
-        """Return the ranges of the amounts that a behaviour changes, and whether it certainly changes them.
+        """Return the ranges of the amounts that a behaviour may change, each with whether the change is certain.
 
-        None if the behaviour isn't applicable because some amount would violate its bounds.
+        Return None if the behaviour certainly isn't applicable, because an amount would have no value or violate its bounds.
         """
         after: dict[Symbol, tuple[Range, bool]] = {}
         for effect in behavior.amounts:
@@ -527,7 +543,7 @@ def variables(condition: Condition) -> set[str]:
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """Return whether a comparison holds for some pairs, or for all pairs, of amounts from two ranges."""
+    """Return whether a comparison holds for all pairs of amounts from two ranges if `must`; otherwise, for some pair."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):
@@ -541,7 +557,7 @@ def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
 
 
 def calculated(sign: str, one: Range, other: Range) -> Range | None:
-    """Return the range of an arithmetic operation on two ranges; None if it has no result."""
+    """Return the range of the results of an arithmetic operation on two ranges; None if there is no result."""
     partial = one.partial or other.partial
     if sign == "+":
         return Range(one.low + other.low, one.high + other.high, partial)

@@ -1,13 +1,14 @@
-"""Soft goals: which of them a plan achieves.
+"""The choice of the soft goals that a plan achieves.
 
-A soft goal has a weight, which is the cost of leaving it unmet. A choice of soft goals is worth the cost of a plan for the hard
-goals and the chosen ones, plus the weights of the others. `preferred` makes the choice by planning for some of them:
+The weight of a soft goal is the cost of leaving the goal unmet. The total cost of a choice of soft goals has two parts: the
+cost of a plan for the hard goals and the chosen soft goals, and the weights of the other soft goals. `preferred` searches for a
+choice with a small total cost:
 
-1. The hard goals alone: without a plan for them there is no plan.
-2. All soft goals; if they have no plan together, none of them.
-3. Each soft goal, the heaviest first, is added or dropped if that is cheaper, until no such change is.
-4. With `prove`, the choice is proved, and so are all choices that could be cheaper, in the order of the weights that they leave
-   unmet.
+1. Plan for the hard goals alone. If there is no plan for the hard goals, the task has no plan.
+2. Plan for all soft goals together. Start with the choice of all soft goals if there is a plan, otherwise with the empty choice.
+3. Add or drop one soft goal, the heaviest first, if the new choice is cheaper. Repeat until no such change is cheaper.
+4. If `prove` is given, compute a lower bound for the choice and for all choices that could be cheaper. Choices with a smaller
+   sum of unmet weights come first.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from confab.reasoner.symbols import Fact, Problem, Symbol
 Search: TypeAlias = "Callable[[Problem], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
-"""Maximum number of choices that are planned for to prove that no other one is cheaper."""
+"""Maximum number of choices with a separate plan in the proof that no other choice is cheaper."""
 PRECISION = 1_000_000
-"""Maximum denominator of the stated cost of meeting a soft goal, since plans' costs are sums of floating-point numbers."""
+"""Maximum denominator of the stated cost of meeting a soft goal; costs of plans are sums of floating-point numbers."""
 
 
 def preferred(problem: Problem, search: Search, prove: Search | None = None) -> tuple[Problem, Outcome]:
@@ -40,20 +41,20 @@ def preferred(problem: Problem, search: Search, prove: Search | None = None) -> 
     Parameters
     ----------
     problem : Problem
-        Its soft goals are those with weights.
+        A problem whose soft goals have weights.
     search : callable
-        Plans for the goals of a problem.
+        Function that plans for the goals of a problem.
     prove : callable, optional
-        Plans for the goals of a problem and proves a lower bound on the cost of a plan. If given, all choices that could be
-        cheaper are tried, at most `MOST_CHOICES`.
+        Function that plans for the goals of a problem and proves a lower bound on the cost of a plan. With this function,
+        `preferred` tries all choices that could be cheaper, at most `MOST_CHOICES`.
 
     Returns
     -------
     Problem
-        The task without the goals that are left unmet; without soft goals, the same task.
+        The task without the unmet soft goals.
     Outcome
-        Of planning for it; `forgone` has the soft goals that are left unmet. With `prove`, its bound is a lower bound on the cost
-        of a plan with the weights that it leaves unmet, less the weights that this plan leaves unmet.
+        The result of planning for the returned task; `forgone` contains the unmet soft goals. With `prove`, `bound` is a lower
+        bound on the total cost of any choice, minus the unmet weights of the returned plan.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)
@@ -70,7 +71,7 @@ def preferred(problem: Problem, search: Search, prove: Search | None = None) -> 
 
 
 class _Choices:
-    """The plans for some choices of soft goals."""
+    """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans."""
 
     def __init__(self, problem: Problem, search: Search, prove: Search | None) -> None:
         self.problem, self.search, self.prove, self.weights = problem, search, prove, problem.weights
@@ -78,11 +79,14 @@ class _Choices:
         self.bounds: dict[Goals, Fraction | None] = {}
 
     def task(self, kept: Goals) -> Problem:
-        """Return the task with these soft goals as hard goals, and without the others."""
+        """Return the task with the chosen soft goals as hard goals, and without the other soft goals."""
         return self.problem.only(self.weights.keys() - kept)
 
     def outcome(self, kept: Goals) -> Outcome:
-        """Plan for a choice; a search that the time limit ends has given up, except the first search."""
+        """Return the outcome of planning for a choice.
+
+        If a limit ends a search, the outcome is that the planner gave up. The first search raises `LimitError` instead.
+        """
         if kept not in self.outcomes:
             try:
                 self.outcomes[kept] = self.search(self.task(kept))
@@ -93,7 +97,10 @@ class _Choices:
         return self.outcomes[kept]
 
     def least(self, kept: Goals) -> Fraction | None:
-        """Return a proved lower bound on the cost of a plan for a choice, None if there is no plan; keep the cheapest plan."""
+        """Return a proved lower bound on the cost of a plan for a choice; None if there is no plan.
+
+        The method stores the cheapest plan for the choice.
+        """
         if kept not in self.bounds:
             known = proved = self.outcome(kept)
             if self.prove is not None and known.status is not Status.UNSOLVABLE:
@@ -105,7 +112,7 @@ class _Choices:
         return self.bounds[kept]
 
     def cost(self, kept: Goals) -> Fraction | None:
-        """Return the cost of a plan for a choice; None if none was found."""
+        """Return the cost of the plan for a choice; None if no plan was found."""
         found = self.outcome(kept)
         return None if found.plan is None else self.price(found)
 
@@ -115,25 +122,25 @@ class _Choices:
         return Fraction(cost_of(self.problem, found.plan))
 
     def total(self, kept: Goals) -> Fraction | None:
-        """Return the cost of a plan for a choice, with the weights that it leaves unmet."""
+        """Return the total cost of a choice: the cost of its plan plus the unmet weights; None if no plan was found."""
         cost = self.cost(kept)
         return None if cost is None else cost + self.unmet(kept)
 
     def unmet(self, kept: Goals) -> Fraction:
-        """Return the sum of the weights of the goals that aren't chosen."""
+        """Return the sum of the weights of the soft goals that aren't chosen."""
         return sum((weight for symbol, weight in self.weights.items() if symbol not in kept), Fraction(0))
 
     def cheaper(self, one: Goals, other: Goals) -> bool:
-        """Return whether the plan for a choice costs less than the plan for another choice."""
+        """Return whether the total cost of a choice is less than the total cost of another choice."""
         first, second = self.total(one), self.total(other)
         return first is not None and (second is None or first < second)
 
     def by_weight(self) -> list[Symbol]:
-        """Return the soft goals, the lightest first."""
+        """Return the soft goals sorted by weight, the smallest weight first."""
         return sorted(self.weights, key=lambda symbol: (self.weights[symbol], symbol))
 
     def settled(self, kept: Goals) -> Goals:
-        """Return a choice that no single goal, added or dropped, makes cheaper."""
+        """Return a choice that doesn't become cheaper by adding or dropping a single soft goal."""
         found = None
         while found != kept:
             found = kept
@@ -143,9 +150,10 @@ class _Choices:
         return kept
 
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
-        """Return the cheapest choice that is found from a choice, and a lower bound on the cost of any choice.
+        """Return the cheapest choice found, at least as cheap as `best`, and a lower bound on the total cost of any choice.
 
-        More goals never make the cheapest plan cheaper, so the bound for the hard goals alone is a bound for all choices.
+        An additional goal never makes the cheapest plan cheaper. Therefore the bound for the hard goals alone is a lower bound
+        on the cost of a plan for any choice.
         """
         self.least(best)
         cheapest, bounds = self.least(Goals()) or Fraction(0), list[Fraction]()
@@ -162,7 +170,7 @@ class _Choices:
         return best, min(bounds)
 
     def ascending(self) -> Iterator[Goals]:
-        """Yield all choices, in the order of the weights that they leave unmet."""
+        """Yield all choices, sorted by the sum of the unmet weights, the smallest sum first."""
         order = self.by_weight()
         waiting: list[tuple[Fraction, tuple[int, ...]]] = [(Fraction(0), ())]
         while waiting:
@@ -173,9 +181,9 @@ class _Choices:
                 heapq.heappush(waiting, (unmet + self.weights[order[i]], (*dropped, i)))
 
     def result(self, kept: Goals, least: Fraction | None = None) -> tuple[Problem, Outcome]:
-        """Return the task of a choice and its outcome, with the goals that it leaves unmet and what each would cost.
+        """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each.
 
-        `least` is a lower bound on the cost of any choice.
+        `least` is a lower bound on the total cost of any choice.
         """
         outcome = self.outcome(kept)
         assert outcome.plan is not None
@@ -191,5 +199,5 @@ class _Choices:
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
 
     def met(self, symbol: Symbol, plan: Plan) -> bool:
-        """Return whether a soft goal holds at the end of a plan, though the plan was made without it."""
+        """Return whether a soft goal that isn't chosen holds at the end of a plan."""
         return not validate(self.task(Goals({symbol})), plan)

@@ -1,17 +1,17 @@
-"""A planning call, top to bottom: a mode proves and searches, the checker validates, and abandoned levels are reported.
+"""A planning call: a mode searches for a plan or a proof, and a checker validates the result.
 
 =========  ==========================================================  ================================
 mode       how it plans                                                module
 =========  ==========================================================  ================================
-guarded    goals in series; rules of proven benefit propose steps      `confab.planner.experience.advice`
-leading    the same; rules propose steps regardless of their record    `confab.planner.experience.advice`
-strict     the same; rules propose no steps                            `confab.planner.experience.advice`
+guarded    goals in series; rules with a good record propose steps     `confab.planner.experience.advice`
+leading    goals in series; all rules propose steps                    `confab.planner.experience.advice`
+strict     goals in series; rules propose no steps                     `confab.planner.experience.advice`
 optimal    shortened until a lower bound is met, without memory         `confab.planner.hierarchical.bounds`
 paper      A* with eq. (5) on each level                                `confab.planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-Every returned plan was accepted by `confab.planner.validation`, every "unsolvable" by
-`confab.planner.certificate_checks`. These share no code with any search.
+`confab.planner.validation` has accepted every returned plan. `confab.planner.certificate_checks` has accepted the certificate
+of every unsolvable outcome. These two modules share no code with any search.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ DEFAULT_MODE: Mode = "guarded"
 
 
 class RejectedPlanError(Exception):
-    """The checker rejects a plan that a search returned: an internal error. The message names the step and the mode."""
+    """The plan checker rejects a plan that a search returned; this is an internal error.
+
+    The message names the step and the mode.
+    """
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,13 @@ class Request:
         A key of `MODES`.
     limits : Limits
     memory : Memory, optional
-        Experience, for the modes that use it.
+        The experience for the modes guarded, leading and strict.
     links : Links, optional
-        The paper's memory, for the paper's mode.
+        The confabulation memory for the paper's mode.
     grounds : mapping of level to quantified behaviours, optional
-        For the paper's mode; quantified from the problem's classes if left out.
+        The quantified behaviours for the paper's mode; by default the arguments are computed from the problem's classes.
     leave_levels : bool
-        Whether steps of a lower level may take the place of a level that has no refinable plan.
+        Whether steps of a lower level may replace steps of a level that has no plan with refinements.
     """
 
     problem: Problem
@@ -72,7 +75,7 @@ class Request:
 
 
 def solve(request: Request) -> Outcome:
-    """Plan, and return the outcome; a plan is checked before it is returned.
+    """Return the outcome of a planning call after a check of the plan or the certificate.
 
     Parameters
     ----------
@@ -83,7 +86,7 @@ def solve(request: Request) -> Outcome:
     ValueError
         The mode doesn't exist.
     RejectedPlanError
-        The checker rejects the steps that a search found. This is an internal error, and no answer to the request.
+        The plan checker rejects the steps that a search found; this is an internal error.
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
@@ -109,7 +112,7 @@ def solve(request: Request) -> Outcome:
         outcome = replace(outcome, cost=cost_of(request.problem, plan))
     first = request.problem.domain.levels[0]
     if all(step.level == first for step in plan.steps):
-        return outcome  # no level is left: nothing to tell
+        return outcome  # no run of lower-level steps to report
     return replace(outcome, left=tuple(levels_left(request.problem, plan)))
 
 
@@ -148,7 +151,7 @@ def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableE
     proof = impossible(problem, PAIRS if states else AT_ONCE, deadline)
     if proof is not None or not states:
         return proof
-    with suppress(OutOfTimeError):  # then no proof was found in time
+    with suppress(OutOfTimeError):  # no proof within the deadline
         try:
             task = proved(problem, problem.domain.levels[-1], deadline)
         except UnsolvableError as proof:

@@ -1,17 +1,17 @@
 """A state as a table that is changed in place, and Python code generated for conditions and effects.
 
-now      the state: situation type → key → value. The key is the individual, or the tuple of individuals of a type with several
-         arguments
-holders  situation type → value → the keys that have the value, in order of assignment; not kept for `FALSE`
-trail    the overwritten values, oldest first; `undo` restores the values since a mark
-age      number of changes, including undone ones; values derived from the table are valid as long as its age is the same
+now      the state: situation type → key → value; a key is an individual, or a tuple if the symbol has several arguments
+holders  situation type → value → the keys that have the value, in order of assignment; `FALSE` has no entry
+trail    the overwritten values, oldest first; `undo` restores the values at a mark
+age      number of changes, including undone changes; results derived from the table are valid while the age is the same
 
-The table doesn't hold defined situations: ``now`` derives them when they are read (`confab.planner.derived_facts`).
+The table contains no defined situations. ``now`` derives a defined situation when its value is read
+(`confab.planner.derived_facts`).
 
-Copying a state would take time in the size of the world; a change and its undoing take a microsecond in any world. A condition
-becomes one Python expression over `now` and `holders`. A behaviour becomes a function ``forward(arguments)`` that returns the
-values of its variables and its changes, or None if it isn't applicable. A new kind of condition gets a case in
-`PythonWriter.expression`.
+The time to copy a state would grow with the size of the world. A change and its undoing take a microsecond in any world. A
+condition becomes one Python expression over `now` and `holders`. A behaviour becomes a function ``forward(arguments)``. This
+function returns the individuals of the behaviour's variables and the changes, or None if the behaviour isn't applicable.
+`PythonWriter.expression` has a case for each kind of condition.
 """
 
 from __future__ import annotations
@@ -45,27 +45,27 @@ from confab.reasoner.symbols import (
 
 Key: TypeAlias = "str | tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Key]"
-"""A symbol in a table: situation type and key."""
+"""A cell of a table: the situation type and the key of a symbol."""
 Change: TypeAlias = "tuple[str, Key, str]"
-"""A changed cell with the values before and after."""
+"""A change: the situation type and the key of a symbol, and the new value."""
 Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
-"""The net changes of cells: the values before and after."""
+"""The net changes of cells: a mapping of cells to the values before, and a mapping of cells to the values after."""
 Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
-"""Returns the individuals of a behaviour's variables, and its changes."""
+"""Function of arguments that returns the individuals of a behaviour's variables and the behaviour's changes."""
 
 
 def key_of(arguments: tuple[str, ...]) -> Key:
-    """Return the key of a symbol's arguments."""
+    """Return the table key for the arguments of a symbol."""
     return arguments[0] if len(arguments) == 1 else arguments
 
 
 def arguments_of(key: Key) -> tuple[str, ...]:
-    """Return the arguments of a key."""
+    """Return the arguments of a symbol with the given table key."""
     return (key,) if isinstance(key, str) else key
 
 
 class Table:
-    """A state in place.
+    """A state that is changed in place, with a log of overwritten values.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Table:
                 self.holders[symbol.situation].setdefault(value, {})[key] = None
 
     def put(self, situation: str, key: Key, value: str) -> None:
-        """Set the value of a symbol, and record the old one."""
+        """Set the value of a symbol, and record the old value."""
         self.age += 1
         cells = self.now[situation]
         old = cells.get(key, FALSE)
@@ -108,7 +108,7 @@ class Table:
             self.put(situation, key, value)
 
     def undo(self, mark: int) -> None:
-        """Undo all changes since the trail had the length `mark`."""
+        """Undo all changes that were made after the trail had the length `mark`."""
         trail = self.trail
         while len(trail) > mark:
             situation, key, old = trail.pop()
@@ -116,34 +116,34 @@ class Table:
             trail.pop()
 
     def before(self, mark: int) -> dict[Cell, str]:
-        """Return the cells touched since a mark, with their values at the mark."""
+        """Return the cells set since a mark, with their values at the mark."""
         found: dict[Cell, str] = {}
         for situation, key, old in self.trail[mark:]:
             found.setdefault((situation, key), old)
         return found
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the net changes since a mark, with the present values."""
+        """Return the cells whose values differ from those at a mark, with their current values."""
         now = self.now
         return {cell: now[cell[0]][cell[1]] for cell, old in self.before(mark).items() if now[cell[0]][cell[1]] != old}
 
     def changes(self, mark: int) -> Changes:
-        """Return the net changes since a mark, with the values at the mark and the present ones."""
+        """Return the net changes since a mark: the values at the mark, and the current values."""
         before, after = self.before(mark), self.since(mark)
         return {cell: before[cell] for cell in after}, after
 
     def state(self) -> dict[Symbol, str]:
-        """Return the state as a value, for callers outside of the search."""
+        """Return the state as a mapping of symbols to values."""
         return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
 
 
 class PythonWriter:
-    """Writes conditions and behaviours of one problem as Python over the dictionaries of a table.
+    """Writer of the conditions and behaviours of one problem as Python code over the dictionaries of a table.
 
     Parameters
     ----------
     problem : Problem
-        Its initial state and goal aren't used.
+        The problem; its initial state and goal aren't used.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -156,7 +156,10 @@ class PythonWriter:
         }
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
-        """Return a function of a table's `now` and `holders` (and further given names) that runs lines and returns a result."""
+        """Return a function that executes the given lines and returns the expression `result`.
+
+        The parameters of the function are `now` and `holders` of a table, and the names in `given`.
+        """
         body = [f"    {line}" for line in (*lines, f"return {result}")]
         text = "\n".join(body)
         names = [f"    {name} = {table}" for name, table in self._tables.items() if name in text]
@@ -164,7 +167,7 @@ class PythonWriter:
         return self.constants.pop("bind")  # type: ignore[return-value]
 
     def forward(self, behavior: Behavior) -> Iterator[str]:
-        """Yield the lines that define the function of a behaviour and put it into `forward`."""
+        """Yield the lines that define the function of a behaviour and store the function in `forward`."""
         kinds = behavior.kinds
         parameters = [p.name for p in behavior.parameters]
         bound = set(parameters)
@@ -202,7 +205,10 @@ class PythonWriter:
         yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
 
     def priced(self, behavior: Behavior) -> Iterator[str]:
-        """Yield the line that puts the cost function of a behaviour into `prices`; its variables follow its parameters."""
+        """Yield the line that stores the cost function of a behaviour in `prices`, if the behaviour has a price.
+
+        The arguments of the cost function are the individuals of the behaviour's parameters and variables.
+        """
         if behavior.price is not None:
             terms = [*(p.name for p in behavior.parameters), *(f"?{name}" for name in self.variables[behavior.name])]
             price = amount(behavior.price, self.problem.relations, self.constant)
@@ -211,12 +217,15 @@ class PythonWriter:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
     ) -> list[str]:
-        """Return the conditions as expressions, in an order that binds each variable before its use; `bound` grows."""
+        """Return the conditions as expressions, in an order that binds each variable before its use.
+
+        The method adds newly bound variables to `bound`.
+        """
         check("compiling conditions")
         return [self.expression(ready, bound, kinds, where) for ready in in_binding_order(conditions, bound, where)]
 
     def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
-        """Return a condition as a Python expression; the expression assigns the variable that the condition determines."""
+        """Return a condition as a Python expression; if the condition determines a variable, the expression assigns it."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 look = self.look(condition)
@@ -247,7 +256,7 @@ class PythonWriter:
     def satisfying(
         self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
     ) -> tuple[str, list[str]]:
-        """Return an iterable expression of the candidates for a witness, and the tests that each candidate must pass."""
+        """Return an expression for the candidates of a witness, and the tests that a candidate must pass."""
         term, kind = condition.variable, condition.kind
         inner = {**kinds, term: kind}
         candidates = self.problem.classes.get(kind, ())
@@ -275,20 +284,20 @@ class PythonWriter:
         return source, tests
 
     def listed(self, situation: str, value: str) -> bool:
-        """Return whether the table lists the holders of a value.
+        """Return whether the table lists the symbols that have a value.
 
-        It doesn't for defined situations, nor for false unless a variable could be false.
+        The table has no lists for defined situations, and for a boolean situation type only the list of true symbols.
         """
         domain = self.problem.domain
         return situation not in domain.rules and (value == TRUE or not domain.situations[situation].boolean)
 
     def look(self, condition: ValueCondition) -> str:
-        """Return the expression for the value that a condition refers to."""
+        """Return the expression for the current value of a condition's symbol."""
         default = f", {FALSE!r}" if self.problem.domain.situations[condition.situation].boolean else ""
         return f"{identifier('now', condition.situation)}.get({key_written(condition.arguments)}{default})"
 
     def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
-        """Return tests of whether the symbol exists; there are none if the classes of the terms guarantee it."""
+        """Return tests that a symbol exists; no test is needed for a term whose class guarantees this."""
         return [
             self.member(term, wanted)
             for term, wanted in zip(arguments, self.problem.domain.situations[situation].arguments, strict=True)
@@ -296,15 +305,15 @@ class PythonWriter:
         ]
 
     def member(self, term: str, kind: str) -> str:
-        """Return the test that a term is of a class."""
+        """Return the test that a term belongs to a class."""
         return f"{written(term)} in {self.kind(kind)}"
 
     def adjacent(
         self, relation: str, arguments: Sequence[str], term: str, unbound: AbstractSet[str] = frozenset()
     ) -> tuple[str, float]:
-        """Return an iterable expression of the individuals that a relation relates to the other arguments, and their number.
+        """Return an expression for the individuals that a relation relates to the other arguments, and their average number.
 
-        Unbound arguments match anything.
+        An unbound argument matches every individual.
         """
         position = list(arguments).index(term)
         known = [i for i, other in enumerate(arguments) if i != position and other not in unbound]
@@ -318,11 +327,11 @@ class PythonWriter:
         return f"{name}.get({tuple_written(written(arguments[i]) for i in known)}, ())", self._fan[name]
 
     def kind(self, kind: str) -> str:
-        """Return the name of a class's individuals as a set."""
+        """Return the name, in generated code, of the set of a class's individuals."""
         return self.constant(("kind", kind), self.problem.members(kind))
 
     def constant(self, what: tuple[str, str], value: object) -> str:
-        """Return the name of a value in generated code."""
+        """Store a value under a name for generated code, and return the name."""
         name = identifier(*what)
         self.constants[name] = value
         return name
@@ -340,12 +349,14 @@ _COST: Mapping[type[Condition], int] = {
 
 
 def in_binding_order(conditions: Iterable[Condition], bound: AbstractSet[str], where: str) -> Iterator[Condition]:
-    """Yield the cheapest remaining condition whose variables are bound; the caller adds newly bound variables to `bound`.
+    """Yield the conditions in an order that binds each variable before its use, cheap conditions first.
+
+    The caller adds newly bound variables to `bound`.
 
     Raises
     ------
     DomainError
-        Nothing binds the variables of the remaining conditions.
+        No condition binds the variables of the remaining conditions.
     """
     waiting = [(_COST[type(condition)], needs(condition), condition) for condition in conditions]
     while waiting:

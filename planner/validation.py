@@ -1,12 +1,12 @@
-"""The checker of plans. It shares no code with any search and reads conditions as they are written.
+"""The plan checker; it shares no code with any search.
 
-A behaviour's preconditions hold if *some* individuals, as its variables, satisfy them all. Each conjunction is compiled once
-into a list of tests and choices, the most determined condition first, and then evaluated in every state. So the time to check a
-plan grows with the length of the plan, and not with the size of the world.
+The preconditions of a behaviour hold if *some* individuals, as the variables of the behaviour, satisfy all of them. The checker
+compiles each conjunction once into a list of tests and choices, the most determined condition first. Therefore the time to
+check a plan grows with the length of the plan, and not with the size of the world.
 
-The meaning of a plan of several levels is defined in docs/levels.md. In short: after a step, the symbols that its level sees
-have the values that the step states. Touched symbols of the level below that have a rest value are at rest. The next step
-begins in that state.
+docs/levels.md defines the meaning of a plan with several levels. After the refinement of a step, the symbols that the step's
+level sees have the values that the step states. Changed symbols of the level below that have a rest value are at rest. The next
+step begins in the state after the refinement.
 """
 
 from __future__ import annotations
@@ -43,14 +43,17 @@ NewValue: TypeAlias = "tuple[str, Arguments, str]"
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of a plan: its path in the tree (empty for the whole plan), and a sentence."""
+    """A fault of a plan: the path of the step (empty for the whole plan), and a sentence."""
 
     path: tuple[int, ...]
     text: str
 
 
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
-    """Return the faults of a plan; it is empty for a valid plan. IDs are checked, and everything that `carried_out` checks."""
+    """Return the faults of a plan; the list is empty for a valid plan.
+
+    The faults are wrong IDs of steps, and the faults that `carried_out` finds.
+    """
     numbered = {step.path: problem.id_of(step.behavior, step.arguments) for step in plan.walk() if _fits(problem, step)}
     wrong = [
         Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {numbered[step.path]}")
@@ -61,7 +64,7 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
 
 
 def _fits(problem: Problem, step: Step) -> bool:
-    """Return whether a step has an ID: its behaviour exists, and its arguments are of the classes of the parameters."""
+    """Return whether the behaviour of a step exists, and the arguments belong to the classes of the parameters."""
     behavior = problem.domain.behaviors.get(step.behavior)
     if behavior is None or len(behavior.parameters) != len(step.arguments):
         return False
@@ -71,22 +74,22 @@ def _fits(problem: Problem, step: Step) -> bool:
 def carried_out(
     problem: Problem, plan: Plan, lookups: Lookups | None = None, lifted: Mapping[str, Behavior] | None = None
 ) -> list[Fault]:
-    """Return the faults of a plan during its execution on symbols.
+    """Return the faults of a plan when its steps are executed on symbols.
 
-    On each level, the preconditions of every step must hold in the state before it. After its refinement, the symbols that its
-    level sees must have the values that the step states, and other touched symbols must be at rest. In the end the goal must
-    hold. Nothing is checked after an inapplicable step.
-
+    On each level, the preconditions of every step must hold in the state before the step. After the refinement of a step, the
+    symbols that the step's level sees must have the values that the step states. Other changed symbols must be at rest. The goal
+    must hold after the last step. The checker stops at an inapplicable step.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
     lookups : dict, optional
-        Filled with the individuals on which the check depends. If the problem has all of them, every larger problem of the same
-        scene has the same faults.
+        Receives the individuals on which the check depends. If the problem has all of these individuals, every larger problem of
+        the same scene has the same faults.
     lifted : mapping of name to behaviour, optional
-        The behaviours before effects on every member of a class are expanded; the individuals that these change are looked up, too.
+        The behaviours before the expansion of effects on every member of a class; individuals that these effects can change are
+        also recorded in `lookups`.
     """
     rules = BehaviorReader(problem, lookups, lifted)
     check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
@@ -97,7 +100,7 @@ def carried_out(
 
 
 def open_goals(problem: Problem) -> list[Fact]:
-    """Return the goals that don't hold in the initial state, stated or derived."""
+    """Return the goals that don't hold in the initial state; goals may be stated or derived facts."""
     return [fact for fact, _ in _unreached(problem, Facts(problem, problem.initial))]
 
 
@@ -110,7 +113,7 @@ def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
 
 
 def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], state: State) -> dict[Symbol, str] | None:
-    """Return the state after a behaviour, or None if its preconditions don't hold."""
+    """Return the state after a behaviour; None if the behaviour isn't applicable."""
     rules = BehaviorReader(problem)
     fits = rules.fits(behavior, tuple(arguments))
     changes = rules.changes(behavior, tuple(arguments), Facts(problem, state)) if fits else None
@@ -120,7 +123,7 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
 
 
 class _Check:
-    """A plan during its execution on symbols: the present facts, and the faults."""
+    """The execution of a plan on symbols, with the current facts and the faults."""
 
     def __init__(self, problem: Problem, depth: int, rules: BehaviorReader) -> None:
         self.problem = problem
@@ -138,10 +141,10 @@ class _Check:
     def carried_out(
         self, steps: Sequence[Step], above: int, path: tuple[int, ...], what: object, inside: bool = False
     ) -> bool:
-        """Execute steps that together refine one of level `above`, or the task (level 0); return whether all were applicable.
+        """Execute the steps that refine a step of level `above`, or the task (level 0); return whether all were applicable.
 
-        A goal on a symbol takes precedence over its rest value, except `inside` a step, since a step knows no goal. Runs of
-        lower-level steps may stand in for steps of the next level.
+        In the task, the goal of a symbol takes precedence over the symbol's rest value. `inside` a step, the rest value is
+        required. Runs of lower-level steps may replace steps of the next level.
         """
         level = next((level for level in self.levels if level > above), above)
         marks = []
@@ -160,7 +163,10 @@ class _Check:
         return True
 
     def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield the symbols changed since some marks of the log that aren't at rest, with their values and rest values."""
+        """Yield the symbols that aren't at rest and differ from their value at one of the marks of the log.
+
+        Each symbol comes with its value and its rest value.
+        """
         first, now = marks[0] if marks else len(self.facts.log), self.facts.value
         changed = {
             (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
@@ -175,7 +181,7 @@ class _Check:
                 yield Symbol(*cell), got, self.rests[cell[0]]
 
     def step(self, step: Step) -> bool:
-        """Execute one step with its refinement; return whether all of it was applicable."""
+        """Execute one step with its refinement; return whether the step and its sub-steps were applicable."""
         behavior = self.problem.domain.behaviors.get(step.behavior)
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
@@ -196,7 +202,7 @@ class _Check:
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
         if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
             return False
-        totals = self.problem.domain.aggregates  # a level promises nothing of one that it doesn't see
+        totals = self.problem.domain.aggregates  # a level determines no total that it doesn't see
         said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
         for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
@@ -205,9 +211,9 @@ class _Check:
         return True
 
     def within_bounds(self, step: Step) -> bool:
-        """Record a total that a step leaves outside its bounds, or a constraint that it violates; return whether there is none.
+        """Return whether all totals are within their bounds and no constraint is violated after a step; record a violation.
 
-        An observed state may have exceptions to a constraint at first; then a step violates the constraint if it adds some.
+        The initial state may have exceptions to a constraint. A step violates the constraint if the number of exceptions grows.
         """
         constraints = self.problem.domain.constraints
         for name in self.rules.bounded:
@@ -230,7 +236,7 @@ class _Check:
 
 
 def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
-    """Yield each step of a level alone, and lower-level steps in runs."""
+    """Yield a list with each single step of the level, and a list with each run of consecutive lower-level steps."""
     lower: list[Step] = []
     for step in steps:
         if step.level > level:
@@ -256,12 +262,12 @@ class Facts:
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
-        self._totals: dict[Cell, str | None] = {}  # of the present state
+        self._totals: dict[Cell, str | None] = {}  # totals of the current state
         for symbol, value in state.items():
             self._values[symbol.situation][symbol.arguments] = value
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
-        """Return the value of a symbol, or None if there is no such symbol."""
+        """Return the value of a symbol, or None if the symbol doesn't exist."""
         if situation in self.problem.domain.rules:
             if not self.exists(situation, arguments):
                 return None
@@ -278,11 +284,14 @@ class Facts:
         return Definitions(self.rules.strata, lambda about, key: self.rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
-        """Return the stated facts."""
+        """Return the stated facts of the current state."""
         return {Symbol(name, key): value for name, values in self._values.items() for key, value in values.items()}
 
     def exists(self, situation: str, arguments: Arguments) -> bool:
-        """Return whether a symbol exists: it is stated, or boolean and its arguments are of the right classes."""
+        """Return whether a symbol exists.
+
+        A symbol exists if it has a stated value, or if it is boolean and its arguments belong to the right classes.
+        """
         if arguments in self._values[situation]:
             return True
         kind = self.problem.domain.situations[situation]
@@ -291,7 +300,7 @@ class Facts:
         )
 
     def holders(self, situation: str, value: str) -> Iterable[Arguments]:
-        """Return the arguments of the symbols that are stated to have a value."""
+        """Return the arguments of the symbols whose stated value is the given value."""
         if situation not in self._holders:
             of: dict[str, dict[Arguments, None]] = {}
             for arguments, its in self._values[situation].items():
@@ -300,7 +309,7 @@ class Facts:
         return self._holders[situation].get(value, ())
 
     def put(self, situation: str, arguments: Arguments, value: str) -> None:
-        """Give an existing symbol a value."""
+        """Set the value of an existing symbol, and log the old value."""
         old = self._values[situation].get(arguments, FALSE)
         if old == value:
             return
@@ -314,7 +323,7 @@ class Facts:
             self._holders[situation].setdefault(value, {})[arguments] = None
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the cells that have changed since the log had the length `mark`, with their values at that time."""
+        """Return the cells that have changed since the log had the length `mark`, with their earlier values."""
         before: dict[Cell, str] = {}
         for situation, arguments, old in self.log[mark:]:
             before.setdefault((situation, arguments), old)
@@ -322,9 +331,9 @@ class Facts:
 
 
 class BehaviorReader:
-    """The preconditions and effects of one problem's behaviours, each read on demand.
+    """The preconditions and effects of a problem's behaviours; each behaviour is compiled at its first use.
 
-    `lookups` and `lifted` are as for `carried_out`.
+    `carried_out` describes the parameters `lookups` and `lifted`.
     """
 
     def __init__(
@@ -342,7 +351,7 @@ class BehaviorReader:
         ]
 
     def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
-        """Return whether a rule of a situation type derives it for some arguments."""
+        """Return whether some rule of a situation type derives the situation with the given arguments."""
         if situation not in self._defined:
             self._defined[situation] = [_Behavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]]
         for rule in self._defined[situation]:
@@ -352,18 +361,21 @@ class BehaviorReader:
         return False
 
     def read(self, behavior: Behavior) -> _Behavior:
-        """Return the reading of a behaviour."""
+        """Return a behaviour in its compiled form."""
         if behavior.name not in self._read:
             self._read[behavior.name] = _Behavior(self, behavior)
         return self._read[behavior.name]
 
     def fits(self, behavior: Behavior, arguments: Arguments) -> bool:
-        """Return whether the arguments are of the classes of the behaviour's parameters."""
+        """Return whether the arguments belong to the classes of the behaviour's parameters."""
         members = self.read(behavior).members
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 
     def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[NewValue] | None:
-        """Return the values that a behaviour gives to arguments that fit, in order; None if it isn't applicable."""
+        """Return the values that a behaviour gives to symbols, in order; None if the behaviour isn't applicable.
+
+        The arguments must belong to the classes of the parameters.
+        """
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         if not all_hold(read.preconditions, facts, values):
@@ -387,7 +399,10 @@ class BehaviorReader:
         return None if more is None else found + more
 
     def beyond(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> tuple[Fact, Fact] | None:
-        """Return an amount before and after a behaviour whose preconditions hold, if the value after it isn't allowed."""
+        """Return an amount before and after a behaviour whose preconditions hold, if the new amount isn't allowed.
+
+        Return None if every new amount is allowed.
+        """
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         if not all_hold(read.preconditions, facts, values):
@@ -400,7 +415,7 @@ class BehaviorReader:
         return None
 
     def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-        """Return the calculated cost of a behaviour in the present state, if it has a price and is applicable."""
+        """Return the price of a behaviour in the current state; None if it has no price or isn't applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         return read.price(facts.value, values) if read.price and all_hold(read.preconditions, facts, values) else None
@@ -408,7 +423,10 @@ class BehaviorReader:
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
-        """Return a binding of the other variables with which all conditions hold, or None."""
+        """Return bindings of the variables with which all conditions hold; None if there are none.
+
+        `terms` contains the variables that are already bound.
+        """
         reading, bound = ConditionReader(self, terms), set(terms)
         tests = reading.conjunction(conditions, bound, kinds)
         values = [terms.get(term, term) for term in reading.places]
@@ -417,7 +435,7 @@ class BehaviorReader:
         return {term: value for term, value in zip(reading.places, values, strict=True) if term in bound}
 
     def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, by the individual at a position."""
+        """Return the tuples of a relation, indexed by the individual at a position."""
         if (relation, position) not in self._rows:
             found: dict[str, list[Arguments]] = {}
             for row in sorted(self.problem.relations.get(relation, ())):
@@ -427,7 +445,7 @@ class BehaviorReader:
 
 
 class _Behavior:
-    """The reading of a behaviour: positions of terms, preconditions, and effects with their conditions."""
+    """A behaviour in compiled form: positions of terms, preconditions, and effects with their conditions."""
 
     def __init__(self, rules: BehaviorReader, behavior: Behavior) -> None:
         reading, bound = (
@@ -460,7 +478,7 @@ class _Behavior:
         ]
         self.price = None if behavior.price is None else worth(behavior.price, reading.key, rules.problem.relations)
         lifted = rules.lifted.get(behavior.name, behavior)
-        self.changed = [  # a test that never holds: it records every individual that such an effect can change
+        self.changed = [  # tests that never hold, but record every individual that an effect on a class can change
             reading.conjunction(
                 (*e.when, ClassCondition(e.each.name, "")), set(bound), {**kinds, e.each.name: e.each.kind}
             )
@@ -471,7 +489,7 @@ class _Behavior:
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
 
     def on_amounts(self, values: Values, facts: Facts) -> Iterator[tuple[Cell, str, Fraction | None]]:
-        """Yield the symbols whose amounts change, with the operation and the number."""
+        """Yield the symbols whose amounts change, each with the operation and the operand."""
         for when, situation, key, operation, amount in self.amounts:
             inner = values.copy()
             if all_hold(when, facts, inner):
