@@ -1,10 +1,13 @@
-"""Amounts of a grounded level: above the bits of its facts, a state contains the number of a tuple of amounts.
+"""Amounts of a grounded level.
 
-A ground comparison is a bit derived from the tuple. So an operator's conditions, the goal, and all functions that read bits are
+A state is an integer. The low bits are facts. The number above these bits identifies a tuple of amounts.
+
+Each ground comparison has a bit that is derived from the tuple. Therefore conditions, goals and all functions that read bits are
 the same with and without amounts. An operator may make a comparison true if it changes the difference of both sides in the right
 direction (`Push`), or if the change depends on the state.
 
-Comparisons are linear: sums of amounts times constants. Numbers are exact; whole numbers are Python integers, which are fast.
+Comparisons are linear: both sides are sums of amounts times constants. Numbers are exact. Whole numbers are Python integers,
+because arithmetic with integers is fast.
 """
 
 from __future__ import annotations
@@ -34,29 +37,29 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 Exact: TypeAlias = "int | Fraction"
 Vector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
-"""The change that an operator makes to the difference of a comparison; None if the change depends on the state."""
+"""The change of a comparison's difference by an operator; None if the change depends on the state."""
 
 
 @dataclass(frozen=True)
 class Linear:
-    """A linear expression: amounts (by their positions in the tuple) times factors, plus a constant."""
+    """A linear expression: the sum of amounts times factors, plus a constant; amounts are positions in the tuple."""
 
     terms: tuple[tuple[int, Exact], ...]
     constant: Exact
 
     def of(self, vector: Vector) -> Exact:
-        """Return the value of the expression."""
+        """Return the value of the expression for a tuple of amounts."""
         total = self.constant
         for place, factor in self.terms:
             total += vector[place] * factor
         return total
 
     def worth(self, vector: Vector) -> float:
-        """Return the value of the expression as a cost."""
+        """Return the value of the expression as a floating-point number."""
         return float(self.of(vector))
 
     def bounds(self, quantities: Sequence[Quantity]) -> tuple[float | Exact, float | Exact]:
-        """Return the minimum and maximum of the expression within the bounds of its amounts."""
+        """Return the minimum and the maximum of the expression within the bounds of its amounts."""
         least: float | Exact = self.constant
         most = least
         for place, factor in self.terms:
@@ -67,7 +70,7 @@ class Linear:
         return least, most
 
     def plus(self, other: Linear, times: Exact = 1) -> Linear:
-        """Return the sum of this expression and a multiple of another one."""
+        """Return the sum of the expression and a multiple of another expression."""
         found = defaultdict[int, Exact](int, self.terms)
         for place, factor in other.terms:
             found[place] += factor * times
@@ -81,9 +84,10 @@ class Linear:
 
 @dataclass(frozen=True)
 class Move:
-    """One change of an amount: the operation, its operand `by` (None: undefined), and the bits `when` that it requires.
+    """A change of one amount by an operator: the operation, the operand `by`, and the required bits `when`.
 
-    Changes with the same `position` are alternatives of one effect; only the first change whose bits are set is made.
+    `by` is None if the operand is undefined. Changes with the same `position` are alternatives of one effect; the operator makes
+    only the first change whose required bits are set.
     """
 
     position: int
@@ -94,7 +98,9 @@ class Move:
 
 
 class AmountTable:
-    """The amounts of a level during grounding: each changing amount gets a place in the tuple, each comparison gets a bit.
+    """The amounts of a level during grounding.
+
+    Each changing amount receives a position in the tuple, and each comparison receives a bit.
 
     Parameters
     ----------
@@ -119,11 +125,11 @@ class AmountTable:
         self._measures: dict[str, Mapping[tuple[str, ...], Exact]] = {}
 
     def text(self, symbol: Symbol) -> str:
-        """Return a symbol's amount as the text of a value."""
+        """Return the initial amount of a symbol as the text of a value."""
         return written(Fraction(self.now[symbol]))
 
     def linear(self, expression: Expression, terms: Mapping[str, str]) -> Linear | None:
-        """Return an expression with individuals for its terms; None if it has no value.
+        """Return a linear expression in which individuals replace terms; None if the expression has no value.
 
         Raises
         ------
@@ -164,9 +170,9 @@ class AmountTable:
     def comparison(
         self, left: Linear | None, sign: str, right: Linear | None, negated: bool, fresh: Callable[[], int]
     ) -> tuple[tuple[int, ...] | None, ...]:
-        """Return the alternatives under which a comparison holds (negated: doesn't hold), each as literals.
+        """Return the alternatives under which a comparison holds, each as literals; if `negated`, doesn't hold.
 
-        `fresh` returns the next free bit. Each bit states that a difference is at least zero, more than zero, or zero.
+        `fresh` returns the next free bit. Each bit means that a difference is at least zero, more than zero, or equal to zero.
         """
         if left is None or right is None:
             return ((),) if negated else (None,)
@@ -189,7 +195,7 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return True or False if a comparison is always or never true within the bounds of its amounts; otherwise None."""
+        """Return whether a comparison is always true or never true within the bounds of its amounts; otherwise None."""
         least, most = difference.bounds(self.quantities)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
@@ -198,7 +204,7 @@ class AmountTable:
         return None
 
     def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
-        """Return the alternatives under which the bit of a comparison isn't set; None if the bit belongs to no comparison."""
+        """Return the alternatives under which the comparison of a bit is false; None if the bit belongs to no comparison."""
         for (difference, sign), its in self.bits.items():
             if its == bit:
                 return list(self.comparison(difference, sign, Linear((), 0), True, fresh))
@@ -207,7 +213,7 @@ class AmountTable:
 
 @dataclass(eq=False)
 class Amounts:
-    """The amounts of a task.
+    """The amounts of a grounded task.
 
     Parameters
     ----------
@@ -237,14 +243,14 @@ class Amounts:
     _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Give number 0 to the initial tuple."""
+        """Assign the number 0 to the initial tuple."""
         self.compared = sum(1 << bit for bit in self.bits.values())
         self.keep = ~self.compared & (1 << self.size) - 1
         self.numbered(self.first, 0, range(len(self.symbols)))
 
     @cached_property
     def at(self) -> Mapping[int, Sequence[tuple[int, Linear, str]]]:
-        """Maps each place to the comparisons that contain its amount."""
+        """The comparisons that contain an amount, by the position of the amount in the tuple."""
         found = defaultdict[int, list[tuple[int, Linear, str]]](list)
         for (difference, sign), bit in self.bits.items():
             for place, _ in difference.terms:
@@ -252,7 +258,11 @@ class Amounts:
         return found
 
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
-        """Return the number of a tuple; for a new tuple, store `mask` (another tuple's bits), updated at the `changed` places."""
+        """Return the number of a tuple.
+
+        A new tuple receives the next number. Its comparison bits are those of another tuple, `mask`, updated for the amounts at
+        the `changed` positions.
+        """
         number = self._number.get(vector)
         if number is None:
             for place in changed:
@@ -266,22 +276,25 @@ class Amounts:
         return number
 
     def vector(self, state: int) -> Vector:
-        """Return the amounts of a state."""
+        """Return the tuple of amounts of a state."""
         return self.vectors[state >> self.size]
 
     def begun(self, state: int) -> int:
-        """Return a state's bits with the comparison bits of the initial amounts."""
+        """Return a state with the comparison bits of the initial amounts."""
         return state & self.keep | self._masks[0]
 
     def made(self, operator: int) -> tuple[Move, ...]:
-        """Return the changes of an operator, computed once."""
+        """Return the changes of amounts by an operator; the changes are computed only once."""
         moves = self._moves.get(operator)
         if moves is None:
             moves = self._moves[operator] = self.moves(operator)
         return moves
 
     def applied(self, before: int, after: int, operator: int) -> int | None:
-        """Return a state with the amounts changed by an operator; None if a new value is undefined or out of bounds."""
+        """Return the state `after` with the amounts that an operator produces from the state `before`.
+
+        Return None if a new amount is undefined or out of bounds.
+        """
         moves = self.made(operator)
         if not moves:
             return after
@@ -326,7 +339,10 @@ class Amounts:
 
 
 def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
-    """Return the value of a difference after changes that assign constants to all its amounts; None if one isn't assigned."""
+    """Return the value of a difference after changes that assign constants to all of its amounts.
+
+    Return None if the changes assign no constant to one of the amounts.
+    """
     given = {
         move.place: move.by.constant
         for move in moves
@@ -338,7 +354,10 @@ def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
 
 
 def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
-    """Return the total change of a difference by `moves`: False if no move changes it, None if the total depends on the state."""
+    """Return the total change of a difference by several changes of amounts.
+
+    Return False if no change concerns the difference, and None if the total change depends on the state.
+    """
     factors = dict(difference.terms)
     concerned = [move for move in moves if move.place in factors]
     if not concerned:

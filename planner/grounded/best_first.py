@@ -1,11 +1,12 @@
-"""Search of one level of a problem, or of any grounded task, without refinement: two search orders of one loop take turns.
+"""Search of one level of a problem, or of any grounded task, without refinement.
 
-This search plans domains of one level (such as imported ones) and scopes, and is the last resort when refinement fails.
+This search solves domains with one level, such as imported domains. The search also solves grounded parts of a level, and whole
+levels if hierarchical planning fails.
 
-loop:     `confab.planner.grounded.exploring`
-orders:   by h_FF, with preferred operators and lookahead (`confab.planner.grounded.greedy`), which is directed to the goals;
-          by novelty (`confab.planner.grounded.novelty`), which is fast and escapes plateaus of h
-shorter:  shortening of the plan (`confab.planner.grounded.plan_windows`)
+Two search orders take turns in one loop (`confab.planner.grounded.exploring`). The first order uses the heuristic h_FF, preferred
+operators and lookahead, and is directed to the goals (`confab.planner.grounded.greedy`). The second order uses novelty, is fast,
+and escapes plateaus of the heuristic (`confab.planner.grounded.novelty`). The plan is shortened afterwards
+(`confab.planner.grounded.plan_windows`).
 """
 
 from __future__ import annotations
@@ -30,13 +31,18 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
 SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
-"""The operators examined to shorten a plan: `SHORTEN`, plus `STEP` for each of the first `STEPS` steps, plus the work of the search
-divided by `SHORTENING`."""
+"""Constants of the work for shortening a plan, in examined operators.
+
+The work is the sum of `SHORTEN`, `STEP` for each of the first `STEPS` steps, and the work of the search divided by `SHORTENING`.
+"""
 
 
 @dataclass(frozen=True)
 class Flat:
-    """The result of a search of a task: if `status` is solved, `plan` contains the operators; `work` is counted in bits."""
+    """The result of searching a task.
+
+    `plan` contains the operators if `status` is solved. The unit of `work` is one bit of a relaxed plan.
+    """
 
     status: Status
     plan: tuple[int, ...] = ()
@@ -61,7 +67,7 @@ def plan_level(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        By default those of the problem; then symbols at rest in the initial state must be at rest in the end.
+        By default the states of the problem; the default goal includes the rest values of symbols that are initially at rest.
     limits : Limits
         Maximum number of expansions by h_FF, and seconds, including grounding.
     most_work : float
@@ -103,8 +109,8 @@ def search(
 ) -> Flat:
     """Search for a plan of a grounded task.
 
-    Work is counted, not timed, so the same limit of expansions always gives the same plan. A deadline can only end the search
-    early.
+    The search counts work instead of time. Therefore the same limit of expansions always gives the same plan. A deadline can only
+    end the search early.
 
     Parameters
     ----------
@@ -112,9 +118,9 @@ def search(
     limits : Limits
         Maximum number of expansions by h_FF; the seconds aren't used (see `deadline`).
     deadline : float, optional
-        On the clock of `time.perf_counter`.
+        The deadline on the clock of `time.perf_counter`.
     found : function of a plan, optional
-        Called with the first plan, before it is shortened.
+        The function is called with the first plan, before the plan is shortened.
     most_work : float
         Maximum work, in bits processed by relaxed plans.
     """
@@ -137,7 +143,7 @@ def search(
     greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
     going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
     spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
-    del novelty, greedy  # so that an order that runs out of memory is released
+    del novelty, greedy  # releases the memory of an order that runs out of memory
     while True:
         order = min(going, key=spent.__getitem__)
         try:
@@ -164,6 +170,6 @@ def search(
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:
         found(plan)
-    with suppress(MemoryError):  # the plan stays as it is
+    with suppress(MemoryError):  # otherwise the plan isn't shortened
         plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING, deadline)
     return Flat(Status.SOLVED, tuple(plan), None, counts, total)

@@ -1,12 +1,12 @@
 """Derived bits: disjunctions in conditions, and facts of defined situation types.
 
-part:          bits that depend on each other, usually one bit; a part comes after the parts that it depends on
-alternatives:  a bit is set if all bits of one alternative are set; an opposite bit is set if the bit that it negates isn't set
+A derived bit is set if all bits of one of its alternatives are set. An opposite bit is set if the bit that it negates isn't set.
+Bits that depend on each other form a part; most parts consist of one bit. A part comes after the parts that it depends on.
 
-After a change only the parts that depend on a changed bit are recalculated. A part of several bits is calculated from scratch
-by counting the missing bits of each alternative: Dowling and Gallier, Journal of Logic Programming 1 (1984). If a change affects
-more alternatives than arrays process in the same time, arrays calculate all derived bits (examples: which places are reachable in
-a large map; the ferry becomes empty, so every car may board).
+After a change, only the parts that depend on a changed bit are recalculated. A part with several bits is recalculated by counting
+the missing bits of each alternative (Dowling and Gallier, Journal of Logic Programming 1, 1984). If a change affects many
+alternatives, arrays recalculate all derived bits, because arrays are then faster. For example, the reachability of all places in a
+large map depends on many alternatives.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ from functools import cached_property, partial
 from confab.planner.grounded.derived_arrays import Bit, by_arrays
 
 AT_ONCE, CALLS = 50, 60
-"""Number of alternatives that arrays process while Python processes one; cost of the calls for a layer, in alternatives."""
+"""Number of alternatives that arrays process while Python processes one alternative, and cost of a layer in alternatives.
+
+The cost of a layer is the cost of the calls to the array library.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The derived bits of a task, in parts; each part comes after the parts that it depends on."""
+    """The derived bits of a task, grouped into parts; each part comes after the parts that it depends on."""
 
     parts: tuple[tuple[Bit, ...], ...] = ()
 
@@ -36,7 +39,10 @@ class Derived:
 
     @cached_property
     def ways(self) -> Sequence[tuple[Sequence[int], int]]:
-        """For each alternative, the numbers of the required bits and of the resulting bit; an opposite bit requires nothing."""
+        """The alternatives of all bits, each as the numbers of the required bits and the number of the resulting bit.
+
+        The alternatives of an opposite bit are listed without required bits.
+        """
         return [
             ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
             for part in self.parts
@@ -51,11 +57,11 @@ class Derived:
 
     @cached_property
     def effort(self) -> int:
-        """Maximum number of alternatives examined after a change; without arrays, parts of one bit don't count."""
+        """Maximum number of alternatives examined after a change; parts of one bit count only if arrays are worthwhile."""
         return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 
     def completed(self, state: int) -> int:
-        """Return a state with all derived bits computed."""
+        """Return a state after computing all derived bits."""
         if self._few < self._all:
             return self._by_arrays(state)
         for number in range(len(self.parts)):
@@ -63,7 +69,7 @@ class Derived:
         return state
 
     def after(self, state: int, before: int) -> int:
-        """Return `state` with its derived bits updated, given the complete state `before` the changes."""
+        """Return `state` after updating its derived bits, given the complete state `before` the changes."""
         users, woken = self._users, self._woken
         waiting: list[int] = []
         seen: set[int] = set()
@@ -89,7 +95,7 @@ class Derived:
             changed, state = new ^ state, new
 
     def fresh(self, state: int, bits: int) -> int:
-        """Return a state with the derived bits in `bits` computed; other derived bits may be those of another state."""
+        """Return a state after computing the derived bits in `bits`; other derived bits may be outdated."""
         support = self._support(bits & self.mask)
         if len(support) > self._few:
             return self._by_arrays(state)
@@ -104,12 +110,12 @@ class Derived:
 
     @cached_property
     def _few(self) -> int:
-        """Maximum number of alternatives that are faster to examine one by one than to process all of them by arrays."""
+        """Maximum number of alternatives whose separate examination is faster than processing all alternatives by arrays."""
         return self._all // AT_ONCE + CALLS * len(self._layers)
 
     @cached_property
     def _layers(self) -> Sequence[Sequence[Bit]]:
-        """The bits in layers; a bit depends only on bits of earlier layers and of its own part."""
+        """The bits grouped into layers; a bit depends only on bits of earlier layers and of its part."""
         height: dict[int, int] = {}  # by bit
         found: list[list[Bit]] = []
         for part in self.parts:
@@ -126,7 +132,7 @@ class Derived:
         return by_arrays(self._layers)
 
     def _worked_out(self, number: int, state: int) -> int:
-        """Return a state with the derived bits of one part computed."""
+        """Return a state after computing the derived bits of one part."""
         work = self._works.get(number)
         if work is None:
             work = self._works[number] = _work(self.parts[number])
@@ -137,7 +143,7 @@ class Derived:
         return {}
 
     def _support(self, bits: int) -> Sequence[int]:
-        """Return the numbers of the parts that the given bits depend on, in order."""
+        """Return the numbers of the parts that the given bits depend on, in ascending order."""
         known = self._supports.get(bits)
         if known is None:
             found: set[int] = set()
@@ -160,7 +166,10 @@ class Derived:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
     def within(self, state: int, changing: int, wanted: int) -> Derived:
-        """Return the derivation of the bits `wanted`, simplified for states that differ from `state` only in `changing`."""
+        """Return the derived bits that the bits `wanted` depend on, simplified for states with fixed bits.
+
+        The states differ from `state` only in the bits `changing`.
+        """
         parts = []
         for number in self._support(wanted & self.mask):
             part = self.parts[number]
@@ -177,7 +186,7 @@ class Derived:
         return Derived(tuple(tuple(map(left, part)) for part in parts))
 
     def renamed(self, small: Callable[[int], int]) -> Derived:
-        """Return the same derivation with every mask converted by `small`."""
+        """Return the same derived bits with all masks converted by the function `small`."""
         return Derived(
             tuple(
                 tuple(Bit(small(bit.mask), tuple(map(small, bit.alternatives)), bit.opposite) for bit in part)
@@ -187,7 +196,10 @@ class Derived:
 
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
-        """For each required bit, the other parts that require it: number, mask (0 for a part of several bits), and sign."""
+        """The parts that require a bit, by the bit; each part as its number, its mask, and whether its bit is opposite.
+
+        The mask of a part with several bits is 0 here.
+        """
         found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)
@@ -202,7 +214,7 @@ class Derived:
 
     @cached_property
     def _woken(self) -> Mapping[int, int]:
-        """For each required bit, the number of alternatives in the parts that require it."""
+        """The number of alternatives in the parts that require a bit, by the bit."""
         ways = [_ways(part) for part in self.parts]
         return {low: sum(ways[number] for number, _, _ in users) for low, users in self._users.items()}
 
@@ -271,9 +283,10 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return derived bits in parts that depend on each other, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
+    """Return derived bits grouped into parts, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
 
-    An alternative that requires its own bit is dropped; otherwise a part of one bit would stay set once the bit is set.
+    A part is a strongly connected component of the dependencies. An alternative of a bit that requires the same bit is dropped,
+    because the bit would otherwise stay set forever.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}

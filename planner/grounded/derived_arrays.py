@@ -1,4 +1,7 @@
-"""Calculation of all derived bits of a state, layer by layer, by arrays over the alternatives of each layer."""
+"""Calculation of all derived bits of a state by arrays, one layer after another.
+
+The arrays of a layer contain the alternatives of the layer's bits.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,11 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Bit:
-    """A derived bit, as a mask: set if a state has all bits of one alternative; if `opposite`, set if there is none."""
+    """A derived bit, represented by a mask.
+
+    The bit is set if a state has all bits of one alternative. If `opposite`, the bit is set if a state has all bits of no
+    alternative.
+    """
 
     mask: int
     alternatives: tuple[int, ...]
@@ -27,7 +34,10 @@ class Bit:
 
 
 def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
-    """Return a function that computes all bits of some layers; a layer depends only on earlier layers and on itself."""
+    """Return a function that computes all bits of the layers in a state.
+
+    The bits of a layer depend only on bits of earlier layers and of the same layer.
+    """
     bits = list(chain(*layers))
     own = reduce(or_, (bit.mask for bit in bits))
     size = reduce(or_, (way for bit in bits for way in bit.alternatives), own).bit_length()
@@ -47,7 +57,11 @@ def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """The alternatives of a layer: columns of required bits of earlier layers and of this layer, resulting bits, and opposites."""
+    """The alternatives of a layer as arrays.
+
+    `before` contains columns of required bits of earlier layers, and `inside` contains columns of required bits of the same
+    layer. `heads` are the resulting bits. `opposites` are the opposite bits of the layer.
+    """
 
     before: Sequence[Ints]
     inside: Sequence[Ints]
@@ -56,7 +70,7 @@ class _Layer:
 
     @staticmethod
     def of(layer: Sequence[Bit], always: int) -> _Layer:
-        """Return the arrays of a layer; shorter rows are filled with a bit that is always set."""
+        """Return the arrays of a layer; short rows are filled with `always`, a bit that is always set."""
         own = reduce(or_, (bit.mask for bit in layer))
         ways = [(way & ~own, way & own, _numbers(bit.mask)[0]) for bit in layer for way in bit.alternatives]
         ways.sort(key=lambda way: -way[0].bit_count())
@@ -69,7 +83,7 @@ class _Layer:
         )
 
     def work(self, flags: Flags) -> None:
-        """Set the flags of the layer's bits, initially unset, in rounds until nothing changes."""
+        """Set the flags of the layer's bits in rounds, until no flag changes; the flags are initially unset."""
         active = np.flatnonzero(_all_set(flags, self.before))
         lacking, goal = [column[active] for column in self.inside], self.heads[active]
         while lacking and len(goal):
@@ -85,7 +99,10 @@ class _Layer:
 
 
 def _columns(masks: Sequence[int], always: int) -> list[Ints]:
-    """Return an array of the first bits of all masks, an array of the second bits, and so on, filled up with `always`."""
+    """Return an array of the first bits of all masks, an array of the second bits, and so on.
+
+    The arrays are filled with `always` where a mask has fewer bits.
+    """
     lists = [_numbers(mask) for mask in masks]
     found = np.full((max(map(len, lists), default=0), len(lists)), always)
     for which, bits in enumerate(lists):
@@ -103,7 +120,7 @@ def _numbers(mask: int) -> list[int]:
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
-    """Return for each row whether all of its bits are set; the columns after the first may cover only the first rows."""
+    """Return, for each row, whether all bits are set; columns after the first column may contain only the first rows."""
     found: Flags = flags[columns[0]]
     for column in columns[1:]:
         found[: len(column)] &= flags[column]

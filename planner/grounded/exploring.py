@@ -1,9 +1,9 @@
-"""The search loop: states are reached one after another, in a given order, until the goal holds.
+"""The search loop: the search reaches states one after another until the goal holds.
 
-order:      selects the next candidate: by h_FF (`confab.planner.grounded.greedy`), by novelty (`confab.planner.grounded.novelty`),
-            by cost and a bound (`confab.planner.grounded.shortest`)
-candidate:  a successor of a reached state; it is accepted unless the state was reached before at no higher cost
-open list:  queues of entries, each ordered by rank; the queues take turns, and a queue may get extra turns
+A search order selects the next candidate. The orders use h_FF (`confab.planner.grounded.greedy`), novelty
+(`confab.planner.grounded.novelty`), or cost with a lower bound (`confab.planner.grounded.shortest`). A candidate is a successor of
+a reached state. The loop accepts a candidate if its state is new, or if the cost of reaching the state has become smaller. An open
+list consists of queues that take turns; the entries of a queue are ordered by rank.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from confab.planner.grounded.task import Task
 from confab.reasoner.limits import check
 
 MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
-"""Maximum size of the states kept by one search, in bytes, and size of a state besides its bits."""
+"""Maximum memory for the states of one search, in bytes, and memory of a state without its bits, in bytes."""
 Entry = TypeVar("Entry")
 
 
 class Candidate(NamedTuple):
-    """A state, the operators that lead to it from a reached state, and the cost of its path from the initial state."""
+    """A candidate state, the operators that lead from the reached state `before` to the candidate, and the cost of its path."""
 
     before: int
     operators: tuple[int, ...]
@@ -30,10 +30,11 @@ class Candidate(NamedTuple):
 
 
 class SearchOrder(Protocol):
-    """An order of search. `work` counts the bits processed by relaxed plans; a turn ends when `work` reaches `turn`.
+    """Interface of a search order.
 
-    `reached` maps each state to the candidate that reached it last; `bytes` is the memory used besides these states; `best` is the
-    final state of the best plan found, if any.
+    `work` counts the bits processed by relaxed plans; a turn of the order ends when `work` reaches `turn`. `reached` maps each
+    state to the last accepted candidate. `bytes` is the memory of the order without the states in `reached`. `best` is the final
+    state of the best plan; None if no plan was found.
     """
 
     reached: dict[int, Candidate]
@@ -43,10 +44,10 @@ class SearchOrder(Protocol):
     best: int | None
 
     def candidates(self) -> Iterator[Candidate]:
-        """Yield candidates until there are none left or a sufficiently good plan has been found."""
+        """Yield candidates until no candidate remains or a sufficiently good plan is found."""
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a newly reached state; discard it if the goal is unreachable from it."""
+        """Rank a newly reached state; discard the state if the goal is unreachable from there."""
 
 
 def explore(task: Task, order: SearchOrder) -> Iterator[int]:
@@ -75,7 +76,7 @@ def explore(task: Task, order: SearchOrder) -> Iterator[int]:
 
 
 def path_to(reached: dict[int, Candidate], state: int) -> list[int]:
-    """Return the operators that led to a state."""
+    """Return the operators on the path from the initial state to a reached state."""
     parts: list[tuple[int, ...]] = []
     while (candidate := reached[state]).operators:
         parts.append(candidate.operators)
@@ -84,7 +85,10 @@ def path_to(reached: dict[int, Candidate], state: int) -> list[int]:
 
 
 class OpenList(Generic[Entry]):
-    """Entries in some queues that take turns; each queue yields the least rank first, and among equal ranks the oldest entry."""
+    """Entries in queues that take turns.
+
+    The first entry of a queue is the entry with the least rank; among entries with equal ranks, the oldest entry is first.
+    """
 
     def __init__(self, queues: int = 1) -> None:
         self.queues: list[list[tuple[object, int, Entry]]] = [[] for _ in range(queues)]
@@ -92,12 +96,12 @@ class OpenList(Generic[Entry]):
         self.number = 0
 
     def push(self, rank: object, entry: Entry, queue: int = 0) -> None:
-        """Add an entry."""
+        """Add an entry with a rank to a queue."""
         self.number += 1
         heapq.heappush(self.queues[queue], (rank, self.number, entry))
 
     def first(self) -> tuple[int, Entry] | None:
-        """Return the queue whose turn it is, and its first entry; None if all queues are empty."""
+        """Return the number of the queue that is next in turn, and the queue's first entry; None if all queues are empty."""
         filled = [which for which, queue in enumerate(self.queues) if queue]
         if not filled:
             return None

@@ -1,4 +1,4 @@
-"""Bits for the facts of a level that can change, and the values of the symbols that can't."""
+"""Bits for the facts of a level that can change, and values of the symbols that never change."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
 
 
 class FactBits:
-    """The numbers of a level's facts (their bits) and symbols.
+    """The bits of a level's facts, and the numbers of its symbols.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class FactBits:
         self.number()
 
     def number(self) -> None:
-        """Give a bit to every reachable fact whose symbol can change."""
+        """Assign a bit to every reachable fact whose symbol can change."""
         reached, names = self.reached, self.reached.individuals
         for name, situation in reached.situations.items():
             reached.check_time()
@@ -73,7 +73,7 @@ class FactBits:
         amounts = reached.amounts
         self.constants |= {symbol: amounts.text(symbol) for symbol in amounts.now if symbol not in amounts.place}
         size = len(self.facts)
-        for name in sorted(reached.defined):  # their bits follow the bits of stated facts
+        for name in sorted(reached.defined):  # the bits of derived facts follow the bits of stated facts
             table = reached.tables["situation", name]
             self.fact_bit[name] = np.arange(size, size + len(table))
             rows = (tuple(names[i] for i in row) for row in table.rows.tolist())

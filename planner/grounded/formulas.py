@@ -1,7 +1,7 @@
 """Ground conditions as conjunctions of bits.
 
-Conditions that don't mention the variable of a witness are split from the witness: "the ferry is here, and some car waits there"
-becomes the bit of the ferry and a bit "some car waits there", which is derived once for each place.
+A quantified condition is split into parts without common variables. For example, "the ferry is here and some car waits there" has
+two parts: the bit of the ferry, and a derived bit for "some car waits there". The derived bit is created once for each place.
 """
 
 from __future__ import annotations
@@ -37,14 +37,17 @@ from confab.reasoner.symbols import (
 )
 
 CONDITIONS_PER_ROW = 20
-"""Maximum number of ground conditions per permitted row of a join; nested groups multiply ground conditions."""
+"""Maximum number of ground conditions, as a multiple of the maximum number of rows of a join.
+
+Nested quantifiers multiply the number of ground conditions.
+"""
 
 Literals = tuple[int, ...] | None
-"""A conjunction of bits; the empty conjunction is true, None is false."""
+"""A conjunction of bits; the empty conjunction is true, and None is false."""
 
 
 class ReachableFacts(Protocol):
-    """The reachable facts, with the members that conditions read (`confab.planner.grounded.reachability.Reached`)."""
+    """Interface of the reachable facts that conditions read (`confab.planner.grounded.reachability.Reached`)."""
 
     problem: Problem
     most: int
@@ -55,7 +58,7 @@ class ReachableFacts(Protocol):
     symbols: dict[str, JoinTable]
 
     def find(self, situation: SituationType, arguments: Sequence[str], value: str) -> int:
-        """Return the row of a fact in its table, or -1."""
+        """Return the row of a fact in the table of its situation type, or -1 if the fact is unreachable."""
 
     def check_time(self) -> None:
         """Raise `OutOfTimeError` when the deadline has passed."""
@@ -63,7 +66,10 @@ class ReachableFacts(Protocol):
 
 @dataclass(frozen=True)
 class _Part:
-    """Conditions connected by shared free variables, the variables bound outside, and the classes of all variables."""
+    """Conditions that are connected by shared free variables.
+
+    `unbound` are the free variables, `bound` are the variables bound outside, and `kinds` are the classes of all variables.
+    """
 
     conditions: tuple[Condition, ...]
     unbound: tuple[str, ...]
@@ -72,9 +78,9 @@ class _Part:
 
 
 class Formulas:
-    """Ground conditions as conjunctions of bits. Disjunctions become derived bits, each created once.
+    """Ground conditions as conjunctions of bits; each disjunction becomes one derived bit.
 
-    Until `bits` is filled, changeable situation types have no bits, so only static conditions can be evaluated.
+    The caller fills `bits`. Before that, only static conditions can be evaluated.
     """
 
     def __init__(self, reached: ReachableFacts) -> None:
@@ -125,14 +131,14 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return the formula that some group holds for some individuals as its variables (negated: that no group does)."""
+        """Return the formula that some group of conditions holds for some individuals; if `negated`, that no group holds."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
     def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
-        """Return the formula that some individuals satisfy all conditions of a part (negated: that no individuals do)."""
+        """Return the formula that some individuals satisfy a part; if `negated`, that no individuals satisfy the part."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
         if key not in self._known:
@@ -156,7 +162,10 @@ class Formulas:
         return self._parts_of[key][1]
 
     def _parts(self, group: Sequence[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> Iterator[_Part]:
-        """Yield the parts of a group: "a cup is clean and a hand is empty" has one part for the cup and one for the hand."""
+        """Yield the parts of a group of conditions.
+
+        For example, "a cup is clean and a hand is empty" has one part about the cup and one part about the hand.
+        """
         kinds = dict(kinds)
         conditions = list(self._opened(group, bound | plain_variables(group), kinds))
         unbound = plain_variables(conditions) - bound
@@ -190,7 +199,7 @@ class Formulas:
             yield from self._opened(inner, shared | set(names.values()), kinds)
 
     def _solutions(self, part: _Part, unbound: Sequence[str], terms: Mapping[str, str]) -> Iterator[Mapping[str, str]]:
-        """Yield the bindings of a part's free variables that static knowledge doesn't exclude."""
+        """Yield the bindings of a part's free variables that the reachable facts and the relations allow."""
         if not unbound:
             yield terms
             return
@@ -202,7 +211,10 @@ class Formulas:
             yield from self._solutions(part, rest, {**terms, name: value})
 
     def _candidates(self, name: str, part: _Part, terms: Mapping[str, str]) -> Sequence[str]:
-        """Return the individuals that a positive condition of the part allows for a variable, otherwise all of its class."""
+        """Return the individuals that a positive condition of a part allows for a variable.
+
+        Without a suitable condition, return all individuals of the variable's class.
+        """
         members = self.members(part.kinds[name])
         for c in part.conditions:
             if isinstance(c, ValueCondition) and not c.negated and c.value == name:
@@ -244,7 +256,7 @@ class Formulas:
         return self._members[kind]
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return the formula that a symbol has a value (negated: that it doesn't have the value)."""
+        """Return the formula that a symbol has a value; if `negated`, that the symbol doesn't have the value."""
         kind = self.reached.situations.get(situation)
         if kind is None:  # the situation type doesn't exist on this level
             return () if negated else None
@@ -262,7 +274,7 @@ class Formulas:
         return (self.complement(bit) if negated else bit,)
 
     def complement(self, bit: int) -> int:
-        """Return the bit of the negation of a fact; for the bit of a negation, the bit of the fact."""
+        """Return the bit of the negation of a fact; for the bit of a negation, return the bit of the fact."""
         if bit in self.facts_of:
             return self.facts_of[bit]
         if bit not in self.complements:
@@ -284,7 +296,7 @@ class Formulas:
         return self.size - 1
 
     def wanted(self, symbol: Symbol, value: str) -> Literals:
-        """Return the formula that a symbol has the value, or satisfies the bounds, of a goal."""
+        """Return the formula of a goal: a symbol has the value, or an amount is within the bounds."""
         if self.reached.problem.domain.situations[symbol.situation].quantity is None:
             return self.value(symbol.situation, symbol.arguments, value, False)
         amount = Amount(symbol.situation, symbol.arguments)
@@ -300,7 +312,10 @@ class Formulas:
         return tuple(sorted(found))
 
     def named(self, literals: Literals) -> Literals:
-        """Return one derived bit for a conjunction that many operators share, such as "no object stands there"."""
+        """Return one derived bit for a conjunction of several bits.
+
+        Many operators may share this bit, for example the bit of "no object stands there".
+        """
         if literals is None or len(literals) < 2:
             return literals
         if (literals,) not in self.derived:
@@ -309,7 +324,7 @@ class Formulas:
         return (self.derived[literals,],)
 
     def any_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the disjunction of formulas: one derived bit, unless the disjunction has a simpler form."""
+        """Return the disjunction of formulas as one derived bit, or as a simpler formula if possible."""
         found: set[tuple[int, ...]] = set()
         for part in parts:
             if part == ():

@@ -1,11 +1,11 @@
-"""The order by h_FF: successors of the state with the least h first, with preferred operators and lookahead.
+"""The search order by the heuristic h_FF, with preferred operators and lookahead.
 
-open list:  two queues of states by h, with operators that haven't been tried: one with all applicable operators, one with the
-            preferred operators, which are in the relaxed plan
-least:      when a state has a smaller h than all states before, preferred operators get extra turns and a lookahead starts
+The next candidates are successors of the state with the least h. The open list has two queues of states: one queue with all
+applicable operators, and one queue with the preferred operators. A preferred operator is applicable and occurs in the relaxed
+plan. A new least h gives extra turns to the preferred operators and starts a lookahead.
 
-A state is evaluated when it is reached, and its operators are applied one at a time: Richter and Helmert, "Preferred operators
-and deferred evaluation in satisficing planning", ICAPS 2009.
+The search evaluates a state when the state is reached, and applies one operator at a time (Richter and Helmert, "Preferred
+operators and deferred evaluation in satisficing planning", ICAPS 2009).
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 BOOST = 1000
-"""Number of extra turns for the preferred operators after a new least h."""
+"""Number of extra turns for the queue of preferred operators after a new least h."""
 ALL, PREFERRED = 0, 1
 
 Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
-"""Maps a state and its relaxed plan to a later state, with the operators that lead to the later state."""
+"""Function of a state and its relaxed plan that returns a later state and the operators on the path to this state."""
 
 
 class Greedy:
-    """The search order by h_FF for a task; `counts` is updated."""
+    """The search order by h_FF for a task; the order adds its effort to `counts`."""
 
     def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
         self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts
@@ -59,7 +59,7 @@ class Greedy:
                 yield Candidate(state, (operator,), after, 0.0)
 
     def put(self, candidate: Candidate) -> None:
-        """Evaluate a state; if the goal is reachable from it, its operators become candidates."""
+        """Evaluate a newly reached state; put the state into the open list if the relaxed goal is reachable."""
         state = candidate.state
         if state & self.task.goal == self.task.goal:
             self.best = state

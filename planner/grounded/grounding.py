@@ -1,16 +1,14 @@
-"""Grounding: one level of a problem becomes a `Task`, by joins in rounds of relaxed reachability.
+"""Grounding of one level of a problem to a `Task`, by joins in rounds of relaxed reachability.
 
-reach:     find the facts that can become true under delete relaxation (`confab.planner.grounded.reachability`)
-assemble:  make bits for the facts that can change, and operators from the joined rows
-goal:      an unreachable goal proves that there is no plan
+The first stage finds the facts that can become true under delete relaxation (`confab.planner.grounded.reachability`). If a goal is
+unreachable, there is no plan. The second stage creates bits for the facts that can change, and operators from the joined rows.
 
-Conditions that aren't atoms but depend on the state are left out of the joins, so reachability is overestimated. When operators are
-assembled, each of these conditions becomes a conjunction of bits, once per combination of individuals
+The joins ignore conditions that depend on the state and aren't atoms. Therefore reachability is overestimated. In the second
+stage, each of these conditions becomes a conjunction of bits for each combination of individuals
 (`confab.planner.grounded.formulas`).
 
-Semi-naive grounding as in databases: Helmert, "Concise finite-domain representations for PDDL planning tasks",
-Artificial Intelligence 173 (2009), section 6. Here arrays are joined instead of tuples, and each symbol has one value from the
-start.
+The method is semi-naive evaluation, known from databases (Helmert, "Concise finite-domain representations for PDDL planning
+tasks", Artificial Intelligence 173, 2009, section 6). This implementation joins arrays instead of single tuples.
 """
 
 from __future__ import annotations
@@ -56,20 +54,21 @@ def ground(
     ----------
     problem : Problem
     level : int, optional
-        By default the lowest level.
+        The level to ground, by default the lowest level.
     initial, goal : State, optional
-        By default those of the problem.
+        By default the initial state and the goal of the problem.
     most : int
         Maximum number of rows of one join.
     deadline : float, optional
-        On the clock of `time.perf_counter`.
+        The deadline on the clock of `time.perf_counter`.
     apart : bool
-        Whether operators are identified by arguments and effects only; then "some crane is free" isn't one operator per crane.
+        Whether only arguments and effects identify an operator; then the condition "some crane is free" doesn't lead to one
+        operator for each crane.
 
     Returns
     -------
     Task or Reason
-        A reason if no behaviours of this level lead from `initial` to `goal`, otherwise the task.
+        The task, or the reason why no behaviours of the level lead from `initial` to `goal`.
 
     Raises
     ------
@@ -92,7 +91,7 @@ def ground(
 
 
 class _Assembly:
-    """Makes the operators and bits of a task from the reachable facts."""
+    """Assembly of the operators and bits of a task from the reachable facts."""
 
     def __init__(self, reached: Reached) -> None:
         self.reached = reached
@@ -113,7 +112,7 @@ class _Assembly:
             wanted = tuple(sorted({one for bit in wanted for one in means[bit]}))
         if wanted is None:
             return self._excluded(goal)
-        # Number the operators, then their conditional effects; a conditional effect whose operator was dropped is dropped, too.
+        # Number the operators, then their conditional effects. Drop conditional effects of dropped operators.
         owners, first, count = {}, {}, 0
         for i in base:
             first[i] = count
@@ -138,7 +137,7 @@ class _Assembly:
         return self._build(rows, needs, owners, first, operators, count, wanted, derived, cases)
 
     def _needs(self, schema: Schema, rows: Ints) -> tuple[Ints, tuple[Ints, Ints]]:
-        """Return the rows of a schema whose conditions are satisfiable, and pairs of a row and a bit that the row requires."""
+        """Return the rows of a schema with satisfiable conditions, and pairs of a row and a bit that the row requires."""
         place = {name: column for column, name in enumerate(schema.terms)}
         columns = {name: rows[:, column] for name, column in place.items()}
         keep = np.ones(len(rows), bool)
@@ -177,7 +176,7 @@ class _Assembly:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
     def _excluded(self, goal: State) -> Reason:
-        """Return the reason why no state satisfies the goal: one goal is impossible, or the goals exclude one another."""
+        """Return the reason why no state satisfies the goal: a single goal is impossible, or the goals exclude one another."""
         for symbol, value in sorted(goal.items()):
             if self.formulas.wanted(symbol, value) is None:
                 quantity = self.reached.problem.domain.situations[symbol.situation].quantity
@@ -295,8 +294,8 @@ class _Assembly:
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
         costs, prices = self._costs(bases, rows, first)
-        # In the relaxed task a conditional effect that sets no bit is useless, and an alternative of a derived bit is an
-        # operator of cost 0 without an owner.
+        # In the relaxed task, a conditional effect that sets no bit is useless. An alternative of a derived bit is an operator
+        # of cost 0 without an owner.
         telling = (np.arange(count) < operators) | (np.diff(add.starts) > 0)
         relaxed_needs, relaxed_adds, owner = with_derived(
             only(need, telling), only(add, telling), owner[telling], [*cases, *left]
@@ -326,7 +325,7 @@ class _Assembly:
     def _costs(
         self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int]
     ) -> tuple[list[float], dict[int, Linear]]:
-        """Return the least cost of each operator, and the operators whose cost depends on amounts."""
+        """Return the least cost of each operator, and the cost expressions of operators whose cost depends on amounts."""
         costs: list[float] = []
         prices: dict[int, Linear] = {}
         for i in bases:

@@ -1,16 +1,14 @@
 """The relaxed-plan heuristic h_FF, which also yields the applicable and the preferred operators.
 
-layer:     bits that are reached at the same time; a relaxed operator is reached when its last required bit is reached
-cost:      of a bit: the repetitions of the cheapest operator that sets the bit, plus the costs of that operator's required bits
-repeated:  an operator that changes an amount until a comparison holds; it counts as often as it must be applied (the difference
-           divided by the operator's change), or once if the change depends on the state
-plan:      the supporters of the goal; supporters in the first layer are applicable
+A layer contains the bits that are reached at the same time. A relaxed operator is reached when its last required bit is reached.
+The cost of a bit is the sum of two parts: the repetitions of the cheapest operator that sets the bit, and the costs of the bits
+that this operator requires. An operator that changes an amount is repeated until a comparison holds. The number of repetitions is
+the difference divided by the operator's change, or one if the change depends on the state. The relaxed plan consists of the
+supporters of the goal. A goal that is unreachable in the relaxed task is unreachable in the task.
 
-A goal that is unreachable in the relaxed task is unreachable.
-
-Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001); additive costs choose the supporters, as in Keyder and Geffner,
-"Heuristics for planning with action costs revisited", ECAI 2008; repetitions: Scala, Haslum, Thiébaux and Ramirez, "Subgoaling
-techniques for satisficing and optimal numeric planning", JAIR 68 (2020).
+The heuristic is described by Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001). Additive costs choose the supporters,
+as in Keyder and Geffner, "Heuristics for planning with action costs revisited", ECAI 2008. Repetitions are described by Scala,
+Haslum, Thiébaux and Ramirez, "Subgoaling techniques for satisficing and optimal numeric planning", JAIR 68 (2020).
 """
 
 from __future__ import annotations
@@ -25,13 +23,16 @@ from confab.planner.grounded.amounts import Exact, Linear, Vector, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
-"""Maximum number of repetitions of an operator that are counted."""
+"""Maximum number of repetitions that count for one operator."""
 AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
-"""A difference, its required sign, and the change of the difference by an operator (None if the change depends on the state)."""
+"""A difference, the required sign, and the change of the difference by an operator.
+
+The change is None if it depends on the state.
+"""
 
 
 class Evaluation(NamedTuple):
-    """The evaluation of a state: h, a relaxed plan in the order of layers, the applicable operators, and the work in bits."""
+    """The evaluation of a state: h, a relaxed plan sorted by layers, the applicable operators, and the work in bits."""
 
     h: int
     plan: list[int]
@@ -40,11 +41,11 @@ class Evaluation(NamedTuple):
 
 
 Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
-"""Maps a state to its evaluation; None if the goal isn't reachable from the state."""
+"""Function of a state that returns the evaluation, or None if the goal is unreachable from the state."""
 
 
 def heuristic(task: Task) -> Evaluate:
-    """Return h_FF of a task, as a function of a state."""
+    """Return the heuristic h_FF of a task as a function of a state."""
     needs, adds, owners, repeated = _relaxed(task)
     operators, amounts, low = len(task), task.amounts, (1 << task.size) - 1
     once = [0 if owner < 0 else 1 for owner in owners]
@@ -61,7 +62,10 @@ def heuristic(task: Task) -> Evaluate:
     of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
     def counted(state: int) -> tuple[list[int], set[int]]:
-        """Return the number of repetitions of each relaxed operator, and the operators that can't make their comparison true."""
+        """Return the number of repetitions of each relaxed operator, and the useless operators.
+
+        A useless operator can't make its comparison true.
+        """
         times, useless = once[:], set[int]()
         if amounts is not None:
             vector = amounts.vector(state)
@@ -105,7 +109,7 @@ def heuristic(task: Task) -> Evaluate:
                         layer.append(bit)
                     elif total < known:
                         cost[bit], supporter[bit] = total, o
-            # A later operator may need fewer repetitions.
+            # An operator of a later layer may need fewer repetitions.
             if not layer or (not repeated and all(cost[bit] >= 0 for bit in goal)):
                 break
             reached = []
@@ -199,9 +203,10 @@ def cost_left(task: Task) -> Callable[[int], float]:
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:
-    """Return the required and added bits of the relaxed operators, their owners, and the relaxed operators of each `AmountPush`.
+    """Return the required bits, the added bits and the owners of the relaxed operators.
 
-    For each comparison that an operator may make true, there is a separate relaxed operator.
+    Also return the relaxed operators of each `AmountPush`. An operator has a separate relaxed operator for each comparison that it
+    may make true. The owner of a relaxed operator is the operator that it belongs to.
     """
     needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
     repeated = defaultdict[AmountPush, list[int]](list)
@@ -230,7 +235,10 @@ def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
 
 
 def _times(amount: Exact, sign: str, push: Exact | None) -> int:
-    """Return how often an operator must be applied until a difference has the required sign; 0 if never."""
+    """Return the number of applications of an operator until a difference has the required sign.
+
+    Return 0 if no number of applications suffices.
+    """
     if push is None:
         return 1
     if sign == "=":

@@ -1,7 +1,8 @@
-"""Tables of small integers and their joins, which take most of the time of grounding.
+"""Tables of small integers, and joins of these tables; the joins take most of the time of grounding.
 
-A `JoinTable` is append-only, so the rows known before a round are a prefix of its rows, and semi-naive evaluation needs no second
-table. An index sorts the rows by some columns, again only after the table has grown; a lookup is then a binary search.
+Rows are only appended to a `JoinTable`. Therefore the rows known before a round are a prefix of all rows, and semi-naive
+evaluation needs no second table. An index contains the rows sorted by several columns; a lookup is a binary search. The table
+sorts an index again only after new rows were added.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ from confab.reasoner.limits import check
 
 Ints = NDArray[np.int64]
 PAIR = 1e-7
-"""Minimum time per row of a join, in seconds. A join can't be interrupted, so it isn't begun if it would exceed the deadline."""
+"""Minimum time per row of a join, in seconds.
+
+A join can't be interrupted. Therefore a join that would exceed the deadline isn't started.
+"""
 
 
 class JoinTable:
-    """Distinct rows of integers in [0, radix), in order of insertion."""
+    """A table of distinct rows in order of insertion; the entries are integers in [0, radix)."""
 
     def __init__(self, arity: int, radix: int) -> None:
         self.arity, self.radix = arity, radix
@@ -31,7 +35,7 @@ class JoinTable:
         return len(self.rows)
 
     def add(self, rows: Ints) -> None:
-        """Append the rows that aren't in the table yet, each once."""
+        """Append the distinct rows that the table doesn't contain."""
         if not len(rows):
             return
         keys = pack(rows, self.radix)
@@ -43,7 +47,7 @@ class JoinTable:
             self.rows = np.concatenate([self.rows, new])
 
     def find(self, rows: Ints) -> Ints:
-        """Return the position of each row in the table, or -1 if the row isn't in the table."""
+        """Return the position of each row in the table, or -1 if the table doesn't contain the row."""
         keys, order = self._index(tuple(range(self.arity)))
         if not len(order):
             return np.full(len(rows), -1)
@@ -52,7 +56,7 @@ class JoinTable:
         return np.where(keys[places] == wanted, order[places], -1)
 
     def match(self, columns: Sequence[int], values: Ints, most: int) -> tuple[Ints, Ints]:
-        """Return all pairs (row of `values`, row of this table) that agree on `columns`.
+        """Return all pairs of a row of `values` and a row of the table that agree on `columns`.
 
         Raises
         ------
@@ -80,7 +84,7 @@ class JoinTable:
         return left, order[places]
 
     def _index(self, columns: tuple[int, ...]) -> tuple[NDArray[np.generic], Ints]:
-        """Return the rows' keys on some columns in ascending order, and the row of each key."""
+        """Return the keys of the rows for the given columns in ascending order, and the row of each key."""
         size, keys, order = self._indices.get(columns, (-1, _NONE, _NONE))
         if size != len(self):
             unsorted = pack(self.rows[:, columns], self.radix)
@@ -94,9 +98,9 @@ _NONE: Ints = np.empty(0, np.int64)
 
 
 def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
-    """Return one key per row; keys compare as the rows do in lexicographic order.
+    """Return one key per row; the order of the keys is the lexicographic order of the rows.
 
-    A key is an integer if the row fits into 63 bits, otherwise the bytes of the row, most significant first.
+    A key is an integer if the row fits into 63 bits. Otherwise the key is the bytes of the row, most significant byte first.
 
     >>> pack(np.array([[1, 2], [0, 3]]), 10).tolist()
     [12, 3]
@@ -113,7 +117,7 @@ def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
 
 
 def ranges(starts: Ints, counts: Ints) -> Ints:
-    """Return start, start + 1, … for each start, with as many numbers as the start's count."""
+    """Return the concatenated ranges of consecutive numbers; each range has a start and a count."""
     ends = np.cumsum(counts)
     total = int(ends[-1]) if len(ends) else 0
     result: Ints = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(starts, counts)
