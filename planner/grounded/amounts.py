@@ -327,7 +327,7 @@ class Amounts:
         return after & self.keep | self._masks[number] | number << self.size
 
     def stated(self, state: int, values: State) -> int:
-        """Return a state with the amounts that `values` states."""
+        """Return a state with the amounts that the mapping `values` contains."""
         vector = tuple(simplified(Fraction(values[symbol])) for symbol in self.symbols)
         number = self.numbered(vector, 0, range(len(vector)))
         return state & self.keep | self._masks[number] | number << self.size

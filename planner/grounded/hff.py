@@ -139,7 +139,10 @@ def heuristic(task: Task) -> Evaluate:
 
 
 def cost_left(task: Task) -> Callable[[int], float]:
-    """Return the cost of a relaxed plan with the cheapest supporters, as a function of a state; infinite if there is none."""
+    """Return a function of a state: the cost of a relaxed plan with the cheapest supporters.
+
+    The cost is infinite if there is no relaxed plan.
+    """
     needs, adds, owners, repeated = _relaxed(task)
     costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
     missing = [len(bits) for bits in needs]
@@ -151,7 +154,10 @@ def cost_left(task: Task) -> Callable[[int], float]:
     low, goal = (1 << task.size) - 1, bits_of(task.goal)
 
     def priced(vector: Vector) -> list[float]:
-        """Return the costs with repetitions; infinite for an operator that can't make its comparison true."""
+        """Return the cost of each operator with its repetitions.
+
+        The cost is infinite if the operator can't make its comparison true.
+        """
         price = costs[:]
         for (difference, sign, push), found in repeated.items():
             times = _times(difference.of(vector), sign, push) or math.inf
@@ -225,7 +231,7 @@ def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], d
 
 
 def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
-    """Return the change of a difference by a relaxed operator; None if the change depends on the state."""
+    """Return the change of a difference by a relaxed operator, or None if the change depends on the state."""
     amounts, owner = task.amounts, task.owners[relaxed]
     assert amounts is not None
     own = sum(1 << bit for bit in task.needs[relaxed])
