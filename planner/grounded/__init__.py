@@ -1,1 +1,1 @@
-"""One level as a grounded task: reachability, operators on bits, heuristic search, exhaustive search."""
+"""Grounding of one level to a task whose operators change bits, with heuristic and exhaustive searches of the task."""

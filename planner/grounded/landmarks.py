@@ -1,9 +1,9 @@
 """Landmarks: facts that every plan makes true at some time.
 
-The landmarks of an operator are its required bits and their landmarks. The landmarks of a fact are the landmarks that all operators
-that set the fact have in common.
+The landmarks of an operator are the bits that the operator requires, and the landmarks of these bits. The landmarks of a fact are
+the common landmarks of all operators that set the fact.
 
-Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
+The definition is due to Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from time import perf_counter
 from confab.planner.grounded.task import Task, bits_of
 
 LOOK = 1_000
-"""Number of operators between two checks of the clock."""
+"""Number of operators between two looks at the clock."""
 
 
 def landmarks(task: Task, deadline: float | None = None) -> int:
-    """Return the mask of facts that every plan makes true at some time, including the goals; after the deadline, only the goals.
+    """Return the mask of facts that every plan makes true at some time, including the goals.
 
-    The deadline is on the clock of `time.perf_counter`. Thousands of facts with thousands of achievers each take seconds.
+    After the deadline, return only the goals. The deadline is a time on the clock of `time.perf_counter`. Thousands of facts with
+    thousands of achievers each take seconds.
     """
     behind = [
         0 if task.initial >> bit & 1 else -1 for bit in range(task.size)

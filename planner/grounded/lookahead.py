@@ -1,6 +1,6 @@
-"""Lookahead: execute a relaxed plan as far as possible; if none of its operators is applicable, replace or insert an operator.
+"""Lookahead: the search executes a relaxed plan as far as possible, and replaces or inserts operators if necessary.
 
-Vidal, "A lookahead strategy for heuristic search planning", ICAPS 2004.
+The method follows Vidal, "A lookahead strategy for heuristic search planning", ICAPS 2004.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from typing import TypeAlias
 from confab.planner.grounded.task import Task, bits_of
 
 ENABLING = 8
-"""Maximum number of missing bits for which an inserted operator is tried."""
+"""Maximum number of missing bits for which the lookahead tries to insert an operator."""
 Path: TypeAlias = "tuple[int, list[int]]"
-"""A state, and the operators that lead to it."""
+"""A state, and the operators on the path to this state."""
 
 
 def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
-    """Return a function that executes a relaxed plan from a state as far as possible and returns the final state and its operators.
+    """Return a function that executes a relaxed plan from a state as far as possible.
 
-    If no operator of the plan is applicable, one of them is replaced by an applicable operator that sets the same bit for a later
-    operator or the goal (a truck that has moved north starts from there). If there is no replacement, an operator is inserted that
-    sets the only missing bit of other operators (the truck drives back, so the next parcel can be loaded). Of several such
-    operators, the one after which the rest of the plan achieves the most goals is inserted.
+    The function returns the final state and the executed operators. If no operator of the plan is applicable, the function replaces
+    an operator by an applicable operator that sets the same bit for a later operator or the goal. For example, a truck that has
+    moved north starts from its new place. If there is no replacement, the function inserts an operator that sets the only missing
+    bit of other operators. For example, the truck drives back, and the next parcel can be loaded. Among several operators to
+    insert, the function selects the operator after which the rest of the plan achieves the most goals.
     """
 
     @cache

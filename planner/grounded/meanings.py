@@ -1,4 +1,7 @@
-"""The meanings of the bits of defined situation types and of shared conditions: conjunctions of other bits, or alternatives."""
+"""The meanings of derived bits, that is, of defined situation types and of shared conditions.
+
+The meaning of a bit is a conjunction of other bits, or several alternatives.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,14 @@ from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import Rule
 
 SAID_ONCE = 20_000
-"""Minimum number of conditions saved, over all operators, before shared conditions are evaluated once per state. Evaluating this
-number of conditions for a relaxed plan takes a millisecond."""
+"""Minimum number of saved conditions, over all operators, at which shared conditions are evaluated once per state.
+
+The evaluation of this number of conditions for a relaxed plan takes a millisecond.
+"""
 
 
 class Meanings:
-    """The meanings of the bits of a level."""
+    """The computation of the meanings of a level's bits."""
 
     def __init__(self, reached: Reached, formulas: Formulas, bits: FactBits) -> None:
         self.reached, self.formulas, self.bits = reached, formulas, bits
@@ -31,10 +36,10 @@ class Meanings:
     def of_bits(
         self, rows: Mapping[int, Ints], needs: Mapping[int, tuple[Ints, Ints]]
     ) -> tuple[Derived, list[tuple[tuple[int, ...], int]], Grouped | None]:
-        """Return the derived bits, the alternatives of each for the relaxed task, and the meaning of each bit.
+        """Return the derived bits, their alternatives for the relaxed task, and the meaning of each bit.
 
-        A bit with one alternative is replaced by the bits of that alternative, unless the alternative is long and many operators
-        require it ("no object stands in that place").
+        A bit with one alternative is replaced by the bits of this alternative. The exception is a long alternative that many
+        operators require, for example "no object stands in this place".
         """
         formulas = self.formulas
         ways: dict[int, dict[tuple[int, ...], None]] = {}  # alternatives of each bit of a defined situation type
@@ -82,7 +87,7 @@ class Meanings:
         return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
-        """Add the meanings of the negations of defined facts that conditions require, except for recursive definitions."""
+        """Add the meanings of required negations of defined facts, except for recursively defined facts."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
         for bit in waiting:  # the list grows
@@ -110,7 +115,10 @@ def _meaning(
     circular: AbstractSet[int],
     means: dict[int, tuple[int, ...]],
 ) -> None:
-    """Enter the meaning of a bit into `means`: the bits of its alternative if there is only one, otherwise the bit itself."""
+    """Enter the meaning of a bit into `means`.
+
+    The meaning of a bit with a single alternative is the bits of this alternative. The meaning of any other bit is the bit.
+    """
     waiting = [bit]
     while waiting:
         one = waiting[-1]
@@ -128,7 +136,7 @@ def _meaning(
 
 
 def expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
-    """Return pairs of row and bit in which each bit is replaced by its meaning."""
+    """Return the pairs of a row and a bit in which the bits of its meaning replace each bit."""
     counts = np.diff(means.starts)[bit]
     return np.repeat(row, counts), means.items[ranges(means.starts[bit], counts)]
 

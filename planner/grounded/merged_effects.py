@@ -1,4 +1,4 @@
-"""Conditional effects of the same shape merged into one effect, so that one join grounds them."""
+"""Merging of conditional effects of the same shape into one effect that a single join grounds."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from confab.reasoner.symbols import Parameter, Problem, RelationCondition, Situa
 
 
 def lifted(problem: Problem, level: int) -> Problem:
-    """Return a problem in which conditional effects of the same shape are one effect, over the rows of an auxiliary relation.
+    """Return a problem in which conditional effects of the same shape are one effect over the rows of an auxiliary relation.
 
-    In a problem, an effect on every member of a class is one effect per individual. A cube of 26 faces has thousands of effects,
-    and each would need a separate join.
+    In a problem, an effect on every member of a class is a separate effect for each individual. The model of a cube puzzle has
+    thousands of such effects, and each effect would need a separate join.
     """
     relations: dict[str, frozenset[tuple[str, ...]]] = {}
     behaviors = dict(problem.domain.behaviors)
@@ -54,9 +54,9 @@ def _parts(effect: ValueEffect) -> list[ValueEffect | ValueCondition]:
 
 
 def _shape(effect: ValueEffect) -> object:
-    """Return the common shape of effects that differ only in individuals.
+    """Return the shape of an effect; effects that differ only in individuals have the same shape.
 
-    Conditions other than value conditions are part of the shape unchanged.
+    The shape contains conditions other than value conditions unchanged.
     """
     values = tuple(
         (type(p), p.situation, tuple(t if is_variable(t) else "" for t in p.arguments), p.value) for p in _parts(effect)
@@ -70,7 +70,7 @@ def _constants(effect: ValueEffect) -> tuple[str, ...]:
 
 
 def _kinds(effect: ValueEffect, situations: Mapping[str, SituationType]) -> list[str]:
-    """Return the class of each constant."""
+    """Return the class of each constant of an effect."""
     return [
         kind
         for part in _parts(effect)
@@ -80,7 +80,7 @@ def _kinds(effect: ValueEffect, situations: Mapping[str, SituationType]) -> list
 
 
 def _with_constants(effect: ValueEffect, terms_: Iterator[str]) -> ValueEffect:
-    """Return an effect with its constants replaced by other terms."""
+    """Return an effect whose constants are replaced by the given terms."""
 
     def put(arguments: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(term if is_variable(term) else next(terms_) for term in arguments)

@@ -1,16 +1,17 @@
-"""The order by novelty: states first that have a fact that no earlier state at the same distance from the goal had.
+"""The search order by novelty: states with a new fact come first.
 
-open:       goals that don't hold, and landmarks that haven't been reached
-distance:   a pair: the number of open goals and landmarks, and the number of facts of the last relaxed plan that have been reached;
-            a relaxed plan is made after a goal or landmark has been reached
-novel:      a state is novel if it has a fact that no earlier state of the same distance had: one "and" of two integers
-open list:  states by novelty, then by the number of open goals and landmarks; among equal states the newest comes first
+A goal is open if it doesn't hold. A landmark is open if the path to the state hasn't reached it. The distance of a state is a pair
+of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed plan. A new relaxed plan is
+computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier state with the same distance had.
+This test is one operation on two integers. The open list is sorted by novelty, then by the number of open goals and landmarks.
+Among equal states, the newest state comes first.
 
-Since relaxed plans are made only for expanded states that reach an open goal or landmark, the order ranks a hundred thousand
-states a second. No state is dropped: if the open list is exhausted, there is no plan.
+Relaxed plans are computed only for expanded states that reach an open goal or landmark. Therefore the order ranks a hundred
+thousand states per second. The order drops only states from which the goal is unreachable. If the open list is empty, there is no
+plan.
 
-Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
-restricted to width one.
+The method is best-first width search with novelty of width one (Lipovetzky and Geffner, "Best-first width search: exploration and
+exploitation in classical planning", AAAI 2017).
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 CHILD, VISIT = 20, 2
-"""Number of bits that h_FF processes in the time that making a successor takes, and that visiting a tree node takes."""
+"""Time to make a successor, and time to visit a node of the successor tree, in bits that h_FF processes in this time."""
 
 
 class Progress(NamedTuple):
-    """The progress of a state: number of open goals and landmarks, landmarks ahead, facts of the relaxed plan, and reached facts.
+    """The progress of a state.
 
-    `wanted`, the facts of the relaxed plan, is -1 until the plan is made.
+    `open` is the number of open goals and landmarks, and `unmet` is the mask of open landmarks. `wanted` is the mask of the relaxed
+    plan's facts; -1 if the relaxed plan isn't computed. `met` is the mask of the reached facts of the relaxed plan.
     """
 
     state: int
@@ -42,7 +44,10 @@ class Progress(NamedTuple):
 
 
 class Novelty:
-    """The search order by novelty for a task. `marks` are landmarks; a relaxed plan costs `relaxing` bits; `counts` is updated."""
+    """The search order by novelty for a task.
+
+    `marks` is the mask of the landmarks. `relaxing` is the work of a relaxed plan in bits. The order adds its effort to `counts`.
+    """
 
     def __init__(self, task: Task, evaluate: Evaluate, relaxing: int, marks: int, counts: Counts) -> None:
         self.task, self.evaluate, self.counts = task, evaluate, counts
@@ -78,7 +83,7 @@ class Novelty:
                         return
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by its novel facts."""
+        """Rank a newly reached state by its novel facts."""
         state, begin = candidate.state, self.begin
         missing, unmet = self.task.goal & ~state, begin.unmet & ~state
         if not missing:
@@ -94,7 +99,7 @@ class Novelty:
         self.open.push((not state & ~old, open_, -len(self.reached)), place)
 
     def relaxed(self, place: Progress) -> Progress | None:
-        """Return the progress of a state with the facts of its relaxed plan; None if the goal is unreachable."""
+        """Return the progress of a state with the facts of a relaxed plan; None if the goal is unreachable."""
         if place.wanted >= 0:
             return place
         evaluation = self.evaluate(place.state)
@@ -110,7 +115,7 @@ class Novelty:
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
-    """Return the bits that an operator keeps, and the bits that it sets; None if these depend on the state."""
+    """Return the bits that an operator keeps, and the bits that the operator sets; None if the bits depend on the state."""
     changes = task.changes_of(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None

@@ -1,17 +1,19 @@
-"""Cheaper plans: a window of steps is replaced if a bounded search finds cheaper steps with the effects that later steps need.
+"""Reduction of the cost of a plan by replacing windows, that is, sequences of consecutive steps.
 
-window:     consecutive steps; a replacement starts in the same state and sets the bits that the later steps and the goal require,
-            with amounts that still let the later steps reach the goal
-operators:  the operators nearest to the window: reachable in few steps from its start, and useful in few steps before its end
-search:     A* with h_FF on these operators (`confab.planner.grounded.shortest`); states from which h allows no cheaper plan are cut
-whole:      in the end the remaining work is spent on the whole plan as one window, with all operators and a greater weight of h
-order:      windows are tried on the given plan and on a regrouped plan, where a step follows a step that it depends on
-cost:       of two equally cheap plans, the one with fewer steps is the cheaper one (`TRIFLE`); so equal costs count steps
+A replacement starts in the same state as the window, and sets the bits that later steps and the goal require. The amounts after
+the replacement must still let the later steps reach the goal. The search for a replacement uses the operators nearest to the
+window. An operator is near if few steps lead from the start of the window to the operator, and few steps from the operator to the
+end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). States from which h allows no cheaper plan are
+dropped.
 
-Work is counted in operators examined and never in seconds, so that the same plan is shortened in the same way on any machine.
+Windows are tried on the given plan and on a regrouped plan, in which each step follows a step that it depends on. Finally, the
+remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally cheap plans,
+the plan with fewer steps counts as cheaper (`TRIFLE`).
 
-Action elimination (`shortened`): Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
-2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
+Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
+
+Action elimination (`shortened`) is described by Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
+2010. Windows of plans are described by Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
 """
 
 from __future__ import annotations
@@ -34,23 +36,25 @@ from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
 STATES, STEPS = 400, 12
-"""Maximum number of states, and of steps of the given plan, for a search of a cheapest plan before windows are tried."""
+"""Maximum number of states, and of steps of the given plan, for the search for a cheapest plan before windows are tried."""
 WAYS = 20
-"""Number of alternatives of derived bits processed in the time of one operator."""
+"""Number of alternatives of derived bits that are processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
-"""Lengths of windows in steps; long windows can contain whole round trips that a shorter plan avoids."""
+"""Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
 OPERATORS, EVALUATIONS = 150, 100
 """Maximum number of operators, and of evaluations of h_FF, in the search of a window."""
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
-"""Maximum number of replayed operators when removing needless steps."""
+"""Maximum number of replayed operators when superfluous steps are removed."""
 LOOK = 50
-"""Number of operators ranked in the time of one evaluation."""
+"""Number of operators that are ranked in the time of one evaluation."""
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
-    """Return a plan that costs at most as much: a cheapest plan if few states suffice to prove it, otherwise with windows replaced.
+    """Return a plan that costs at most as much as the given plan.
+
+    The result is a cheapest plan if a search of few states proves this; otherwise the result is a plan with replaced windows.
 
     Parameters
     ----------
@@ -58,9 +62,9 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     plan : sequence of int
         Operators that lead from the task's initial state to its goal.
     work : int
-        Maximum number of operators examined; half a million to a million are examined per second.
+        Maximum number of examined operators; the function examines half a million to a million operators per second.
     deadline : float, optional
-        On the clock of `time.perf_counter`.
+        The deadline on the clock of `time.perf_counter`.
     """
     if task.prices or len(set(task.costs)) > 1 or not any(task.costs):
         prices = {operator: price.plus(Linear((), Fraction(TRIFLE))) for operator, price in task.prices.items()}
@@ -82,12 +86,15 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
 
 
 def cheaper(task: Task, plan: Sequence[int], other: Sequence[int]) -> list[int]:
-    """Return the cheaper of two plans; the first if their costs are equal."""
+    """Return the cheaper of two plans, or the first plan if their costs are equal."""
     return list(other if task.cost_of(other) < task.cost_of(plan) else plan)
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
-    """Return a cheapest plan, or the given plan if a few states don't suffice, and whether the plan is proved cheapest."""
+    """Return a plan, and whether it is proved to be a cheapest plan.
+
+    The plan is the given plan if a search of few states finds no cheaper plan.
+    """
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
@@ -98,7 +105,7 @@ def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
     """Return a plan without the steps that neither the goal nor a remaining step requires.
 
-    In a very long plan only the first steps are tested.
+    In a very long plan, the function tests only the first steps.
     """
     plan = list(plan)
     state, i, work = task.initial, 0, TRIALS
@@ -117,9 +124,10 @@ def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) ->
 
 
 def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
-    """Return a plan reordered so that a step follows the latest step that it depends on; the same plan if the order is invalid.
+    """Return a plan in another order, in which each step follows the latest step that it depends on.
 
-    Steps keep their order if one depends on the other or would undo the other's precondition.
+    Two steps keep their order if one depends on the other, or if one would make the other's precondition false. If the new order
+    doesn't reach the goal, return the plan in the given order.
     """
     n = len(plan)
     states = _states(task, plan)
@@ -190,22 +198,25 @@ def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
 
 @dataclass
 class _Windows:
-    """The common data of the windows of one task; `work` counts down."""
+    """The common data of the windows of one task; `work` is the remaining work."""
 
     task: Task
     work: int
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
-    """Windows without a cheaper replacement: state, required bits, cost."""
+    """Windows without a cheaper replacement, each as a state, required bits and a cost."""
 
     @cached_property
     def cut(self) -> float:
-        """The share of h_FF by which states are cut: h_FF may be too large, if a dear step serves many others."""
+        """The weight of h_FF when states are dropped.
+
+        The weight is below 1 if costs differ, because h_FF may then exceed the remaining cost.
+        """
         return min(self.task.costs) / max(self.task.costs)
 
     @property
     def over(self) -> bool:
-        """Whether the work is used up."""
+        """Whether the work is used up or the deadline has passed."""
         return self.work <= 0 or self.late
 
     @property
@@ -214,7 +225,7 @@ class _Windows:
         return self.deadline is not None and perf_counter() > self.deadline
 
     def pass_over(self, plan: list[int], size: int) -> list[int]:
-        """Return the plan after windows of `size` steps have been tried, each overlapping the previous window by half."""
+        """Return the plan after trying windows of `size` steps; each window overlaps the previous window by half."""
         states, needed = _states(self.task, plan), self.needed(plan)
         start = 0
         while start < len(plan) - 1 and not self.over:
@@ -234,7 +245,7 @@ class _Windows:
         return plan
 
     def needed(self, plan: Sequence[int]) -> list[int]:
-        """Return for each position of a plan the bits that the steps after the position and the goal require."""
+        """Return, for each position of a plan, the bits that the later steps and the goal require."""
         states = _states(self.task, plan)
         wanted = self.task.goal
         found = [wanted]
@@ -250,7 +261,10 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int, spent: float) -> list[int] | None:
-        """Search for steps from a state to the required bits that cost less than `spent`, with operators near the window."""
+        """Search for a replacement of a window: steps from a state to the required bits that cost less than `spent`.
+
+        Return None if the search with operators near the window finds no replacement.
+        """
         if (state, wanted, spent) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
@@ -262,21 +276,21 @@ class _Windows:
         return [operators[operator] for operator in found]
 
     def restarted(self, plan: list[int]) -> list[int]:
-        """Return a cheaper plan found by a search with all operators, within the remaining work; otherwise the same plan."""
+        """Return a cheaper plan that a search with all operators finds within the remaining work, or the given plan."""
         following = 1 + self.task.derived.effort // WAYS
         most = self.work // (max(len(self.task.owners), 1) * following)
         found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
         return plan if found is None else shortened(self.task, found, self.deadline)
 
     def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
-        """Search for a plan cheaper than `upper` by A*; states whose cost plus h_FF reaches `upper` are cut."""
+        """Search for a plan cheaper than `upper` by A*; drop states whose cost plus weighted h_FF reaches `upper`."""
         found = shortest(task, cost_left(task), upper, deadline=self.deadline, known=most, weight=weight, cut=self.cut)
         self.work -= len(found.states) * len(task.owners)
         return None if found.plan is None else list(found.plan)
 
     @cached_property
     def arrays(self) -> tuple[Ints, Ints, Ints]:
-        """Arrays: the owner of each relaxed operator, and the relaxed operator of each entry of the needs and of the adds."""
+        """Three arrays: the owners of the relaxed operators, and the relaxed operators of all required and all added bits."""
         task = self.task
         number = np.arange(len(task.owners))
         return (
@@ -286,15 +300,15 @@ class _Windows:
         )
 
     def flags(self, bits: int) -> NDArray[np.bool_]:
-        """Return for each bit whether it is set."""
+        """Return an array that contains, for each bit, whether the bit is set."""
         packed = np.frombuffer(bits.to_bytes((self.task.size + 7) // 8, "little"), np.uint8)
         return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
 
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
-        """Return the operators nearest to a window, in ascending order, including the window's own operators.
+        """Return the operators nearest to a window in ascending order, including the operators of the window.
 
-        Operators that clear a required bit that no step of the window clears are left out, since their effect would have to be
-        undone.
+        An operator is excluded if it clears a required bit that no step of the window clears. Another operator would have to set
+        this bit again.
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
@@ -342,9 +356,10 @@ class _Windows:
         return sorted(chosen)
 
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
-        """Return the task of reaching the required bits from a state by some operators, and the operators that the task has.
+        """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
 
-        Symbols that these operators don't change have no bits; operators that require another value of such symbols are left out.
+        The task has no bits for symbols that these operators don't change. Operators that require another value of such a symbol
+        are excluded.
         """
         task = self.task
         if task.amounts is not None:
@@ -397,7 +412,10 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the task of a window with all bits of the whole task, since a state's amounts are numbered above these bits."""
+        """Return the task of a window with all bits of the whole task.
+
+        A state with amounts contains the number of a tuple above the bits of the whole task.
+        """
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]
@@ -417,7 +435,7 @@ class _Windows:
         )
 
     def _rows(self, operators: Sequence[int]) -> list[int]:
-        """Return the relaxed operators of these operators and of their conditional effects."""
+        """Return the relaxed operators that belong to the given operators and their conditional effects."""
         return [*operators, *sorted(chain.from_iterable(self._conditional.get(operator, ()) for operator in operators))]
 
     @cached_property

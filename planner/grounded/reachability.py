@@ -1,4 +1,4 @@
-"""Relaxed reachability: the facts of a level that can become true under delete relaxation, by joins in rounds."""
+"""Relaxed reachability: rounds of joins compute the facts of a level that can become true under delete relaxation."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 
 class Reached:
-    """The tables of a level, with all facts that are reachable under delete relaxation.
+    """The tables of a level with all facts that are reachable under delete relaxation.
 
     Attributes
     ----------
     tables : mapping of (kind, name) to JoinTable
-        The kind is situation, relation or class. A row of a situation type has the arguments and the value. A row of a boolean
-        situation type has no value, since only true facts are listed.
+        The kind is situation, relation or class. A row of a situation type contains the arguments and the value. A row of a boolean
+        situation type contains only the arguments, because the table lists only true facts.
     rows : list of Ints
-        For each schema, the rows that match it, with a column of individuals for each of its terms.
+        The matching rows of each schema, with a column of individuals for each term of the schema.
     changed : set of situation types
         Situation types that behaviours change or rules define.
     together : set of relations
-        Auxiliary relations for effects of the same shape.
+        Auxiliary relations for merged effects of the same shape.
     made : set of situation types
         Auxiliary situation types that represent a part of a rule.
     """
@@ -146,7 +146,7 @@ class Reached:
         table.add(np.array(flat, np.int64).reshape(len(rows), arity))
 
     def close(self) -> None:
-        """Join every schema with the rows that the last round added, until a round adds none."""
+        """Join every schema with the rows that the last round added, until a round adds no row."""
         fluents = [("situation", name) for name in self.situations]
         before = dict.fromkeys(fluents, 0)
         found: list[list[Ints]] = [[] for _ in self.schemas]
@@ -175,7 +175,7 @@ class Reached:
     def _new_rows(
         self, schema: Schema, before: Mapping[tuple[str, str], int], size: Mapping[tuple[str, str], int], first: bool
     ) -> Iterator[Ints]:
-        """Yield the schema's rows that use at least one fact of the last round, each combination of facts once."""
+        """Yield the rows of a schema that use at least one fact of the last round; each combination of facts occurs once."""
         fluent = [i for i, atom in enumerate(schema.atoms) if atom.fluent]
         if not fluent and first:
             yield from self.joined(schema, None, {})
@@ -191,7 +191,10 @@ class Reached:
     def joined(
         self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
     ) -> Iterator[Ints]:
-        """Yield at most one array: the rows of a schema's terms that match every atom within the atom's range of table rows."""
+        """Yield at most one array: the rows of a schema's terms that match all atoms.
+
+        `ranges` restricts atoms to ranges of table rows.
+        """
         columns: dict[str, Ints] = {}
         count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
         while waiting:
@@ -212,14 +215,14 @@ class Reached:
             )
             columns, count = self._projected(columns, count, wanted)
         self.check_time()
-        for condition in filters:  # remaining filters: there are no atoms, or only local variables
+        for condition in filters:  # the remaining filters have only local variables, or the schema has no atoms
             keep = self._decide(condition, columns, count, schema.kinds)
             columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
         if count:
             yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
 
     def _projected(self, columns: dict[str, Ints], count: int, wanted: Set[str]) -> tuple[dict[str, Ints], int]:
-        """Return the columns of the variables in `wanted`, each distinct row once, and the number of rows."""
+        """Return the distinct rows of the columns for the variables in `wanted`, and the number of rows."""
         left = {name: column for name, column in columns.items() if name in wanted}
         if len(left) == len(columns):
             return columns, count
@@ -235,7 +238,7 @@ class Reached:
         check("grounding")
 
     def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
-        """Return the atom that matches the fewest rows, the first among equals; atoms without unbound variables come first."""
+        """Return the position of the first atom that matches the fewest rows; atoms without unbound variables are preferred."""
         best, least = -1, float("inf")
         for i in waiting:
             rows = self._fan_out(schema.atoms[i], columns)
@@ -246,14 +249,14 @@ class Reached:
         return best
 
     def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
-        """Estimate how many rows of the atom's table match one row of `columns`."""
+        """Return an estimate of the number of rows of the atom's table that match one row of `columns`."""
         free = len({t for t in atom.terms if t.startswith("?")} - columns.keys())
         return float(max(len(self.tables[atom.table]), 1) ** (free / max(len(atom.terms), 1)) - (not free))
 
     def _step(
         self, atom: Atom, columns: dict[str, Ints], count: int, limits: tuple[int, int] | None
     ) -> tuple[dict[str, Ints], int]:
-        """Join `columns` with an atom; return the joined columns and their number of rows."""
+        """Join `columns` with an atom; return the joined columns and the number of their rows."""
         table = self.tables[atom.table]
         if table.arity != len(atom.terms):
             return {name: column[:0] for name, column in columns.items()} | {
@@ -296,7 +299,7 @@ class Reached:
         return {t for t in mentions(condition) if t in bound}
 
     def _decide(self, condition: Condition, columns: Mapping[str, Ints], count: int, kinds: Mapping[str, str]) -> Flags:
-        """Return for each row whether a static condition holds."""
+        """Return an array that contains, for each row, whether a static condition holds."""
         match condition:
             case EqualityCondition(left, right, negated):
                 a, b = (columns[t] if t in columns else self.number.get(t, -1) for t in (left, right))
@@ -329,11 +332,14 @@ class Reached:
 
     @cached_property
     def formulas(self) -> Formulas:
-        """Evaluates conditions; before bits are assigned, only static conditions."""
+        """The evaluation of static conditions."""
         return Formulas(self)
 
     def effect_rows(self, schema: Schema, effect: ValueEffect, rows: Ints, value: bool = True) -> Ints:
-        """Return the table row that an effect makes true for each row of a schema; without `value`, only the row's symbol."""
+        """Return the table row that an effect makes true, for each row of a schema.
+
+        Without `value`, the table rows contain only the arguments of the symbol.
+        """
         boolean = self.situations[effect.situation].boolean
         terms = effect.arguments if boolean or not value else (*effect.arguments, effect.value)
         place = {name: column for column, name in enumerate(schema.terms)}
@@ -341,7 +347,7 @@ class Reached:
         return np.stack(columns, axis=1) if columns else np.zeros((len(rows), 0), np.int64)
 
     def _exists(self, name: str, rows: Ints) -> Flags:
-        """Return for each row of a situation type's table whether the row's symbol exists."""
+        """Return an array that contains, for each row of a situation type, whether the symbol of the row exists."""
         situation = self.situations[name]
         if not situation.boolean:
             return self.symbols[name].find(rows[:, :-1]) >= 0
@@ -351,7 +357,7 @@ class Reached:
         return exists
 
     def possible(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a fact is reachable if nothing ever becomes false."""
+        """Return whether a fact is reachable under delete relaxation."""
         situation = self.situations.get(symbol.situation)
         if situation is None:
             return symbol in self.amounts.now
@@ -360,7 +366,7 @@ class Reached:
         return self.find(situation, symbol.arguments, value) >= 0
 
     def find(self, situation: SituationType, arguments: Sequence[str], value: str) -> int:
-        """Return the row of a fact in its table, or -1."""
+        """Return the row of a fact in the table of its situation type, or -1 if the fact is unreachable."""
         words = arguments if situation.boolean else (*arguments, value)
         numbers = [self.number.get(word, -1) for word in words]
         table = self.tables["situation", situation.name]

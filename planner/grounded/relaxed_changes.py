@@ -1,4 +1,4 @@
-"""Changes by relaxed operators: effects on facts, changes of amounts, and the bits that these may set."""
+"""Changes by relaxed operators: effects on facts, changes of amounts, and the bits that the changes may set."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ class RelaxedChanges:
         self.reached, self.formulas, self.bits = reached, formulas, bits
 
     def effects(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> Ints:
-        """Return a row for each effect on a fact: relaxed operator, position of the effect, symbol, and bit (-1: false)."""
+        """Return an array with a row for each effect on a fact.
+
+        A row contains the relaxed operator, the position of the effect, the symbol, and the bit, or -1 for the value false.
+        """
         parts = []
         for i, begin in first.items():
             schema = self.reached.schemas[i]
@@ -48,7 +51,7 @@ class RelaxedChanges:
         return np.concatenate(parts) if parts else np.empty((0, 4), np.int64)
 
     def moves(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> dict[int, list[Move]]:
-        """Return the changes of amounts for each relaxed operator that changes amounts."""
+        """Return the changes of amounts by each relaxed operator that changes amounts."""
         names, table = self.reached.individuals, self.reached.amounts
         found = defaultdict[int, list[Move]](list)
         for i, begin in first.items():
@@ -63,7 +66,7 @@ class RelaxedChanges:
         return found
 
     def pushed(self, moves: Mapping[int, Sequence[Move]], owner: Ints) -> tuple[Ints, Ints]:
-        """Return pairs of a relaxed operator and the bit of a comparison that it may make true."""
+        """Return pairs of a relaxed operator and the bit of a comparison that the operator may make true."""
         by_place = defaultdict[int, list[tuple[Linear, str]]](list)
         for difference, sign in self.reached.amounts.bits:
             for place, _ in difference.terms:
@@ -98,10 +101,10 @@ class RelaxedChanges:
         count: int,
         pushed: tuple[Ints, Ints],
     ) -> tuple[Grouped, list[tuple[tuple[int, ...], int]]]:
-        """Return the bits that each relaxed operator may set, and pairs of bits implied by auxiliary bits.
+        """Return the bits that each relaxed operator may set, and the bits that auxiliary bits imply.
 
-        An effect sets complements only of values that its symbol may have had. If these are many, the effect sets one auxiliary bit
-        "changed" of the symbol instead, which implies the complements in the relaxed task.
+        An effect sets the complements of the values that its symbol may have had before. If there are many such complements, the
+        effect sets one auxiliary bit "changed" of the symbol instead. In the relaxed task, this bit implies the complements.
         """
         changed: dict[int, int] = {}
         opposites: dict[int, dict[int, int]] = {}
@@ -148,7 +151,10 @@ def only(groups: Grouped, wanted: Flags) -> Grouped:
 def with_derived(
     need: Grouped, add: Grouped, owner: Ints, cases: Sequence[tuple[tuple[int, ...], int]]
 ) -> tuple[Grouped, Grouped, Ints]:
-    """Return needs, additions and owners, with one more relaxed operator for each alternative of a derived bit."""
+    """Return the required bits, the added bits and the owners with an additional relaxed operator for each alternative.
+
+    The alternatives are those of derived bits.
+    """
     if not cases:
         return need, add, owner
     more = np.array([bit for group, _ in cases for bit in group], np.int64)

@@ -1,11 +1,10 @@
-"""Behaviours prepared for joins: conjunctions of atoms, filters, and other conditions that depend on the state.
+"""Behaviours prepared for joins: each behaviour becomes a schema with atoms, filters and a residue.
 
-Atom:       a condition that rows of a table match: a positive value condition or relation condition, a class condition
-filter:     a condition that static facts decide once its variables are bound
-residue:    all other conditions: negated values, disjunctions, "no object such that"
+An atom is a condition that the rows of a table match: a positive value condition, a positive relation condition, or a class
+condition. A filter is a condition that static facts decide. The residue contains all other conditions, such as negated values,
+disjunctions and negated quantifiers.
 
-A positive `Witness` becomes a separate variable. Variables that no atom binds are local to the condition in which they occur.
-
+A positive `Witness` becomes a variable of the schema. A variable that no atom binds is local to its condition.
 """
 
 from __future__ import annotations
@@ -38,7 +37,10 @@ from confab.reasoner.symbols import (
 
 @dataclass(frozen=True)
 class Atom:
-    """A row of a table of a situation type (arguments, then the value unless the type is boolean), a relation or a class."""
+    """A condition that the rows of a table match; the table is that of a situation type, a relation or a class.
+
+    For a situation type that isn't boolean, `terms` are the arguments and the value.
+    """
 
     table: tuple[str, str]
     terms: tuple[str, ...]
@@ -47,11 +49,10 @@ class Atom:
 
 @dataclass(frozen=True)
 class Schema:
-    """A behaviour, or one of its conditional effects, as a join.
+    """A behaviour, or a conditional effect of a behaviour, in the form of a join.
 
-    `terms` identify an operator; other variables are used in the join, then dropped. The terms of a conditional effect begin with
-    the terms of its behaviour. `effects` and `amounts` are pairs of position and effect, in order of execution.
-
+    `terms` identify an operator; the join drops other variables. The terms of a conditional effect begin with the terms of its
+    behaviour. `effects` and `amounts` contain pairs of a position and an effect, in order of execution.
     """
 
     behavior: Behavior
@@ -69,8 +70,9 @@ class Schema:
 def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[list[Behavior], dict[str, SituationType]]:
     """Return rules in which each witness has a separate auxiliary rule, and the auxiliary situation types.
 
-    Joining "there is a full cup, and there is a free shelf" at once would give all pairs. So a witness becomes an auxiliary
-    situation type over the terms that it shares with other conditions, unless no other condition of the rule can change.
+    A single join of "there is a full cup and there is a free shelf" would yield all pairs of a cup and a shelf. Therefore a witness
+    becomes an auxiliary situation type over the terms that the witness shares with other conditions. The exception is a rule
+    without other changing conditions.
     """
     found: list[Behavior] = []
     made: dict[str, SituationType] = {}
@@ -120,7 +122,7 @@ def schemas(
     changed: frozenset[str],
     members: Callable[[str], frozenset[str]],
 ) -> list[Schema]:
-    """Return the schema of a behaviour, followed by one for each of its conditional effects.
+    """Return the schema of a behaviour, followed by a schema for each conditional effect of the behaviour.
 
     Parameters
     ----------
@@ -214,7 +216,7 @@ class _Compiler:
     def _flat(
         self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
     ) -> Iterator[Condition]:
-        """Yield the conjuncts, with positive witnesses expanded; variables that are not `shared` get unique names."""
+        """Yield conjuncts in which conditions replace positive witnesses; variables that aren't `shared` get unique names."""
         for condition in conditions:
             if isinstance(condition, Witness) and not condition.negated:
                 yield from self._opened(
@@ -235,7 +237,7 @@ class _Compiler:
         kinds: dict[str, str],
         fresh: Iterator[int],
     ) -> Iterator[Condition]:
-        """Yield the conjuncts of a group, with unique names for the variables that only the group uses."""
+        """Yield the conjuncts of a group of conditions, with unique names for variables that only the group uses."""
         own = {name: kinds[name] for name in sorted(plain_variables(group) - shared - witness.keys())} | {**witness}
         names = {name: f"?{next(fresh)}{name[1:]}" for name in own}
         kinds |= {names[name]: kind for name, kind in own.items()}
@@ -243,7 +245,10 @@ class _Compiler:
         yield from self._flat([substituted(c, names) for c in group], shared | set(names.values()), kinds, fresh)
 
     def _plain(self, condition: ValueCondition, kinds: Mapping[str, str]) -> Iterator[Condition]:
-        """Yield a condition on a boolean symbol as conditions that the symbol is true or not true, and that it exists."""
+        """Yield conditions that are equivalent to a value condition and mention only the value true of boolean symbols.
+
+        If a boolean symbol must be false, the conditions also require that the symbol exists.
+        """
         situation = self.situations[condition.situation]
         if not situation.boolean or condition.value == TRUE:
             yield condition
@@ -281,5 +286,5 @@ class _Compiler:
 
 
 def plain_variables(group: Sequence[Condition]) -> set[str]:
-    """Return the variables of a group's conditions, except variables inside nested witnesses and disjunctions."""
+    """Return the variables of a group of conditions, except variables inside witnesses and disjunctions."""
     return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

@@ -1,7 +1,8 @@
-"""Removal from schemas of variables that no effect names: a move with some crane is one operator instead of one per crane.
+"""Removal of variables that no effect names from schemas.
 
-The conditions on such a variable become an auxiliary rule over its neighbouring terms. Each join then has the rows of one part
-instead of all pairs of rows of both parts.
+For example, a move that requires some free crane becomes one operator instead of one operator for each crane. The conditions on the
+removed variable become an auxiliary rule over the other terms of these conditions. Each join then has the rows of one part instead
+of all pairs of rows of both parts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ Members = Callable[[str], frozenset[str]]
 
 
 def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, SituationType]]:
-    """Return a schema without the variables that only conditions use, rules for these conditions, and their situation types.
+    """Return a schema without the variables that only conditions use, the rules for these conditions, and their situation types.
+
+    A variable is removed only if the removal saves rows.
 
     Parameters
     ----------
@@ -65,9 +68,10 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
 def _separable(
     schema: Schema, named: set[str], members: Members
 ) -> tuple[int, str, tuple[str, ...], tuple[str, ...]] | None:
-    """Select the variable whose removal leaves the fewest rows; return that number, the variable, its neighbours, the other terms.
+    """Return the variable whose removal leaves the fewest rows.
 
-    Return None if no removal saves rows.
+    The result contains the number of rows, the variable, the terms that occur with the variable in conditions, and the remaining
+    terms of the schema. Return None if no removal saves rows.
     """
     every = {term for atom in schema.atoms for term in atom.terms if is_variable(term)}
 

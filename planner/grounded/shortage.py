@@ -1,10 +1,11 @@
-"""Proof of unsolvability by shortage: a sum of amounts that no operator increases is less than the goal requires.
+"""Proof of unsolvability by shortage: a sum that no operator increases is less than the goal requires.
 
-The sum has two kinds of terms: amounts of a situation type (of all symbols or of one symbol), and facts set by operators that
-consume such amounts. The worth of a fact is the least amount that an operator consumes to set it (divided among the facts that
-the operator sets together). An operator that returns an amount (returning a lent book frees its place) doesn't increase the sum
-if it also clears facts of at least that worth. The goal requires the worth of its facts, plus the amount that must remain
-because of the goal or the bounds.
+The sum has two kinds of terms. The first kind are the amounts of a situation type, either of all symbols or of one symbol. The
+second kind are facts that operators set while consuming such amounts. The worth of a fact is the least amount that an operator
+consumes to set the fact. If an operator sets several facts together, the consumed amount is divided among these facts. An operator
+that returns an amount doesn't increase the sum if the operator also clears facts of at least the same worth. For example, the
+return of a lent book increases the number of books, and clears the fact that a reader has the book. The goal requires the worth of
+its facts, plus the amount that must remain because of the goal or the bounds.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from confab.reasoner.amounts import written
 
 
 def shortage(task: Task) -> Reason | None:
-    """Return the reason, with the missing quantity, if a sum shows that an amount doesn't suffice for the goal."""
+    """Return the reason why an amount doesn't suffice for the goal; None if no sum proves a shortage."""
     amounts = task.amounts
     if amounts is None:
         return None
@@ -46,7 +47,7 @@ def shortage(task: Task) -> Reason | None:
 
 @dataclass(frozen=True)
 class _Sums:
-    """The terms of a sum: amounts of one situation type, and facts that stand for consumed amounts."""
+    """The sums of a task: amounts of one situation type, plus facts that represent consumed amounts."""
 
     task: Task
     amounts: Amounts
@@ -54,7 +55,7 @@ class _Sums:
     moves: Mapping[int, Sequence[Move]]
 
     def short(self) -> Reason | None:
-        """Return the reason if some sum is less than the goal requires."""
+        """Return the reason why the goal is unreachable if some sum is less than the goal requires, otherwise None."""
         places = defaultdict[str, list[int]](list)
         for place, symbol in enumerate(self.amounts.symbols):
             places[symbol.situation].append(place)
@@ -67,7 +68,10 @@ class _Sums:
         return None
 
     def wanted_of(self, places: Sequence[int], left: Fraction) -> Reason | None:
-        """Return the reason if the sum over the amounts at `places` is less than the goal requires; `left` is what must remain."""
+        """Return the reason why the goal is unreachable if the sum for the amounts at `places` is too small, otherwise None.
+
+        `left` is the amount that must remain in the goal state.
+        """
         touched = {o for place in places for o, _ in self.of[place]}
         most = {o: _change(self.moves[o], places) for o in touched}
         used = {o: -change for o, change in most.items() if change is not None and change < 0}
@@ -85,7 +89,7 @@ class _Sums:
 
     @cached_property
     def of(self) -> Mapping[int, Sequence[tuple[int, Move]]]:
-        """The operators that change each amount, with their changes."""
+        """The operators that change an amount, each with its change, by the position of the amount."""
         found = defaultdict[int, list[tuple[int, Move]]](list)
         for o, its in self.moves.items():
             for move in its:
@@ -94,7 +98,7 @@ class _Sums:
 
     @cached_property
     def sets(self) -> Mapping[int, Set[int]]:
-        """The bits that each operator may set."""
+        """The bits that an operator may set, by the operator."""
         found = defaultdict[int, set[int]](set)
         for bits, owner in zip(self.task.adds.lists(), self.task.owners, strict=True):
             found[owner].update(bits)
@@ -102,7 +106,7 @@ class _Sums:
 
     @cached_property
     def makers(self) -> Mapping[int, Sequence[int]]:
-        """The operators that may set each bit."""
+        """The operators that may set a bit, by the bit."""
         found = defaultdict[int, list[int]](list)
         for o, bits in self.sets.items():
             for bit in bits:
@@ -110,7 +114,7 @@ class _Sums:
         return found
 
     def counted(self, used: Mapping[int, Exact]) -> Iterator[Set[int]]:
-        """Yield sets of facts that may count as consumed amounts: the open goals, then the facts of each situation type."""
+        """Yield sets of facts that may represent consumed amounts: the open goals, then the facts of each situation type."""
         task = self.task
         yield {bit for bit in bits_of(task.goal & ~task.initial) if not self.amounts.compared >> bit & 1}
         kinds = {task.facts[bit].symbol.situation for o in used for bit in self.sets[o] if bit < len(task.facts)}
@@ -118,7 +122,10 @@ class _Sums:
             yield {bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == kind}
 
     def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
-        """Return for each bit the least amount consumed by any operator that sets it, divided among bits set together."""
+        """Return the worth of each bit: the least amount that an operator consumes to set the bit.
+
+        The amount is divided among the bits that the operator sets together.
+        """
         found = dict[int, Fraction]()
         for bit in bits:
             makers = self.makers.get(bit, ())
@@ -134,7 +141,7 @@ class _Sums:
         return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))
 
     def least(self, worth: Mapping[int, Fraction]) -> Fraction:
-        """Return the least worth of the facts that the goals require; a fact that can satisfy two goals counts once."""
+        """Return the least worth of the facts that the goals require; a fact that can satisfy several goals counts once."""
         least, serving = dict(worth), {bit: 1 << bit for bit in worth}
         for part in self.task.derived.parts:
             for one in part if len(part) == 1 and not part[0].opposite else ():
@@ -166,7 +173,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """Maps the bit of each lower bound on a single amount to the amount's place and the bound."""
+        """The position of the amount and the bound, by the bit of a comparison that is a lower bound on one amount."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()
@@ -174,12 +181,15 @@ class _Sums:
         }
 
     def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
-        """Return the greatest lower bound on an amount among the comparisons in `bits`; None if there is none."""
+        """Return the greatest lower bound on an amount among the comparisons in `bits`; None if there is no such bound."""
         found = (self.limits[bit] for bit in bits if bit in self.limits)
         return max((wanted for of, wanted in found if of == place), default=None)
 
     def kept(self, place: int) -> Fraction | None:
-        """Return the part of an amount that no operator can consume, since each requires more than it consumes; None if unknown."""
+        """Return the part of an amount that no operator can consume; None if unknown.
+
+        The part exists if every consuming operator requires more than it consumes.
+        """
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:
             if move.operation == "increase" and move.by is not None and not move.by.terms and move.by.constant >= 0:
@@ -191,7 +201,7 @@ class _Sums:
         return least
 
     def left(self, place: int) -> Fraction | None:
-        """Return a lower bound on the amount that is left in any goal state; None if there is no bound."""
+        """Return a lower bound on an amount in every goal state; None if there is no bound."""
         wanted = self.asked(bits_of(self.task.goal), place)
         found = (self.amounts.quantities[place].least, self.kept(place), wanted)
         floor = [limit for limit in found if limit is not None]
@@ -201,7 +211,7 @@ class _Sums:
 def _extent(
     amounts: Amounts, place: int, vector: Vector, moves: Mapping[int, Sequence[Move]]
 ) -> tuple[Fraction | None, Fraction | None]:
-    """Return the minimum and maximum that an amount can reach by the operators; None for no limit."""
+    """Return the minimum and the maximum that operators can give to an amount; None means no limit."""
     low: Fraction | None = Fraction(vector[place])
     high: Fraction | None = Fraction(vector[place])
     for move in (move for its in moves.values() for move in its if move.place == place):

@@ -1,11 +1,13 @@
 """Cheapest plans of a grounded task: A* with a given estimate of the remaining cost.
 
 g:       cost of the operators from the start to a state
-h:       estimated cost from a state to the goal, infinite if the goal is unreachable. If h is a lower bound, the plan is a cheapest
-         one. Lower bounds are `nothing` (breadth-first search), `ways` (each goal alone) and LM-cut
-         (`confab.planner.hierarchical.bounds`).
-f:       g + weight · h; the state with the least f is expanded next. With weight 1, no plan is cheaper than the least open f.
-upper:   the cost that a plan must stay below; states with g + cut · h at or above it are dropped
+h:       estimated cost from a state to the goal; infinite if the goal is unreachable
+f:       g + weight · h; the state with the least f is expanded next
+upper:   upper bound on the cost of a plan; states with g + cut · h at or above this bound are dropped
+
+If h is a lower bound and the weight is 1, the search finds a cheapest plan, and no plan is cheaper than the least f of the open
+states. The lower bounds are `nothing` (breadth-first search), `ways` (each goal separately) and LM-cut
+(`confab.planner.hierarchical.bounds`).
 """
 
 from __future__ import annotations
@@ -28,9 +30,10 @@ Bound: TypeAlias = "Callable[[int], float]"
 
 @dataclass(frozen=True)
 class Shortest:
-    """The result of a search: no plan is cheaper than `bound`, which is infinite if there is no plan.
+    """The result of a search for a cheapest plan.
 
-    `plan` has the operators of the cheapest plan found; `states` has the states that were reached.
+    `bound` is a lower bound on the cost of a plan. `plan` contains the operators of the cheapest plan found; None if no plan was
+    found. `states` contains the reached states.
     """
 
     bound: float
@@ -39,12 +42,15 @@ class Shortest:
 
 
 def nothing(state: int) -> float:
-    """Return the trivial lower bound, 0."""
+    """Return the trivial lower bound 0."""
     return 0.0
 
 
 class Cheapest:
-    """The search order of A* by a bound on the remaining cost; `lower` is the proved lower bound, `counts` is updated."""
+    """The search order of A* by a bound on the remaining cost.
+
+    `lower` is the proved lower bound on the cost of a plan. The order adds its effort to `counts`.
+    """
 
     def __init__(
         self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
@@ -62,7 +68,7 @@ class Cheapest:
             self.open.drop(0)
             h, (_, _, state, cost) = drawn[1]
             if cost > self.reached[state].cost or cost + self.cut * h >= self.upper:
-                continue  # the state was reached more cheaply since, or a plan of at most this cost was found
+                continue  # a cheaper path to the state or a cheap enough plan was found
             self.lower = max(self.lower, cost + self.weight * h)
             self.work += 1
             self.counts.expanded += 1
@@ -74,7 +80,7 @@ class Cheapest:
                     yield Candidate(state, (operator,), after, cost + spent)
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by f, or drop it if no plan through it is cheaper than `upper`; a goal state lowers `upper`."""
+        """Rank a state by f; drop the state if its estimated total cost reaches `upper`; lower `upper` at a goal state."""
         cost = candidate.cost
         h = self.bound(candidate.state)
         if cost + self.cut * h >= self.upper:
@@ -96,7 +102,9 @@ def shortest(
     weight: int = 1,
     cut: float = 1.0,
 ) -> Shortest:
-    """Return a cheapest plan among the plans cheaper than `upper`; at a limit, a lower bound and the cheapest plan found so far.
+    """Search for a cheapest plan among the plans cheaper than `upper`.
+
+    At a limit, return a lower bound and the cheapest plan found so far.
 
     Parameters
     ----------
@@ -106,15 +114,15 @@ def shortest(
     most : int
         Maximum number of expansions.
     deadline : float, optional
-        On the clock of `time.perf_counter`.
+        The deadline on the clock of `time.perf_counter`.
     counts : Counts, optional
-        The numbers of generated and expanded states are added.
+        The counts to which the search adds the generated and the expanded states.
     known : float
         Maximum number of states reached.
     weight : int
-        Weight of h in f. With a weight above 1, a plan is found sooner but may cost more, and the returned bound is meaningless.
+        Weight of h in f. With a weight above 1, the search is faster, but the plan may cost more and the bound is meaningless.
     cut : float
-        Weight of h when states are dropped; below 1 if h may be too large.
+        Weight of h when states are dropped; below 1 if h may exceed the remaining cost.
     """
     order = Cheapest(task, bound, upper, counts or Counts(), weight, cut)
     expanded, lower = 0, None
@@ -128,9 +136,10 @@ def shortest(
 
 
 def ways(task: Task) -> Bound:
-    """Return a lower bound on the cost of a plan: the sum over the goals of the least cost of achieving the goal alone.
+    """Return a lower bound on the cost of a plan: the sum, over all goals, of the least cost of achieving the goal alone.
 
-    Each operator counts for one symbol only, so no plan is cheaper. A goal on a symbol with a single bit adds 0.
+    Each operator counts for only one symbol. Therefore no plan is cheaper than the bound. A goal on a symbol with a single bit
+    contributes 0.
     """
     of_symbol: dict[object, list[int]] = {}
     for bit, fact in enumerate(task.facts):
@@ -171,7 +180,8 @@ def ways(task: Task) -> Bound:
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return three arrays with an entry for each bit that an operator sets.
 
-    They are the operator, the bit of the same symbol that the operator requires (-1: none), and the bit that the operator sets.
+    The first array contains the operators. The second array contains the required bits of the same symbols, or -1. The third array
+    contains the bits that the operators set.
     """
     owner = np.array(task.owners, np.int64)
     setter = owner[np.repeat(np.arange(len(owner)), np.diff(task.adds.starts))]

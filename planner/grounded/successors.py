@@ -1,7 +1,7 @@
-"""Applicable operators of a state: a decision tree over symbols, whose branches are created when a state reaches them.
+"""Applicable operators of a state, found by a decision tree over symbols.
 
-Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search visits few branches, and only these are
-created.
+The tree is the successor generator of Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A branch is
+created when a state first reaches it, because a search visits only few branches.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from confab.planner.grounded.joins import Ints
 from confab.reasoner.limits import check
 
 Waiting = tuple[int, list[int], int]
-"""An operator, its required bits in the order of testing, and their number."""
+"""An operator, its required bits in the order of the tests, and the number of bits that were tested."""
 
 
 class SuccessorTree:
-    """A node of a decision tree: operators by the value that they require of one symbol.
+    """A node of a decision tree that tests one symbol.
 
-    `mask` has the symbol's bits. `by_value` maps each value of the symbol to a subtree; `otherwise` is the subtree of operators
-    without a test of the symbol. `operators` need no further test; `waiting` has operators that aren't in a subtree yet.
+    `mask` contains the bits of the symbol. `by_value` maps each value of the symbol to a subtree. `otherwise` is the subtree of
+    operators without a test of the symbol. `operators` need no further test. `waiting` contains operators that aren't in a subtree
+    yet.
     """
 
     __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")
@@ -56,7 +57,10 @@ class SuccessorTree:
         return found, visited
 
     def _branch(self) -> None:
-        """Distribute the waiting operators over subtrees, by the value of the symbol that the first waiting operator tests."""
+        """Distribute the waiting operators over subtrees.
+
+        The node tests the symbol that the first waiting operator tests next.
+        """
         masks, others = self.masks, []
         by_value: dict[int, list[Waiting]] = {}
         for one in self.waiting:
@@ -76,14 +80,14 @@ class SuccessorTree:
 
 
 def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:
-    """Return the tree of operators; symbols that many operators require are tested first.
+    """Return the decision tree of operators; symbols that many operators require are tested first.
 
     Parameters
     ----------
     starts, items : array of int
         Operator `i` requires the bits ``items[starts[i]:starts[i + 1]]``.
     masks : sequence of int
-        For each bit, the mask of all bits of its symbol.
+        The masks of all bits of a symbol, one for each bit.
     """
     numbers = {mask: i for i, mask in enumerate(dict.fromkeys(masks))}
     symbol_of = np.array([numbers[mask] for mask in masks], np.int64)

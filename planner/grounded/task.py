@@ -1,10 +1,10 @@
-"""A grounded task: the symbols of a problem as bits, its behaviours as operators on one Python integer.
+"""A grounded task: facts are bits, a state is a Python integer, and behaviours are operators on states.
 
 ==============================  =================================================================
-in `confab.reasoner.symbols`           here
+in `confab.reasoner.symbols`    in a grounded task
 ==============================  =================================================================
 `Fact`                          a bit, unless the fact is always true or never reachable
-a fact that must not hold       a complement bit, if a condition requires that
+the negation of a fact          a complement bit, if a condition requires the negation
 `AnyOf`, a negated `Witness`    a derived bit, unless static facts decide it
 `Behavior` with all its terms   an operator
 conditional effect              a change of an operator, and a separate relaxed operator
@@ -30,18 +30,21 @@ from confab.planner.plan import Step
 from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 BitChange = tuple[int, int, int]
-"""Three masks: if all bits of the first mask are set, the bits of the second are cleared, then the bits of the third are set."""
+"""Three masks: a condition, the bits to clear, and the bits to set afterwards.
+
+The change takes place if all bits of the condition are set.
+"""
 
 
 @dataclass(frozen=True)
 class Grouped:
-    """A list of integers for each of n items: ``items[starts[i]:starts[i + 1]]``."""
+    """Several lists of integers in one array; list `i` is ``items[starts[i]:starts[i + 1]]``."""
 
     starts: Ints
     items: Ints
 
     def __getitem__(self, i: int) -> list[int]:
-        """Return list number `i`."""
+        """Return the list with the number `i`."""
         found: list[int] = self.items[self.starts[i] : self.starts[i + 1]].tolist()
         return found
 
@@ -52,7 +55,7 @@ class Grouped:
 
 
 def grouped(owner: Ints, items: Ints, count: int) -> Grouped:
-    """Return the items of each owner in ascending order, each once."""
+    """Return a list of distinct items in ascending order for each owner."""
     if len(owner):
         order = np.lexsort((items, owner))
         owner, items = owner[order], items[order]
@@ -81,11 +84,11 @@ class Task:
     constants : mapping of Symbol to value
         The symbols that no operator changes.
     costs : list of float
-        The cost of each operator; its minimum if the cost depends on amounts.
+        The cost of each operator; the minimum if the cost depends on amounts.
     owners : list of int
-        For each relaxed operator, the operator that it is made from; -1 for an alternative of a derived bit.
+        The operator that each relaxed operator belongs to; -1 for an alternative of a derived bit.
     needs, adds : Grouped
-        For each relaxed operator, the bits that it requires, and the bits that it may set.
+        The bits that each relaxed operator requires, and the bits that it may set.
     derived : Derived
         The bits that are derived from other bits.
     change : function of an operator
@@ -93,11 +96,11 @@ class Task:
     describe : function of an operator
         Returns the operator's behaviour, arguments and bindings.
     amounts : Amounts, optional
-        Present if some operator changes amounts.
+        The amounts of the task; None if no operator changes an amount.
     prices : mapping of operator to Linear
         The costs that depend on amounts.
     barred : set of (state, operator)
-        Pairs excluded from the search: steps that turned out not to be refinable in a state.
+        Pairs that the search excludes, because the operator's step has no refinement in the state.
     """
 
     problem: Problem
@@ -132,7 +135,7 @@ class Task:
         )
 
     def cost_of(self, plan: Sequence[int]) -> float:
-        """Return the cost of a plan."""
+        """Return the cost of a plan that starts in the initial state."""
         total, state = 0.0, self.initial
         for operator in plan:
             total += self.spent(state, operator)
@@ -140,9 +143,9 @@ class Task:
         return total
 
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
-        """Return the state after an operator, or None if the operator isn't applicable.
+        """Return the state after an operator; None if the operator isn't applicable.
 
-        Derived bits are updated only if `follow` is true.
+        If `follow` is false, derived bits aren't updated.
         """
         precondition, changes = self._changes.get(operator) or self.changes_of(operator)
         if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
@@ -159,9 +162,9 @@ class Task:
         return self.derived.after(after, state) if follow and self.derived.parts else after
 
     def carried_out(self, state: int, plan: Sequence[int]) -> tuple[int, list[int]]:
-        """Execute the operators of a plan, skipping inapplicable ones; return the final state and the executed operators.
+        """Execute the applicable operators of a plan in sequence; return the final state and the executed operators.
 
-        Before each operator, only the derived bits that the operator requires are calculated.
+        Before each operator, the method calculates only the derived bits that the operator requires.
         """
         follow = bool(self.barred) or not self.derived.parts  # barred pairs contain complete states
         kept = []
@@ -181,7 +184,7 @@ class Task:
 
     @cached_property
     def applicable(self) -> Callable[[int], tuple[list[int], int]]:
-        """Maps a state to its applicable operators and the work of finding them, in tree nodes."""
+        """Function of a state that returns the applicable operators and the number of visited tree nodes."""
         of_symbol: dict[Symbol, int] = {}
         for bit, fact in enumerate(self.facts):
             of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
@@ -190,14 +193,14 @@ class Task:
         return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
 
     def changes_of(self, operator: int) -> tuple[int, tuple[BitChange, ...]]:
-        """Return an operator's precondition and changes, computed once."""
+        """Return the precondition and the changes of an operator; both are computed only once."""
         known = self._changes.get(operator)
         if known is None:
             known = self._changes[operator] = self.change(operator)
         return known
 
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
-        """Return the operators of `steps` (behaviours with arguments), executed in sequence; None if a step isn't applicable."""
+        """Return the operators of `steps` (behaviours with arguments), applied in sequence; None if a step isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
         for operator in range(len(self)):
             step = self.describe(operator)[:2]
@@ -213,7 +216,7 @@ class Task:
         return found
 
     def values(self, state: int) -> dict[Symbol, str]:
-        """Return a state as values of symbols; boolean symbols that could never be true are left out."""
+        """Return a state as a mapping of symbols to values, without boolean symbols that can't become true."""
         found = dict(self.constants)
         situations = self.problem.domain.situations
         for i, fact in enumerate(self.facts):
@@ -226,7 +229,7 @@ class Task:
         return found
 
     def steps(self, plan: Sequence[int]) -> tuple[Step, ...]:
-        """Return a plan's operators as steps of its level."""
+        """Return the operators of a plan as steps of the task's level."""
         found = []
         for position, operator in enumerate(plan):
             behavior, arguments, bindings = self.describe(operator)
@@ -236,7 +239,7 @@ class Task:
 
 
 def bits_of(mask: int) -> list[int]:
-    """Return the numbers of the bits that are set in a mask.
+    """Return the positions of the bits that are set in a mask.
 
     >>> bits_of(0b1010)
     [1, 3]
