@@ -30,8 +30,6 @@ from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
 """Maximum number of seconds for a schedule if no limit is given; exchanges of turns are also bounded by their work."""
-FIRST, SHARING = 0.2, 0.7
-"""Shares of the remaining time for the schedule of the first plan, and then for sharing its goals among actors."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +53,20 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     shorten : bool
         Whether a short schedule is wanted; otherwise the first one is returned that keeps all windows and deadlines.
     """
-    from confab.planner.timed.sharing import shared
+    from confab.planner.timed.sharing import evenly_shared, shared
 
-    until = perf_counter() + (SECONDS if seconds is None else seconds)
-    first = in_time(problem, plan, (until - perf_counter()) * FIRST)
-    if first.plan is not None and not shorten:
+    until = perf_counter() + (3 * SECONDS if seconds is None else seconds)
+
+    def left(parts: int) -> float:
+        return max(until - perf_counter(), 0.0) / parts
+
+    first = in_time(problem, plan, left(3))
+    if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.serial, first.plan.makespan)):
         return first
-    other = shared(problem, plan, perf_counter() + (until - perf_counter()) * SHARING, shorten)
+    other = shared(problem, plan, perf_counter() + left(2), shorten)
     if other is None:
         return first
-    found = in_time(problem, other, max(until - perf_counter(), 0.0))
+    found = in_time(problem, other, left(1))
     if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):
         return first
     return found

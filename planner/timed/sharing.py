@@ -1,18 +1,18 @@
 """Who does what: the goals are achieved again one after another, in another order and by other actors, for a better schedule.
 
-crew      the chosen individual for each class of actors, and barred steps; steps towards a goal name no other actors. The empty
-          crew allows all.
+crew      the chosen individual for each class of actors, barred actors, and barred steps; steps towards a goal name no others. The
+          empty crew allows all.
 task      a goal with its crew
 stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
 
-A first sequence of tasks is built greedily: each goal is given to the crew that achieves it first. Then the crew or position of
-one task is changed at a time, or one of its steps is barred, preferably on the critical path. The work is bounded by numbers of
+The first sequence of tasks is that of the plan, or a greedy one: each goal is given to the crew that achieves it first. Then the
+crew or position of one task is changed at a time, preferably of a task on the critical path. The work is bounded by numbers of
 stretches and changes, so the result is the same on every machine unless the time is over.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -44,14 +44,18 @@ MOST_CHANGES = 1_000
 """Maximum number of changes of the sequence that are tried."""
 BARREN = 150
 """Maximum number of changes that are tried without a better schedule."""
+BUSY = Fraction(103, 100)
+"""Maximum of the actors' time divided by the work, up to which a schedule isn't improved."""
 MOST_KNOWN = 4
 """Maximum number of known steps that are tried for a stretch."""
 MOST_COMPILED = 200
 """Maximum number of crews for which behaviours are compiled; then no more steps are barred."""
-PREFERRED = 0.8
-"""Share of the changes that concern a task on the critical path."""
-EXPANSIONS = 500
-"""Maximum number of expansions for a stretch."""
+HALF, PREFERRED = 0.5, 0.8
+"""Shares of the bars that concern an actor, and of the changes that concern a task on the critical path."""
+MOST_FAILED = 2
+"""Number of failed searches after which no more steps are searched for a task."""
+EXPANSIONS, WORK = 500, 200_000
+"""Maximum number of expansions for a stretch, and maximum work of its searches in states times operators."""
 
 State: TypeAlias = "dict[Symbol, str]"
 Task: TypeAlias = "tuple[Symbol, Crew]"
@@ -59,10 +63,14 @@ Task: TypeAlias = "tuple[Symbol, Crew]"
 
 @dataclass(frozen=True)
 class Crew:
-    """The chosen individual for each class of actors, and the barred steps, each a behaviour with its arguments."""
+    """The chosen individual for each class of actors, the actors that are barred, and the barred steps.
+
+    A barred step is a behaviour with its arguments.
+    """
 
     chosen: tuple[tuple[str, str], ...] = ()
-    barred: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    without: frozenset[str] = frozenset()
+    barred: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -79,10 +87,12 @@ class _Sequence:
     stretches: list[_Stretch]
     cost: tuple[Fraction, Fraction, Fraction]
     """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
+    serial: Fraction
+    """The sum of all durations."""
     end: Fraction
     """The end of the last stretch."""
-    critical: list[tuple[int, Step]]
-    """The steps on the critical path, or on the path to the activity that is latest, each with the number of its task."""
+    critical: list[tuple[int, Step, tuple[str, ...]]]
+    """The steps on the critical path, or on the path to the activity that is latest, each with its task's number and its actors."""
 
 
 def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> Plan | None:
@@ -122,6 +132,16 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
         yield Crew(tuple(zip(several, its, strict=True)))
 
 
+def evenly_shared(problem: Problem, serial: Fraction, makespan: Fraction) -> bool:
+    """Return whether all actors of a problem are busy for almost the whole makespan of a plan; `serial` is its work."""
+    resting, actors = default_actors(problem), set[str]()
+    for behavior in problem.domain.behaviors.values():
+        actors.update(term for term in timing_of(behavior).actors if term not in behavior.kinds)
+        for term in _actor_terms(problem, behavior, resting):
+            actors.update(problem.members(behavior.kinds[term]))
+    return makespan * len(actors) <= serial * BUSY
+
+
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
     """Return the parameters and variables of a behaviour that denote actors."""
     stated = timing_of(behavior).actors
@@ -138,9 +158,10 @@ def with_crew(problem: Problem, crew: Crew) -> Problem:
     def asked(behavior: Behavior) -> Behavior:
         acting = _actor_terms(problem, behavior, resting) if behavior.level == lowest else tuple(behavior.kinds)
         own = [EqualityCondition(t, chosen[k]) for t in acting if (k := behavior.kinds[t]) in chosen]
+        own += [EqualityCondition(t, one, negated=True) for t in acting for one in sorted(crew.without)]
         barred = tuple(
             tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=True))
-            for name, arguments in crew.barred
+            for name, arguments in sorted(crew.barred)
             if name == behavior.name
         )
         others = [AnyOf(barred, negated=True)] if barred else []
@@ -161,6 +182,8 @@ class _Search:
     tried: int = 0
     known: dict[Task, list[tuple[Step, ...]]] = field(default_factory=dict)
     """The steps found for each task, which are tried again before other steps are searched."""
+    failed: Counter[Task] = field(default_factory=Counter)
+    """How often no steps were found for each task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
 
     @cached_property
@@ -174,8 +197,8 @@ class _Search:
         return list(islice(crews_of(self.problem), MOST_CREWS))
 
     @cached_property
-    def goals(self) -> list[Symbol]:
-        """The goals that the plan achieves, those with deadlines first, then in the order of their last changes."""
+    def last(self) -> dict[Symbol, int]:
+        """The number of the primitive of the plan that changes each symbol last."""
         rules, facts = self.rules, Facts(self.problem, self.problem.initial, self.rules)
         last: dict[Symbol, int] = {}
         for number, step in enumerate(self.plan.primitives):
@@ -183,6 +206,12 @@ class _Search:
             for situation, key, value in rules.changes(behavior, step.arguments, facts) or ():
                 last[Symbol(situation, key)] = number
                 facts.put(situation, key, value)
+        return last
+
+    @cached_property
+    def goals(self) -> list[Symbol]:
+        """The goals that the plan achieves, those with deadlines first, then in the order of their last changes."""
+        last = self.last
         deadlines = self.problem.times.deadlines if self.problem.times else {}
         count = len(self.plan.primitives)
         open_ = [
@@ -191,14 +220,19 @@ class _Search:
         return sorted(open_, key=lambda s: (s not in deadlines, deadlines.get(s, 0), last.get(s, count)))
 
     def run(self) -> None:
-        """Build a first sequence of tasks and change it."""
-        now = self.greedy()
-        self.best = now
+        """Change the better one of the plan's sequence and a greedy one."""
+        self.best = self.own()
+        greedy = self.greedy()
+        if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
+            self.best = greedy
+        now = self.best
         if now is None:
             return
         random, barren = Random(0), 0
         for _ in range(MOST_CHANGES):
             if barren >= BARREN or not now.critical or not (self.shorten or now.cost[0]):
+                break
+            if not now.cost[0] and evenly_shared(self.problem, now.serial, now.cost[1]):
                 break
             other = self.built(self.changed(now, random), now)
             barren += 1
@@ -207,6 +241,21 @@ class _Search:
             if other.cost < now.cost:
                 barren = 0
             now = self.best = other
+
+    def own(self) -> _Sequence | None:
+        """Return the plan as a sequence: its goals in the order of their last changes, each with the steps up to this change."""
+        numbers = iter(range(len(self.plan.primitives)))
+        ends = [[next(numbers) for one in step.walk() if not one.steps][-1] for step in self.plan.steps]
+        goals = sorted(self.goals, key=lambda goal: self.last.get(goal, ends[-1] if ends else 0))
+        stretches, state, at = list[_Stretch](), dict(self.problem.initial), 0
+        for goal in goals:
+            upto = next((k for k, end in enumerate(ends) if end >= self.last.get(goal, ends[-1])), len(ends) - 1) + 1
+            upto = len(ends) if goal == goals[-1] else max(upto, at)
+            steps = renumbered(self.plan.steps[at:upto])
+            state, at = self.after(state, steps), upto
+            stretches.append(_Stretch(steps, state))
+            self.known[goal, Crew()] = [steps]
+        return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
     def greedy(self) -> _Sequence | None:
         """Return the goals in their order, each given to the crew that achieves it first; None if a goal isn't achieved.
@@ -231,10 +280,10 @@ class _Search:
     def changed(self, now: _Sequence, random: Random) -> list[Task]:
         """Return the tasks of a sequence with a change.
 
-        One task gets another crew, two exchange their crews, a step of one is barred, or one gets another position.
+        One task gets another crew, two exchange their crews, an actor or a step of one is barred, or one gets another position.
         """
         tasks = list(now.tasks)
-        i, step = random.choice(now.critical)
+        i, step, actors = random.choice(now.critical)
         i = i if random.random() < PREFERRED else random.randrange(len(tasks))
         j, kind = random.randrange(len(tasks)), random.randrange(4)
         goal, crew = tasks[i]
@@ -243,8 +292,10 @@ class _Search:
         elif kind == 1 and crew != tasks[j][1]:
             tasks[i], tasks[j] = (goal, tasks[j][1]), (tasks[j][0], crew)
         elif kind == 2 and len(self.compiled) < MOST_COMPILED:
-            barred = tuple(sorted({*crew.barred, (step.behavior, step.arguments)}))
-            tasks[i] = goal, replace(crew, barred=barred)
+            if actors and random.random() < HALF:
+                tasks[i] = goal, replace(crew, chosen=(), without=crew.without.union(actors[:1]))
+            else:
+                tasks[i] = goal, replace(crew, barred=crew.barred | {(step.behavior, step.arguments)})
         else:
             tasks.insert(j, tasks.pop(i))
         return tasks
@@ -280,8 +331,12 @@ class _Search:
             problem = replace(self.problem, initial=state, goal=self.wanted(goals))
             known = self.known.setdefault((goals[-1], crew), [])
             again = (steps for steps in reversed(known[-MOST_KNOWN:]) if not validate(problem, Plan(steps)))
-            steps = next(again, None) or self.planned(problem, crew)
-            if steps is not None and steps not in known:
+            steps = next(again, None)
+            if steps is None and self.failed[goals[-1], crew] < MOST_FAILED:
+                steps = self.planned(problem, crew)
+            if steps is None:
+                self.failed[goals[-1], crew] += 1
+            elif steps not in known:
                 known.append(steps)
             self.stretches[key] = None if steps is None else _Stretch(steps, self.after(state, steps))
         return self.stretches[key]
@@ -305,6 +360,7 @@ class _Search:
             self.compiled[crew] = allowed, compiled(allowed)
         allowed, using = self.compiled[crew]
         call = Call(replace(allowed, initial=problem.initial, goal=problem.goal), using, self.until, EXPANSIONS)
+        call.space.most_work = WORK
         levels = problem.domain.levels
         leaves = any(step.level != levels[0] for step in self.plan.steps)
         agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, solvable=True, forward=True)
@@ -331,16 +387,16 @@ class _Search:
         if begins is None:
             return None
         if not steps:
-            return _Sequence(tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), [])
+            return _Sequence(tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), Fraction(0), [])
         of = [k for k, one in enumerate(stretches) for _ in Plan(one.steps).primitives]
         ends = [begin + lasts for begin, lasts in zip(begins.begins, network.durations, strict=True)]
-        critical, at = list[tuple[int, Step]](), begins.latest
+        critical, at = list[tuple[int, Step, tuple[str, ...]]](), begins.latest
         if at < 0:
             at = max(range(len(of)), key=ends.__getitem__)
         passed = set[int]()
         while at >= 0 and at not in passed:
             passed.add(at)
-            critical.append((of[at], steps[at]))
+            critical.append((of[at], steps[at], order.activities[at].actors))
             at = begins.waits_for[at]
         work: dict[str, Fraction] = defaultdict(Fraction)
         for one in order.activities:
@@ -348,6 +404,5 @@ class _Search:
                 work[actor] += one.duration
         late, makespan = (cost * network.unit for cost in begins.cost)
         end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
-        return _Sequence(
-            tasks, stretches, (late, makespan, sum((its**2 for its in work.values()), Fraction(0))), end, critical
-        )
+        cost = late, makespan, sum((its**2 for its in work.values()), Fraction(0))
+        return _Sequence(tasks, stretches, cost, sum(network.durations) * network.unit, end, critical)
