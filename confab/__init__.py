@@ -3,14 +3,16 @@
 ================  =========================================================================================
 `scenes()`        the shipped scenes' names
 `load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a SPARQL endpoint
-`scene.query(…)`  query it in SPARQL: a `Table`
-`scene.plan(…)`   plan in it: a `Result`
-`scene.verify(…)` carry a plan out in physics: a `Report`
-`scene.execute(…)`  act in a closed loop, and be interrupted: an `Execution`
-`Memory`          experience from planning and execution; `practise(…)` learns, and measures the benefit
-`new_domain(name)`  begin a domain of your own; `validate(file)` lists its faults
-`generate(…)`     a scene for trials, as large as wanted
-`within(seconds)` everything that is done in a block ends by then
+`scene.query(…)`  query the scene in SPARQL: a `Table`
+`scene.plan(…)`   plan in the scene: a `Result`
+`scene.verify(…)` execute a plan in physics: a `Report`
+`scene.execute(…)`  execute the task in a closed loop, with interventions: an `Execution`
+`Memory`          experience from planning and execution
+`practise(…)`     learn in scenes, and measure the benefit
+`new_domain(name)`  write a skeleton of a new domain
+`validate(file)`  the faults of an ontology file, with remedies
+`generate(…)`     a generated scene of any size
+`within(seconds)` a time limit for all calls in a block
 `KnowledgeError`  the given input can't be used; the message states the fault, its position, and the remedy
 ================  =========================================================================================
 

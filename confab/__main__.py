@@ -1,4 +1,4 @@
-"""The command line as a module: ``python -m confab plan SCENE``."""
+"""The command line, run as a module by ``python -m confab plan SCENE``."""
 
 from confab.start import main
 

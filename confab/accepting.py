@@ -33,7 +33,7 @@ values."""
 
 
 class Stated(list[str]):
-    """A list of facts as texts, which also maps a symbol to its value: ``facts["cup1 LOCATION"]``."""
+    """A list of facts as texts. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...

@@ -60,7 +60,7 @@ class Kept:
         return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
 
     def whole(self, number: str) -> str:
-        """Return the complete text of the answer with a number.
+        """Return the complete text of an answer by its number.
 
         Raises
         ------

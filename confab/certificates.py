@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Checked:
     """The verdict of the checker on a certificate of unsolvability.
 
-    `refused` is the reason why the certificate is no proof. It is None if the certificate proves that there is no plan.
-    `claims` are the claims of the proof as sentences.
+    `refused` is the reason why the certificate is no proof, or None for a proof that there is no plan. `claims` are the claims
+    of the proof as sentences.
     """
 
     refused: str | None

@@ -21,9 +21,9 @@ def refused(
 ) -> list[Fault]:
     """Return the faults that a plan made in a part of a scene has in the whole scene; the list is empty if the plan is valid.
 
-    The checker executes the plan with the individuals of the part. It reports the other individuals on which conditions and
-    effects depend. These individuals are read from the graph, and the check is repeated until no individual is missing. The
-    check doesn't use the code that selects the part of a scene.
+    The checker executes the plan with the individuals of the part. If conditions or effects depend on other individuals, these
+    individuals are read from the graph, and the check is repeated. The check doesn't use the code that selects the part of a
+    scene.
 
     Parameters
     ----------

@@ -122,13 +122,13 @@ def _completion(context: click.Context, option: click.Parameter, shell: str | No
 )
 @QUIET
 def app() -> None:
-    """Plan what a robot does from an ontology, and verify it in physics."""
+    """Plan for a robot whose knowledge is an ontology, and verify plans in physics."""
 
 
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
     """Run the command line, and end the process with an exit code and at most one line on stderr.
 
-    `ending` is called to end the process if a step continues long after its deadline. Without it, the process isn't ended at a
-    deadline, so that another program can call `main`.
+    `ending` is called to end the process if a step continues long after its deadline. Without `ending`, no deadline ends the
+    process, so that another program can call `main`.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

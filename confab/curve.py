@@ -51,7 +51,7 @@ def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, c
 class Curve:
     """A learning curve: expansions per mode and episode.
 
-    `with_memory` has the expansions with the memory before the episode, `without` has the expansions without memory. A value is
+    `with_memory` has the expansions with the memory before the episode. `without` has the expansions without memory. A value is
     None if planning found no plan.
     """
 

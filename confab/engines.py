@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
 """Default time limit of a planning call by an engine in seconds."""
 IMPORTING = 1.0
-"""Seconds that the import of unified-planning can take. With less time left, no engine is started."""
+"""Seconds that the import of unified-planning can take; no engine is started if less time is left."""
 READING = 0.93
 """Share of the remaining time after which an engine is stopped. The rest of the time is for reading and validating the engine's
 plan."""

@@ -163,7 +163,7 @@ def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
 
 
 def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the push of an object from ``OBJECT X Y``, in centimetres away from the robot and to the robot's left."""
+    """Return the push of an object, read from ``OBJECT X Y`` (in centimetres away from the robot and to the robot's left)."""
     try:
         individual, *by = words
         numbers = tuple(float(number) / 100 for number in by)
@@ -177,7 +177,7 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the addition of a box at a place from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres; no fact mentions the box."""
+    """Return the intervention that puts a box without facts at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres."""
     place, size = (*words, "6x6x12")[:2] if words else ("", "")
     try:
         numbers = tuple(float(number) / 100 for number in size.split("x"))
@@ -201,7 +201,7 @@ def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the addition of an individual from a class, a name, and facts without the name: ``Cup cup9 LOCATION location5``."""
+    """Return the intervention that adds an individual with facts, read from words like ``Cup cup9 LOCATION location5``."""
     from confab.planner.acting.symbolic_world import with_individual
 
     if len(words) < 4 or len(words) % 2:
@@ -461,7 +461,7 @@ def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> 
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
-    """Return the planner of a mode for new plans during execution; None denotes the default planner.
+    """Return the planner of a mode for new plans during execution, or None for the default planner.
 
     Raises
     ------

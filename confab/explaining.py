@@ -199,7 +199,7 @@ def behind(memory: Memory, name: str) -> str:
 
 
 def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:
-    """Return the most cogent of several instances of rules; None if there is no instance."""
+    """Return the most cogent of several instances of rules, or None if there is no instance."""
 
     def key(c: RuleInstance) -> float:
         facts, individual = reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles)

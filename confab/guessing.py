@@ -1,7 +1,8 @@
-"""The right name for a wrong name, found by the words of the wrong name among the public names and their descriptions.
+"""Suggestions for a wrong name, found by a comparison of its words with public names and their descriptions.
 
-A wrong name is split into words; words of one meaning are equal. The candidates are the names of the object itself, then those of
-the objects that it leads to (``result.outcome.search``), then all others (``scene.with_fact``).
+A wrong name is split into words, and words of similar meanings match each other. Names of the same object are preferred to
+names of objects that are reachable from it, such as ``result.outcome.search``. All other public names, such as
+``scene.with_fact``, are the last candidates.
 """
 
 from __future__ import annotations
@@ -143,7 +144,7 @@ MOST, NEAR = 3, 0.3
 
 @cache
 def stem(word: str) -> str:
-    """Return the stem of a word: ``simulat`` for ``simulators``."""
+    """Return the stem of a word, for example ``simulat`` for ``simulators``."""
     return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", word))
 
 
@@ -181,7 +182,7 @@ def segments(run: str) -> tuple[str, ...]:
 
 @cache
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the significant words of a name: ``plan`` and ``length`` for ``getPlanLength``."""
+    """Return the significant words of a name, for example ``plan`` and ``length`` for ``getPlanLength``."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
     words = tuple(word for run in re.findall(r"[^\W_]+", apart) for word in segments(run) or (run,))
     return tuple(word for word in words if word not in FILLERS) or words
@@ -249,7 +250,7 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return the known name that a wrong name most likely means, or an empty text. The values of a mapping are descriptions.
+    """Return the known name that a wrong name most likely means, or an empty text; `known` may map names to descriptions.
 
     >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
     ('time_limit', '')

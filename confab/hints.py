@@ -1,4 +1,4 @@
-"""Hints for wrong names: names from other libraries, and the names of the same functions in Confab."""
+"""Names that users of other libraries may try, and the corresponding names in Confab."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ def read_certificate(path: Path) -> Certificate:
 
 
 def _json(path: Path, what: str) -> Any:
-    """Return the content of a JSON file; `what` names the expected content (a plan or a certificate) in error messages."""
+    """Return the content of a JSON file. The text `what` names the expected content (a plan or a certificate) in error messages."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -26,7 +26,7 @@ NAMED = re.compile(
     rf"|(?P<of>\w+) of (?P<about>{WORD}(?:, {WORD})*): "
     rf"|(?P<words>{WORD}(?: {WORD})*)"
 )
-"""A symbol with a value, a symbol before a colon, or words that may contain facts."""
+"""Pattern of a symbol with a value, of a symbol before a colon, or of words that may contain facts."""
 AT_ONCE = 400
 """Maximum number of terms in one query for labels."""
 
@@ -76,7 +76,7 @@ class Labels:
         return NAMED.sub(self._replaced, text)
 
     def _replaced(self, found: re.Match[str]) -> str:
-        """Return the replacement of a match of `NAMED`."""
+        """Return the sentence or label that replaces a match of the pattern `NAMED`."""
         situations = self.domain.situations
         *arguments, situation = (found["symbol"] or f"{found['about']}, {found['of']}").split(", ")
         if found["words"] is None:
@@ -106,7 +106,7 @@ class Labels:
         return f"the place {label}" if first in PLACING and more and more[-1] not in WAYS | {"of"} else label
 
     def about(self, symbol: Symbol) -> str:
-        """Return the beginning of a sentence about a symbol, without the symbol's value: "cup 1 is at"."""
+        """Return the beginning of a sentence about a symbol, without the symbol's value, such as "cup 1 is at"."""
         names = [self.name(name) for name in symbol.arguments]
         verb = self.verbs.get(symbol.situation)
         if verb is None or not names:
@@ -213,7 +213,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of IRIs. An English label is preferred to a label without a language, and this label to all others."""
+    """Return the labels of IRIs: English labels if available, otherwise labels without a language, otherwise any label."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

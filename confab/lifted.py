@@ -19,7 +19,7 @@ from confab.reasoner.symbols import (
 )
 
 MOST_SAID = 6
-"""Maximum number of conditions in the sentence about a rule. The sentence states the number of further conditions."""
+"""Maximum number of conditions in the sentence about a rule."""
 ASKED = (
     (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
     (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),

@@ -89,7 +89,7 @@ class View:
 
 @contextmanager
 def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
-    """Yield an observer that shows an execution in a notebook or, if stderr is a terminal, there.
+    """Yield an observer that shows an execution in a notebook, or on stderr if stderr is a terminal.
 
     The observer also notifies the observer `other`. Without `watch`, or if there is nowhere to show the execution, the context
     manager yields `other`.

@@ -197,7 +197,7 @@ class Memory:
         self.links = links
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
-        """Return the paper's links with those of a plan added; return them unchanged if the sum exceeds `MOST_LINKS`."""
+        """Return the paper's links after learning a plan; return the old links if there would be more than `MOST_LINKS`."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 
@@ -418,7 +418,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def endpoint(source: str | Path) -> str | None:
-    """Return the URL that a text or path contains, or None if it names a file. `Path` removes a slash of a URL; it is restored.
+    """Return the URL in a text or a path, or None for the name of a file. The slash that `Path` removes from a URL is restored.
 
     Examples
     --------

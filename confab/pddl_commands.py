@@ -102,7 +102,8 @@ def read_pddl_plan(
     A planner without hierarchy interleaves independent steps arbitrarily, so that one hand may wait at a place that the other
     hand needs. With `regroup`, each step is moved directly after the latest step on which it depends. With `shorten`, steps
     that the goal doesn't need are removed. The values of a behaviour's variables (such as the object that is grasped) follow
-    from the state before the step. They remain unset from the first inapplicable step on, which validation reports.
+    from the state before the step. From the first inapplicable step on, the variables have no values, and validation reports a
+    fault.
 
     Raises
     ------

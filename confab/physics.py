@@ -100,7 +100,7 @@ class Report:
 
     @property
     def poured(self) -> float | None:
-        """Mean poured share of a serving over all pours of all rollouts; None without a pour."""
+        """Mean poured share of a serving over all pours of all rollouts, or None if nothing was poured."""
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 

@@ -224,7 +224,7 @@ def _top(world: PhysicsWorld, name: str) -> Array:
 
 
 def _table(scene: Known, path: Path) -> Path:
-    """Draw the table in the initial state with objects and places. Places that not every hand reaches name their hands."""
+    """Draw the table in the initial state. A place that not every hand reaches is labelled with the hands that reach the place."""
     from PIL import Image, ImageDraw, ImageFont
     from PIL.PngImagePlugin import PngInfo
 

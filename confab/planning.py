@@ -268,7 +268,7 @@ def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the outcome of an installed engine that found a plan, otherwise the reason; None if no engine is installed."""
+    """Return the outcome of an engine that found a plan, the reason why no plan was found, or None if no engine is installed."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
@@ -485,7 +485,7 @@ class Result:
     def certificate(self) -> Certificate | None:
         """The certificate that the task has no plan, which `confab.planner.certificate_checks` has verified.
 
-        The value is None if the task isn't proved to be unsolvable, or without a certificate.
+        The value is None if there is no certificate.
         """
         return self.outcome.certificate
 

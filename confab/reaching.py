@@ -18,7 +18,7 @@ ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
   FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
   FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
-"""Query for the robots of a scene with geometry. It returns nothing for files of episodes and memories."""
+"""Query for the robots of a scene with geometry. Files of episodes and memories have no result."""
 
 REACHED = "SELECT DISTINCT ?place WHERE {{ ?hand <{relation}> ?place }}"
 """Query for the places that at least one hand reaches."""
@@ -33,8 +33,8 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
     """Return a scene whose reach facts are up to date if it has a robot with a body; other scenes are returned unchanged.
 
     Reach facts are computed if their file is missing or older than a file of the scene. If the bodies are described
-    incompletely, the scene is returned unchanged, and `tell` is called with the missing statement. Shipped scenes are always up
-    to date.
+    incompletely, the scene is returned unchanged, and `tell` is called with the missing statement. The reach facts of shipped
+    scenes are always up to date.
     """
     graph = scene.knowledge
     if graph.remote or graph.faults or not graph.select(ROBOTS):

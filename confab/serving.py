@@ -1,11 +1,12 @@
 """A scene as a page and a read-only SPARQL 1.1 endpoint on loopback (docs/serving.md, docs/page.md).
 
 ==============  ==========================================================================================================
-``/sparql``     the SPARQL 1.1 protocol: GET, POST of a form, POST of a query; without a query, the service description
+``/sparql``     the SPARQL 1.1 protocol (GET, POST of a form, POST of a query), or without a query the service description
 ``/``           the page (`confab.page`)
-``/page.json``  what the page shows: GET of the scene, or of a running execution (with ``after=VERSION`` 204 where nothing is
-                newer); POST of changed controls, answered with the resulting plan
+``/page.json``  the content of the page about the scene or a running execution (GET), and after changes of controls (POST)
 ==============  ==========================================================================================================
+
+A GET of ``/page.json?after=VERSION`` is answered with status 204 if no newer version exists.
 
 The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), which
 form lanes with growing time limits. A query that exceeds the limit of a lane is started again in the next lane with lower
@@ -84,7 +85,7 @@ SOLUTIONS = {
     "text/csv": "sparql-csv",
     "text/tab-separated-values": "tsv",
 }
-"""Media types of answers to SELECT queries. ASK queries have the first four media types. The first media type is the default."""
+"""Media types of answers to SELECT queries, with the default first. Answers to ASK queries have one of the first four types."""
 TRIPLES = {
     "text/turtle": ox.RdfFormat.TURTLE,
     "application/n-triples": ox.RdfFormat.N_TRIPLES,
@@ -180,7 +181,7 @@ class Service:
             worker.process.close()
 
     def page_json(self, after: int) -> bytes | None:
-        """Return the content of the page about a running execution or the scene; None if the page has the newest version."""
+        """Return the content of the page about a running execution or the scene, or None if the page has the newest version."""
         self.page_version, self.page_asked = after, monotonic()
         if not self.following.begun:
             return json.dumps(self.sheet.scene_data).encode()
@@ -428,7 +429,7 @@ class Connection(H11Protocol):
             min(waiting, key=lambda c: c.deadline.when()).transport.abort()
 
     def handle_events(self) -> None:
-        """Handle received data, and end the time limit after the head of a request. The application limits the time of the body."""
+        """Handle received data, and end the time limit after the head of a request."""
         before = self.cycle
         super().handle_events()
         if self.cycle is not before and not self.cycle.response_complete:

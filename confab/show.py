@@ -93,7 +93,7 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
 
 
 def lengths(plan: Plan) -> str:
-    """Return the numbers of steps on all levels as text, e.g. ``4 / 10 / 32``."""
+    """Return the numbers of steps on all levels as text, such as ``4 / 10 / 32``."""
     return " / ".join(map(str, plan.length.values())) or "no"
 
 

@@ -1,7 +1,7 @@
 """Start and end of the command `confab`. Ctrl-C ends the command with one line, even during imports.
 
-At its end, the process ignores Ctrl-C. It doesn't free its objects one by one, which would take half a second for a large
-scene.
+After the output is complete, the process ignores Ctrl-C. The process ends without freeing its objects one by one, which would
+take half a second for a large scene.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ class Table(Sequence[tuple[str | None, ...]]):
     """A query result: a sequence of rows with named columns.
 
     `terms` are the rows with the RDF terms (IRIs, datatypes) of the store. `truth` is the answer to an ASK query, and None for
-    other queries. The truth value of a table is this answer, or whether the table has a row.
+    other queries. A table is true if the answer to an ASK query is true or, for other queries, if the table has a row.
 
     Examples
     --------
@@ -143,7 +143,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
     def standard(self, form: str) -> bytes:
-        """Return the query result in a format of SPARQL 1.1: ``sparql-json``, ``sparql-xml``, ``sparql-csv`` or ``tsv``."""
+        """Return the query result in the SPARQL 1.1 format ``sparql-json``, ``sparql-xml``, ``sparql-csv`` or ``tsv``."""
         from pyoxigraph import QueryResultsFormat, QuerySolutions, Store, parse_query_results
 
         if form not in STANDARD:

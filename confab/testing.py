@@ -1,4 +1,4 @@
-"""Conformance test of a world, that is, of the interface to a robot: `check_world`, or ``python -m confab.testing SCENE ROBOT``.
+"""Conformance test of a robot's interface (`check_world`), which ``python -m confab.testing SCENE ROBOT`` runs.
 
 Each check reports a verdict with numbers. The robot executes the primitives of a plan; keep people away from a real robot.
 """
@@ -31,7 +31,7 @@ ATTEMPTS = 5
 """Maximum number of attempts at a primitive."""
 
 BEGUN = 0.05
-"""Seconds after the begin of a primitive at which the test stops it."""
+"""Seconds between the begin of a primitive and the call of `stop`."""
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def needs_others_meanwhile(problem: Problem) -> bool:
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether a condition or effect is at the begin or end of a step, so that only overlapping steps may reach a goal."""
+    """Return whether a condition or effect is at the begin or end of a step, so that overlapping steps may reach more goals."""
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()
@@ -106,7 +106,7 @@ def headline(timed: TimedPlan) -> str:
 
 
 def lanes(timed: TimedPlan) -> Iterator[str]:
-    """Yield lines of text that show the steps of each actor: ``█`` on the critical path, ``▒`` with slack, ``·`` idle."""
+    """Yield lines of text that show when each actor is busy on the critical path (█), busy with slack (▒), and idle (·)."""
     yield headline(timed)
     end = timed.makespan
     if not end:

@@ -124,7 +124,7 @@ def _flow(value: Any) -> str:
 
 
 def _nested(value: Any) -> bool:
-    """Return whether a value is written in block style."""
+    """Return whether a value is written in YAML's block style."""
     if isinstance(value, Mapping):
         return any(isinstance(inner, Mapping | list) for inner in value.values())
     return isinstance(value, list) and any(isinstance(inner, Mapping) for inner in value)

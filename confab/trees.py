@@ -47,12 +47,12 @@ RESERVED |= {
     "Script",
     "ScriptCondition",
 }
-"""Names of nodes and attributes of the two libraries, which leaves, ports and subtrees can't have."""
+"""Reserved names of BehaviorTree.CPP and py_trees, which leaves, ports and subtrees can't have."""
 
 
 @dataclass(frozen=True)
 class Element:
-    """A node of a kind that both libraries support.
+    """A node of a behaviour tree, of a kind that BehaviorTree.CPP and py_trees support.
 
     The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. Fallback and Sequence
     begin with their first child in each tick. Once is a sequence that resumes at the running child. `name` is the name of a

@@ -1,1 +1,1 @@
-"""The functions of the commands, in a module for each purpose; `confab.cli` lists the commands."""
+"""The functions of the commands that `confab.cli` lists, in a module for each purpose."""

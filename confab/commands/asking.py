@@ -1,4 +1,4 @@
-"""The commands query, serve and mcp: SPARQL queries on scenes, a SPARQL endpoint, and tools for agents."""
+"""The commands query, serve and mcp, which answer SPARQL queries, run an endpoint, and offer tools to agents."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
 @command(epilog=examples("mcp"))
 @click.argument("folder", type=PATH, default=".", metavar="[FOLDER]")
 def mcp(folder: Path) -> None:
-    """Answer agents (Model Context Protocol) on stdio."""
+    """Serve tools for agents on stdio (Model Context Protocol)."""
     from confab.agents import server
 
     server(folder).run("stdio")
@@ -121,7 +121,7 @@ def query(
     iri: str | None,
     as_json: bool,
 ) -> None:
-    """Ask a scene in SPARQL, or what its objects afford."""
+    """Query a scene in SPARQL, or list what its objects afford."""
     from confab.reasoner.graph.query_process import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 )
 @click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
 def new(domain: str, folder: Path | None, bodies: bool) -> None:
-    """Begin a domain of your own with a commented skeleton."""
+    """Write a commented skeleton of a new domain."""
     from confab import authoring
 
     files = authoring.new_domain(domain, folder, bodies)
@@ -67,7 +67,7 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
     help="Folder of the file that imports it.",
 )
 def fetch(url: str, folder: Path) -> None:
-    """Fetch an ontology that is imported by URL."""
+    """Download an ontology that a file imports by URL."""
     from confab.reasoner.graph.fetching import fetch as fetch_ontology
 
     fetched = fetch_ontology(url, folder)
@@ -109,7 +109,7 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
 def validate(
     files: tuple[str, ...], deep: bool, strict: bool, watch: bool, time_limit: float | None, as_json: bool
 ) -> None:
-    """Check ontologies: what is wrong where, why, and what to do."""
+    """Validate ontologies, and print faults with their remedies."""
     from confab.watching import again_and_again
 
     code = _validated(files, deep, strict, time_limit, as_json)
@@ -150,7 +150,7 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: flo
 @click.option("--clutter", type=int, default=0, metavar="K", help="Irrelevant objects in other rooms.")
 @SEED
 def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
-    """Write a scene for trials as an ordinary ontology file."""
+    """Generate a scene for trials as an ordinary ontology file."""
     from confab.authoring import turtle_path
     from confab.reasoner.generate import write_scene
 
@@ -205,9 +205,9 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 def import_(
     source: str, problem: Path | None, out: Path, level: int, query: str | None, time_limit: float | None
 ) -> None:
-    """Turn a PDDL problem, or a robot's world, into a scene.
+    """Import a PDDL problem, or a robot's world model, as a scene.
 
-    A robot's world is given as INTERFACE:ADDRESS, or as a world file.
+    A robot's world model is given as INTERFACE:ADDRESS, or as a world file.
     """
     from confab.authoring import turtle_path
     from confab.reasoner.graph.knowledge import KnowledgeError

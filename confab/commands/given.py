@@ -62,7 +62,7 @@ NAMED = 3
 
 
 def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
-    """Return the memory in a file; None if no file is given, or if the file can't be read and planning continues without it."""
+    """Return the memory in a file, or None if no file is given or the file can't be read."""
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:

@@ -62,7 +62,7 @@ def learn(
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Learn how scenes are best solved, or from a demonstration."""
+    """Learn from solutions of scenes, or from a demonstration."""
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
@@ -120,14 +120,14 @@ class InOrder(click.Group):
 
 @click.group("memory", cls=InOrder)
 def memory_app() -> None:
-    """Look after a memory file."""
+    """Show, merge or trust memories, or rename terms in a memory."""
 
 
 @memory_app.command(epilog=examples("memory migrate"))
 @click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
 def migrate(memory: Path, renames: tuple[str, ...]) -> None:
-    """Rename terms in a memory, so that experience about them isn't lost."""
+    """Rename terms in a memory after they were renamed in the ontology."""
     from confab.authoring import migrate as rename
 
     show_result(f"{memory}: {rename(memory, renames)} statements changed")
@@ -138,7 +138,7 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 @click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="Maximum number of rows.")
 @AS_JSON
 def show(memory: str, most: int, as_json: bool) -> None:
-    """Show what a memory advises: rules by kind of goal, orders of goals and methods."""
+    """Show the learned rules, orders of goals and methods of a memory."""
     from confab.memory import Memory
     from confab.scene import scenes
 
@@ -166,7 +166,7 @@ def show(memory: str, most: int, as_json: bool) -> None:
 )
 @click.option("--trust", is_flag=True, help="Let what they have counted lead; else it runs in strict mode.")
 def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
-    """Merge memories: the counts of each replica, in any order, once or many times."""
+    """Merge the counts of memories, in any order or repeatedly."""
     from confab.memory import Memory, undisturbed
 
     with undisturbed(out):
@@ -181,7 +181,7 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
 @click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
 def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
-    """Let the counts of other replicas lead the search, too."""
+    """Let the counts of other replicas also guide the search."""
     from confab.memory import Memory, undisturbed
 
     with undisturbed(memory):

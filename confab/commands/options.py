@@ -22,7 +22,7 @@ STDIN = Path("/dev/stdin")
 
 
 class Input(click.Path):
-    """A file that a command reads; ``-`` is standard input."""
+    """A file that a command reads, or ``-`` for standard input."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
@@ -37,7 +37,7 @@ FOLDER = click.Path(path_type=Path)
 
 
 class Output(click.Path):
-    """A file that a command writes; ``-`` is standard output, which only the kinds in `TEXTS` may use.
+    """A file that a command writes, or ``-`` for standard output, which only the kinds in `TEXTS` may use.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ def plan(
     iri: str | None,
     as_json: bool,
 ) -> None:
-    """Plan in a scene: a tree of behaviours down to primitives."""
+    """Plan in a scene, and print the plan as a tree of steps."""
     from confab.plan_options import PlanOptions, leaves_levels
     from confab.planning import plan_by
     from confab.show import summary
@@ -209,7 +209,7 @@ def verify(
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Carry a plan out in physics and check every primitive."""
+    """Execute a plan in physics, and check every primitive."""
     from confab.physics import counted
     from confab.refuting import keep, refuted_in
 
@@ -301,7 +301,7 @@ def execute(
     serve_at: int | None,
     as_json: bool,
 ) -> None:
-    """Act in a closed loop: watch, be interrupted, repair, replan."""
+    """Execute a task in a closed loop, with repair and replanning."""
     from confab.live import both, spectator
     from confab.memory import Memory, undisturbed
 
@@ -390,7 +390,7 @@ def explain(
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Say why each step is there, why not another one, or why no plan."""
+    """Explain a plan, an alternative, or why there is no plan."""
     from confab.certificates import checked_certificate
     from confab.planning import Result
 

@@ -62,7 +62,7 @@ def report(
 @AS_JSON
 @QUIET
 def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) -> None:
-    """List the runs that were kept, or compare two of them."""
+    """List stored runs, or compare two runs."""
     from confab.history import compared, history_html, listed
     from confab.history import runs as read
 

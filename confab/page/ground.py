@@ -108,7 +108,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
 
 
 def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
-    """Return the polygons and points of shapes, or None. An individual with only a polygon is at the mean of its corners."""
+    """Return the polygons and points of shapes, or None. An individual without a point is at the mean of its polygon's corners."""
     spots: dict[str, Point] = {}
     areas: list[Area] = []
     for name, text in shapes:
@@ -129,7 +129,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return the places that static relations connect, in a layout with connected places near each other, or None."""
+    """Return places in a layout with places near each other that static relations connect; None for fewer than three places."""
     import networkx
 
     values = _values(problem)
@@ -149,7 +149,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return places without coordinates and connections in rows, ordered by name, or None."""
+    """Return places without coordinates and connections in rows, ordered by name; None for fewer than three places."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 MOST_FIXED = 5000
-"""Maximum number of rows for symbols that neither change nor have a goal. The page states the number of further symbols."""
+"""Maximum number of rows for symbols that neither change nor have a goal. For more symbols, the page states their number."""
 LAST = 0.04
 """Extension of the time axis after the last primitive, as a share of the plan's duration, to show the last effects."""
 

@@ -18,7 +18,7 @@ class Markup(str):
 
 
 def tag(name: str, *inner: object, **attributes: object) -> Markup:
-    """Return an HTML element. Attributes that are None or False are omitted; ``class_`` denotes ``class``, ``data_x`` ``data-x``.
+    """Return an HTML element. Attributes that are None or False are omitted. Names like ``class_``, ``data_x`` may be used.
 
     >>> tag("p", "a < b ", tag("b", "yes"), class_="note", title=None)
     '<p class="note">a &lt; b <b>yes</b></p>'

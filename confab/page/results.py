@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import TimedPlan
 
 LARGEST_FILM = 40_000_000
-"""Maximum size in bytes of a film that the page embeds. The page links a larger film."""
+"""Maximum size in bytes of a film that the page embeds; larger films are linked."""
 
 
 class Planned(Protocol):

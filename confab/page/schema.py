@@ -27,8 +27,8 @@ class Interval(TypedDict, total=False):
 class Row(TypedDict, total=False):
     """A row of the timeline.
 
-    The text `group` is levels, actors, changes, wanted or fixed. The flag `met` states whether the symbol has its goal value in
-    the end.
+    The text `group` is ``levels``, ``actors``, ``changes``, ``wanted`` or ``fixed``. The flag `met` states whether the symbol
+    has its goal value in the end.
     """
 
     group: str

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of symbols that the user can change on the page. The page states the number of further symbols."""
+"""Maximum number of symbols that the user can change on the page. For more symbols, the page states their number."""
 SECONDS = 10.0
 """Time limit of planning for the page in seconds."""
 
@@ -135,7 +135,7 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. Amounts are not checked."""
+        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. Any text is accepted as an amount."""
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)
@@ -149,7 +149,7 @@ class Sheet:
         return Result(self.scene, problem, solve(Request(problem, DEFAULT_MODE, Limits(seconds=SECONDS))), {})
 
     def act(self, by: Turned, result: Result) -> Execution | None:
-        """Execute the plan of a result with the interventions, and return the execution; None without interventions or plan."""
+        """Execute the plan of a result with the interventions; return None if there is no plan or no intervention."""
         from confab.execution import execute
 
         if not by.get("interventions") or not result.solved:
@@ -177,7 +177,7 @@ class Sheet:
         return data
 
     def answer(self, by: Turned) -> PageData:
-        """Return the content of the page after a change of controls. If planning fails, the content is the reason alone."""
+        """Return the content of the page after a change of controls. If planning fails, the content has only the reason."""
         try:
             result = self.plan(by)
             execution = self.act(by, result)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes by first argument. If there would be more lanes, all primitives share one lane."""
+"""Maximum number of lanes if each lane has the primitives with one first argument. Otherwise all primitives share one lane."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Timeline:
         return dict(sorted(found.items()))
 
     def met(self, symbol: Symbol) -> bool | None:
-        """Return whether a symbol has its goal value in the end; None if the symbol has no goal."""
+        """Return whether a symbol has its goal value in the end, or None if the symbol has no goal."""
         wanted = self.problem.goal.get(symbol)
         return None if wanted is None else self.final.get(symbol, FALSE) == wanted
 

@@ -33,7 +33,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
         raise KnowledgeError(MISSING) from error
 
     class Board(anywidget.AnyWidget):
-        """The widget. Python writes the content `data` and the query results `rows`; the page writes `turned` and `asked`."""
+        """The widget. Python sets the content `data` and the results `rows` of queries; the page sets `turned` and `asked`."""
 
         _esm = script()
         _css = asset("page.css")
