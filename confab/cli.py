@@ -118,7 +118,7 @@ def _completion(context: click.Context, option: click.Parameter, shell: str | No
     is_eager=True,
     expose_value=False,
     callback=_completion,
-    help='Print what completes commands, scenes and files: eval "$(confab --completion bash)".',
+    help='Print the script that completes commands, scenes and files: eval "$(confab --completion bash)".',
 )
 @QUIET
 def app() -> None:

@@ -250,7 +250,7 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return the known name that a wrong name most likely means, or an empty text; `known` may map names to descriptions.
+    """Return the known name that a wrong name most likely means, or an empty text. The argument may map names to descriptions.
 
     >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
     ('time_limit', '')

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 @command(epilog=examples("serve"))
 @SCENE
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=7879, metavar="N", help="On 127.0.0.1; 0 is any free one."
+    "--port", type=click.IntRange(0, 65535), default=7879, metavar="N", help="Port on 127.0.0.1; 0 selects a free port."
 )
 @QUERY_SECONDS
 @QUERY_ROWS
@@ -48,7 +48,9 @@ def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
     from confab.serving import serving
 
     with serving(load_scene(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
-        show_result(f"{server.url} is the page of the scene, {server.url}sparql answers SPARQL 1.1; Ctrl-C ends it")
+        show_result(
+            f"{server.url} is the page of the scene, {server.url}sparql answers SPARQL 1.1; Ctrl-C ends the server"
+        )
         sys.stdout.flush()
         Event().wait()
 
@@ -79,28 +81,28 @@ FORMS = {
     "sparql",
     required=False,
     metavar="[QUERY]",
-    help="SPARQL text, a .rq file, a ready query (where-was-it), or - for stdin.",
+    help="SPARQL text, a .rq file, a shipped query (where-was-it), or - for stdin.",
 )
+@click.option("--episodes", multiple=True, type=PATH, metavar="FILE", help="Also query this saved episode; repeatable.")
+@click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies this behaviour.")
 @click.option(
-    "--episodes", multiple=True, type=PATH, metavar="FILE", help="Ask this saved episode as well; repeatable."
+    "--applicable", is_flag=True, help="With --show: the query for the arguments with which it is applicable."
 )
-@click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies it.")
-@click.option("--applicable", is_flag=True, help="With --show: the query with its preconditions, where it can be done.")
-@click.option("--update", is_flag=True, help="With --show: the behaviour itself, as a SPARQL update.")
-@click.option("--affords", metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
-@click.option("--format", "form", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
-@click.option("--iris", is_flag=True, help="Whole IRIs in place of short names.")
+@click.option("--update", is_flag=True, help="With --show: the behaviour as a SPARQL update.")
+@click.option("--affords", metavar="OBJECT", help="List the behaviours that an object affords; 'all' for every object.")
+@click.option("--format", "form", help="Format: table, csv, json, tsv, sparql-json or sparql-xml.")
+@click.option("--iris", is_flag=True, help="Print full IRIs instead of short names.")
 @click.option(
     "-o",
     "--output",
     "out",
     type=Output(),
     metavar="FILE",
-    help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology.",
+    help="File to write; FILE.ttl gets the triples of a CONSTRUCT query.",
 )
 @QUERY_SECONDS
 @QUERY_ROWS
-@click.option("--service", is_flag=True, help="Let the query ask other endpoints (SERVICE).")
+@click.option("--service", is_flag=True, help="Allow the query to use other endpoints (SERVICE).")
 @SCENE_IRI
 @AS_JSON
 @QUIET
@@ -132,7 +134,7 @@ def query(
     if len(given) > 1:
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
     if applicable and show is None:
-        raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
+        raise KnowledgeError("--applicable selects the query that --show prints; also give --show BEHAVIOR")
     if update and (applicable or show is None):
         raise KnowledgeError(
             "--update shows the behaviour that --show names; give --show BEHAVIOR, and not --applicable"
@@ -149,7 +151,7 @@ def query(
             raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
         if out is not None and out.suffix.lower() == ".ttl":
             if sparql is None:
-                raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
+                raise KnowledgeError("-o FILE.ttl needs the triples of a CONSTRUCT query; also give the query")
             told(out, f"{loaded.construct(sparql, out, limits)} triples")
             return
         with progress("asking"):

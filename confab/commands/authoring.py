@@ -41,7 +41,9 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder to write into; default: DOMAIN.",
 )
-@click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
+@click.option(
+    "--bodies", is_flag=True, help="Add shapes, a table and skills, so that 'confab run' executes plans in physics."
+)
 def new(domain: str, folder: Path | None, bodies: bool) -> None:
     """Write a commented skeleton of a new domain."""
     from confab import authoring
@@ -55,7 +57,7 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
 
 
 @command(epilog=examples("fetch"))
-@click.argument("url", metavar="URL", help="IRI of an ontology that lies on the web.")
+@click.argument("url", metavar="URL", help="IRI of an ontology on the web.")
 @click.option(
     "-o",
     "--output",
@@ -81,8 +83,8 @@ def fetch(url: str, folder: Path) -> None:
 @click.option(
     "-o", "--output", "out", type=Output(PICTURE), required=True, metavar="FILE.png", help="File to draw into."
 )
-@click.option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
-@click.option("--classes", is_flag=True, help="Draw the classes of objects instead.")
+@click.option("--behavior", metavar="BEHAVIOR", help="Draw the conditions and effects of this behaviour.")
+@click.option("--classes", is_flag=True, help="Draw the classes of objects.")
 def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
     """Draw the table with its places, a behaviour, or the classes."""
     from confab.picturing import draw
@@ -100,9 +102,9 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
     shell_complete=scene_names,
     help="Ontology files, or names of shipped scenes.",
 )
-@click.option("--deep", is_flag=True, help="Ask HermiT for contradictions as well; needs Java.")
+@click.option("--deep", is_flag=True, help="Also find contradictions with HermiT; needs Java.")
 @click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
-@click.option("--watch", is_flag=True, help="Check again whenever one of the files changes, until Ctrl-C.")
+@click.option("--watch", is_flag=True, help="Validate again after each change of a file, until Ctrl-C.")
 @TIME_LIMIT
 @AS_JSON
 @QUIET
@@ -173,7 +175,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     "out",
     type=Output(CONVERTED),
     metavar="FILE.ttl",
-    help="File to write; what it is goes to the terminal if not given.",
+    help="File to write; by default the result is printed.",
 )
 def convert(file: Path, form: str, out: Path | None) -> None:
     """Write the behaviours of a file in another form."""
@@ -198,9 +200,14 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 @click.argument("problem", type=PATH, required=False, metavar="[PROBLEM.pddl]")
 @click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
-    "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
+    "--level",
+    type=click.IntRange(min=1),
+    default=1,
+    help="Level of the imported behaviours; abstract levels can be added above.",
 )
-@click.option("--by", "query", metavar="QUERY.rq", help="The CONSTRUCT query that makes a scene of a foreign RDF file.")
+@click.option(
+    "--by", "query", metavar="QUERY.rq", help="The CONSTRUCT query that makes a scene from a foreign RDF file."
+)
 @TIME_LIMIT
 def import_(
     source: str, problem: Path | None, out: Path, level: int, query: str | None, time_limit: float | None
@@ -234,15 +241,17 @@ def import_(
 @command(epilog=examples("export"))
 @SCENE
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="OUT", help="Folder, or file, to write.")
-@click.option("--level", type=int, help="Level to export; the lowest if not given.")
+@click.option("--level", type=int, help="Level to export; by default the lowest.")
 @click.option(
     "--trajectory",
     is_flag=True,
-    help="Instead the joint paths of a plan, verified in physics, into a .json or .yaml file.",
+    help="Export the joint trajectories of a verified plan into a .json or .yaml file.",
 )
-@click.option("--bt", "trees", is_flag=True, help="Instead a plan as a behaviour tree: BehaviorTree.CPP 4, py_trees.")
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="The plan whose trajectories or tree are written.")
-@click.option("--both-hands", is_flag=True, help="Trajectories with all hands at once.")
+@click.option("--bt", "trees", is_flag=True, help="Export a plan as a behaviour tree (BehaviorTree.CPP 4, py_trees).")
+@click.option(
+    "--plan", type=PATH, metavar="PLAN.json", help="Plan for the trajectories or the tree; by default a new plan."
+)
+@click.option("--both-hands", is_flag=True, help="Execute with all hands at once.")
 @GOALS
 @SEED
 @TIME_LIMIT
@@ -263,11 +272,11 @@ def export(
     from confab.scene import load
 
     if trajectory and trees:
-        raise KnowledgeError("--trajectory and --bt are two outputs; give one of them")
+        raise KnowledgeError("--trajectory and --bt exclude each other; give one")
     if goal and not trees:
-        raise KnowledgeError("--goal is of behaviour trees; add --bt")
+        raise KnowledgeError("--goal applies to behaviour trees; add --bt")
     if level is not None and (trajectory or trees):
-        raise KnowledgeError("--level is of PDDL; trajectories and trees are those of primitives")
+        raise KnowledgeError("--level applies to PDDL only; trajectories and trees have primitives")
     if trajectory:
         from confab.commands.given import load_scene, plan_in
         from confab.reasoner.files import check_replaceable
@@ -283,7 +292,7 @@ def export(
         print(f"{out}: trajectories of {len(data['primitives'])} primitives, verified with seed {seed}")
         return
     if both_hands or (plan is not None and not trees):
-        raise KnowledgeError("--plan and --both-hands are of trajectories; add --trajectory")
+        raise KnowledgeError("--plan and --both-hands apply to trajectories; add --trajectory")
     with limited(time_limit):
         if trees:
             paths = _exported_trees(load(scene), plan, goal, out)

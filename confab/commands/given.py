@@ -43,7 +43,7 @@ def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
         errors = quick_errors(scene.knowledge)
     if errors:
         more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
-        remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
+        remark(f"'confab validate {path}' finds errors, so the result may be wrong: {errors[0].what}{more}")
 
 
 def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
@@ -78,7 +78,7 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
             lines = memory_lines(path)
             if unknown := unknown_terms(lines, scene.knowledge):
                 more = f"; and {len(unknown) - NAMED} more" if len(unknown) > NAMED else ""
-                remark(f"{path} counts what this scene doesn't know: {'; '.join(unknown[:NAMED])}{more}")
+                remark(f"{path} has terms that this scene doesn't have: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
         if not path.is_file():

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     required=True,
     metavar="SCENE…",
     shell_complete=scene_names,
-    help="Scenes to gather experience in.",
+    help="Scenes to plan in and learn from.",
 )
 @click.option(
-    "--memory", type=Output(MEMORY), required=True, metavar="FILE", help="Memory file to learn into; made if missing."
+    "--memory", type=Output(MEMORY), required=True, metavar="FILE", help="Memory file to update; created if missing."
 )
-@click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
+@click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan only.")
 @click.option(
     "--plot", type=Output(PICTURE), metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF."
 )
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     "--rounds",
     type=click.IntRange(1),
     metavar="N",
-    help="How often all scenes are gone through.",
+    help="Number of rounds through all scenes.",
 )
 @TIME_LIMIT
 @AS_JSON
@@ -124,7 +124,7 @@ def memory_app() -> None:
 
 
 @memory_app.command(epilog=examples("memory migrate"))
-@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file, which is rewritten.")
 @click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
 def migrate(memory: Path, renames: tuple[str, ...]) -> None:
     """Rename terms in a memory after they were renamed in the ontology."""
@@ -162,9 +162,9 @@ def show(memory: str, most: int, as_json: bool) -> None:
     type=Output(MEMORY, may_be="memories"),
     required=True,
     metavar="FILE",
-    help="The merged memory; may be one of them.",
+    help="The merged memory; may be one of the inputs.",
 )
-@click.option("--trust", is_flag=True, help="Let what they have counted lead; else it runs in strict mode.")
+@click.option("--trust", is_flag=True, help="Let all counts guide the search; by default planning is strict.")
 def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
     """Merge the counts of memories, in any order or repeatedly."""
     from confab.memory import Memory, undisturbed
@@ -178,8 +178,10 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
 
 
 @memory_app.command("trust", epilog=examples("memory trust"))
-@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
-@click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
+@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file, which is rewritten.")
+@click.argument(
+    "replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in the memory, or 'all'."
+)
 def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
     """Let the counts of other replicas also guide the search."""
     from confab.memory import Memory, undisturbed
@@ -188,4 +190,6 @@ def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
         loaded = Memory.load(memory)
         loaded.trust(sorted(loaded.experience.episodes) if replicas == ("all",) else replicas)
         loaded.save(memory)
-    show_result(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
+    show_result(
+        f"{memory}: the counts of {len(loaded.trusted | {loaded.experience.replica})} replicas guide the search"
+    )

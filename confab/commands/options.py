@@ -71,7 +71,7 @@ class Command(click.Command):
         read = [p for p in self.params if _reads_stdin(ctx.params.get(p.name or ""), p)]
         if len(read) > 1:
             names = " and ".join(map(_name, read))
-            raise click.UsageError(f"stdin can be read for one thing; {names} are both '-'", ctx)
+            raise click.UsageError(f"stdin can be read only once; {names} are both '-'", ctx)
         for output in self.params:
             path = ctx.params.get(output.name or "")
             if not isinstance(output.type, Output) or not isinstance(path, Path) or path == STDOUT:
@@ -133,10 +133,15 @@ def scene_names(context: click.Context, option: click.Parameter, begun: str) -> 
 
 
 _QUIET = click.option(
-    "-q", "--quiet", is_flag=True, expose_value=False, callback=_quiet, help="Say nothing but results and errors."
+    "-q", "--quiet", is_flag=True, expose_value=False, callback=_quiet, help="Print only results and errors."
 )
 _VERBOSE = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Say what each stage takes, on stderr."
+    "-v",
+    "--verbose",
+    is_flag=True,
+    expose_value=False,
+    callback=_verbose,
+    help="Print the duration of each stage on stderr.",
 )
 
 
@@ -151,15 +156,15 @@ SCENE = click.argument(
     shell_complete=scene_names,
     help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.",
 )
-SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
+SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="IRI of the scene at an endpoint with several scenes.")
 GOALS = click.option(
     "--goal",
     multiple=True,
     metavar="FACT",
-    help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable.",
+    help="A goal that replaces the goal of its symbol, e.g. 'cup2 LOCATION location8'; repeatable.",
 )
 MEMORY_FILE = click.option(
-    "--memory", type=PATH, metavar="FILE", help="The only place where memory is read or written."
+    "--memory", type=PATH, metavar="FILE", help="Memory file; no other memory is read or written."
 )
 NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan explicitly without memory.")
 MODE = click.option(
@@ -178,7 +183,7 @@ class Seconds(click.FloatRange):
         """Return the value as a number of seconds; fail if the value exceeds `LONGEST` or isn't a number."""
         seconds = float(super().convert(value, param, ctx))
         if not seconds <= LONGEST:  # also excludes 'nan'
-            self.fail(f"'{value}' is no time to wait; wanted seconds up to {LONGEST:,.0f}", param, ctx)
+            self.fail(f"'{value}' is no time limit; wanted seconds up to {LONGEST:,.0f}", param, ctx)
         return seconds
 
 
@@ -188,9 +193,9 @@ TIME_LIMIT = click.option(
     "--time-limit",
     type=Seconds(min=0.0),
     metavar="S",
-    help="Seconds after which it gives up (exit 3).",
+    help="Time limit in seconds (exit 3).",
 )
-SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
 NOISE = click.option(
     "--noise",
@@ -215,8 +220,12 @@ QUERY_SECONDS = click.option(
     type=Seconds(min=0.0),
     default=60.0,
     metavar="S",
-    help="Seconds after which a query ends (exit 3).",
+    help="Time limit of a query in seconds (exit 3).",
 )
 QUERY_ROWS = click.option(
-    "--rows", type=click.IntRange(min=1), default=100000, metavar="N", help="More rows than this end it, too."
+    "--rows",
+    type=click.IntRange(min=1),
+    default=100000,
+    metavar="N",
+    help="Maximum number of rows of a query (exit 3).",
 )

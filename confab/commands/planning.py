@@ -52,28 +52,34 @@ if TYPE_CHECKING:
 @MODE
 @TIME_LIMIT
 @click.option(
-    "--optimal", is_flag=True, help="--mode optimal: improve until proved or the limit (10 s); tell the bound."
+    "--optimal", is_flag=True, help="As --mode optimal: improve the plan until it is proved optimal, for up to 10 s."
 )
 @click.option(
     "--levels",
     default="free",
     metavar="free|strict",
-    help="Strict: no steps of a lower level where a level has no plan that can be refined.",
+    help="strict: fail if a level has no plan that can be refined.",
 )
 @click.option(
-    "--from-observed", "observed", type=PATH, metavar="FILE", help="Start from what was seen, not from the scene."
+    "--from-observed",
+    "observed",
+    type=PATH,
+    metavar="FILE",
+    help="File of observed facts, which replace the scene's facts.",
 )
-@click.option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
+@click.option("--diff", metavar="OLD_SCENE", help="Print the differences from this scene and its plan.")
 @click.option(
-    "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
+    "--engine", metavar="NAME", help="An engine of unified-planning; none: no engine even if the search gives up."
 )
-@click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
+@click.option("--level", type=int, metavar="N", help="Level on which the engine plans; by default the lowest.")
 @click.option(
     "--minimise",
     metavar="makespan|cost|steps",
-    help="Makespan: schedule the steps, several actors at once; cost and steps: as --optimal.",
+    help="makespan: schedule the steps of all actors; cost, steps: as --optimal.",
 )
-@click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write the plan and its reasons as a page.")
+@click.option(
+    "--report", type=Output(REPORT), metavar="FILE.html", help="Write the plan and its reasons as an HTML page."
+)
 @click.option("-o", "--output", "out", type=Output(PLAN), metavar="PLAN.json", help="Write the plan into this file.")
 @SCENE_IRI
 @AS_JSON
@@ -148,7 +154,7 @@ def plan(
 @NOISE
 @OUT
 @click.option(
-    "--keep", is_flag=True, help="Keep the run in a folder of its own in DIR: 001, 002, …; 'confab runs' lists them."
+    "--keep", is_flag=True, help="Store the run in a new folder in DIR (001, 002, …); 'confab runs' lists runs."
 )
 @click.option("--no-video", is_flag=True, help="Don't film: faster.")
 @GUI
@@ -179,14 +185,16 @@ def run(
 
 @command(epilog=examples("verify"))
 @SCENE
-@click.argument(
-    "plan", type=PATH, metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form."
+@click.argument("plan", type=PATH, metavar="PLAN.json", help="Output of 'confab plan --json', or a plan in PDDL.")
+@click.option(
+    "--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="Number of rollouts, with seeds S, S+1, …"
 )
-@click.option("--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="How often, with seeds S, S+1, …")
 @SEED
 @NOISE
-@click.option("--workers", default="1", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
-@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option(
+    "--workers", default="1", metavar="W", help="Number of processes for the rollouts, or ray, ray://HOST:PORT."
+)
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and filled amounts.")
 @click.option("--video", type=Output(FILM), metavar="OUT.mp4", help="Film the first rollout.")
 @GUI
 @click.option(
@@ -241,14 +249,15 @@ def verify(
 
 @command(epilog=examples("execute"))
 @SCENE
-@click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
+@click.option("--world", default="symbolic", help="World to act in: symbolic or pybullet.")
+@click.option("--on", metavar="INTERFACE:ADDRESS", help="Robot to act on, e.g. pyrobosim:world.yaml; excludes --world.")
 @click.option(
-    "--on", metavar="INTERFACE:ADDRESS", help="Act on a robot, e.g. pyrobosim:world.yaml; instead of --world."
+    "--intervene",
+    multiple=True,
+    metavar="'WHEN WHAT'",
+    help="e.g. 'after=28 cup2 LOCATION location8', or a file of interventions.",
 )
-@click.option(
-    "--intervene", multiple=True, metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."
-)
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="What to begin with.")
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="Plan to begin with.")
 @GOALS
 @MEMORY_FILE
 @NO_MEMORY
@@ -263,19 +272,19 @@ def verify(
     metavar="EPISODE.ttl",
     help="Write the episode into this file.",
 )
-@click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write what happened as a page.")
+@click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write the episode as an HTML page.")
 @SCENE_IRI
-@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and filled amounts.")
 @NOISE
-@click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
-@click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
+@click.option("--both-hands", is_flag=True, help="In PyBullet: execute with all hands at once, without interventions.")
+@click.option("--learn", is_flag=True, help="Learn from the episode and its failures into --memory.")
 @TIME_LIMIT
 @click.option(
     "--serve",
     "serve_at",
     type=click.IntRange(0, 65535),
     metavar="PORT",
-    help="Meanwhile show it on a page, and answer SPARQL, at this port.",
+    help="Serve the page and SPARQL on this port during execution.",
 )
 @AS_JSON
 @QUIET
@@ -354,25 +363,32 @@ def execute(
 @command(epilog=examples("explain"))
 @SCENE
 @click.argument(
-    "which", required=False, metavar="[STEP]", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."
+    "which",
+    required=False,
+    metavar="[STEP]",
+    help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or words of the step.",
 )
 @click.option(
     "--not",
     "instead",
     metavar="WHAT",
-    help="Why not this: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
+    help="The alternative: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
 )
 @GOALS
 @MEMORY_FILE
 @click.option(
-    "--step", type=click.IntRange(min=0), default=0, metavar="N", help="Which step of the level, counted from 0."
+    "--step",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="Number of the step on its level, counted from 0.",
 )
-@click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
-@click.option(
-    "--check", type=PATH, metavar="FILE", help="Verify a certificate that `plan --json` wrote, and search nothing."
-)
+@click.option("--level", type=int, default=1, metavar="L", help="Level of the step.")
+@click.option("--check", type=PATH, metavar="FILE", help="Verify a certificate from `plan --json`, without planning.")
 @click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
-@click.option("--plot", type=Output(PICTURE), metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
+@click.option(
+    "--plot", type=Output(PICTURE), metavar="FILE", help="With --memory: draw the reasons into a PNG, SVG or PDF file."
+)
 @TIME_LIMIT
 @AS_JSON
 @QUIET
@@ -397,7 +413,7 @@ def explain(
     if check is not None:
         if any(given is not None for given in (which, instead, memory, against, plot)):
             raise KnowledgeError(
-                "--check verifies a certificate and plans nothing; leave out STEP, --not and what asks memory"
+                "--check verifies a certificate and plans nothing; leave out STEP, --not and options of memory"
             )
         with limited(time_limit):
             checked = checked_certificate(load_scene(scene), goal, check)
@@ -439,7 +455,7 @@ def _explained(
     if remembered is not None:
         return _by_memory(result, remembered, which or "L1#0", against, plot)
     if against is not None or plot is not None:
-        raise KnowledgeError("--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT")
+        raise KnowledgeError("--against and --plot need --memory FILE; without a memory, give --not WHAT")
     return result.explain() if which is None else result.why(which)
 
 

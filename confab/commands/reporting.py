@@ -20,8 +20,10 @@ from confab.terminal import limited, show_result, told
 @click.option("-o", "--output", "out", type=Output(REPORT), required=True, metavar="FILE.html", help="File to write.")
 @GOALS
 @click.option("--plan", type=PATH, metavar="PLAN.json", help="With --verdicts: the plan that was verified.")
-@click.option("--verdicts", type=PATH, metavar="VERDICTS.json", help="Show what 'confab verify -o' wrote.")
-@click.option("--episode", type=PATH, metavar="EPISODE.json", help="Show what 'confab execute -o' wrote.")
+@click.option(
+    "--verdicts", type=PATH, metavar="VERDICTS.json", help="Show the verdicts in a file of 'confab verify -o'."
+)
+@click.option("--episode", type=PATH, metavar="EPISODE.json", help="Show the episode in a file of 'confab execute -o'.")
 @TIME_LIMIT
 @QUIET
 def report(
@@ -55,10 +57,14 @@ def report(
 
 @command(epilog=examples("runs"))
 @click.argument(
-    "folder", type=FOLDER, default="confab-out", metavar="[FOLDER]", help="Where 'confab run --keep' keeps runs."
+    "folder",
+    type=FOLDER,
+    default="confab-out",
+    metavar="[FOLDER]",
+    help="Folder in which 'confab run --keep' stores runs.",
 )
 @click.argument("names", nargs=-1, metavar="[RUN OTHER]", help="Two runs to compare.")
-@click.option("-o", "--output", "out", type=Output(REPORT), metavar="FILE.html", help="Write them as a page.")
+@click.option("-o", "--output", "out", type=Output(REPORT), metavar="FILE.html", help="Write the runs as an HTML page.")
 @AS_JSON
 @QUIET
 def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) -> None:

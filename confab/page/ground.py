@@ -129,7 +129,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return places in a layout with places near each other that static relations connect; None for fewer than three places."""
+    """Return at least three places in a layout in which places connected by static relations are near each other, or None."""
     import networkx
 
     values = _values(problem)
@@ -149,7 +149,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return places without coordinates and connections in rows, ordered by name; None for fewer than three places."""
+    """Return at least three places without coordinates and connections in rows, ordered by name, or None."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial

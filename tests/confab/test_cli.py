@@ -84,7 +84,7 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
     ("arguments", "code", "word"),
     [
         (["plan", "no-such-scene"], 2, "no scene 'no-such-scene'"),
-        (["plan", "beverage-serving", "--time-limit", "nan"], 2, "'nan' is no time to wait"),
+        (["plan", "beverage-serving", "--time-limit", "nan"], 2, "'nan' is no time limit"),
         (
             ["query", "beverage-serving", "where-is-everything", "--time-limit", "1e300"],
             2,
