@@ -1,4 +1,4 @@
-"""Execute the book of notebooks, keep their outputs, and print the time of each: `make notebooks`.
+"""Execution of all notebooks by `make notebooks`, which stores their outputs and prints the time of each notebook.
 
 python -m benchmarks.notebooks [PART OF A NAME …]
 """

@@ -1,10 +1,10 @@
-"""The cost of derived situations and amounts in scenes without any: tables with and without the code that serves only them.
+"""The cost of the code for derived situations and amounts in scenes that have neither.
 
 python -m benchmarks nothing_derived
-CONFAB_PAIRS=10 …            how many calls of each kind, by turns in one process
+CONFAB_PAIRS=10 …            number of calls with and without this code, which alternate in one process
 
-Without: the scene isn't asked for definitions of value properties, chains and rules; none is compiled; a value is what is wanted
-if it is the same, and not if it lies within bounds.
+In the calls without this code, the scene isn't queried for definitions, property chains and rules, and no rule is compiled. A
+value meets a goal only if it equals the goal value, not if it lies within bounds.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.reading import frame, schema
 
 CASES = (("served", 50), ("handover", 50), ("served", 200), ("served", 1000))
-"""Families and how many objects."""
+"""Families of scenes, and numbers of objects."""
 PART = re.compile(
     r"\n  UNION \{(?:(?!\n  UNION ).)*BIND\(\"(?:expression|axiom|swrl|range)\" AS \?part\)(?:(?!\n  UNION |\n\}).)*",
     re.DOTALL,
 )
-"""Parts of the schema query that only defined situations and amounts need."""
+"""Pattern of the parts of the schema query that only derived situations and amounts need."""
 COMPARING = (
     "confab.planner.hierarchical.chains",
     "confab.planner.hierarchical.refinement",
@@ -42,12 +42,12 @@ COMPARING = (
     "confab.planner.hierarchical.planner",
     "confab.planner.validation",
 )
-"""Modules that test goal values."""
+"""Modules that compare values with goal values."""
 
 
 @contextmanager
 def without() -> Iterator[None]:
-    """Do without what serves only derived situations and amounts."""
+    """Remove the code for derived situations and amounts from the planner until the end of the block."""
     left, parts = PART.subn("", schema.SCHEMA)
     assert parts == 4, f"wanted 4 parts of the query, found {parts}"
     with ExitStack() as stack:

@@ -1,7 +1,7 @@
-"""Numbers in planning: random problems beside a search in plain Python; problems that unified-planning ships, read and solved.
+"""Numeric planning: random problems compared with a search in plain Python, and the numeric problems of unified-planning.
 
 python -m benchmarks numeric
-CONFAB_PROBLEMS=100 …        how many random problems, half of jugs, half of a van whose ways have a price
+CONFAB_PROBLEMS=100 …        number of random problems: half with jugs, half with a van whose roads have costs
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LIMITS = Limits(2_000_000, 60.0)
 
 
 def main() -> None:
-    """Print how many problems agree."""
+    """Print the numbers of solved random problems and the disagreements with the search in plain Python."""
     half = int(os.environ.get("CONFAB_PROBLEMS", "100")) // 2
     counts, wrong = Counter[tuple[str, str, str]](), list[str]()
     for name, make in (("jugs", jugs), ("van", rounds)):
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def others() -> None:
-    """Print what becomes of the problems that unified-planning ships."""
+    """Print the numbers of unified-planning's problems that are read, solved and accepted by its validator."""
     print(
         "\n| problems of unified-planning's tests | read | solved | accepted by its validator | refused |\n|---|---|---|---|---|"
     )
@@ -79,7 +79,7 @@ def others() -> None:
 
 
 def published() -> Iterator[tuple[str, str, str, str]]:
-    """Yield the numeric problems that unified-planning's wheel has: where from, a name, domain and problem as PDDL."""
+    """Yield the numeric problems in unified-planning's wheel: the source, a name, and domain and problem as PDDL."""
     import unified_planning
     from unified_planning.io import PDDLWriter
     from unified_planning.test.examples import get_example_problems
@@ -92,7 +92,7 @@ def published() -> Iterator[tuple[str, str, str, str]]:
             and hasattr(example.problem, "actions")
         ):
             writer = PDDLWriter(example.problem)
-            with suppress(AttributeError):  # what its own writer can't write
+            with suppress(AttributeError):  # unified-planning's writer can't write some examples
                 yield "examples", f"examples: {name}", writer.get_domain(), writer.get_problem()
     tests = Path(unified_planning.__file__).parent / "test" / "pddl"
     for domain in sorted([*tests.glob("*/domain.pddl"), *tests.glob("*/d.pddl")]):
@@ -103,7 +103,7 @@ def published() -> Iterator[tuple[str, str, str, str]]:
 
 
 def tried(domain: str, problem: str) -> tuple[str, bool]:
-    """Return what became of a problem, and whether unified-planning accepts the plan."""
+    """Return the result for a problem as text, and whether unified-planning accepts the plan."""
     try:
         found = imported(parse(domain, problem))
     except PddlError as error:

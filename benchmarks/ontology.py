@@ -1,9 +1,9 @@
-"""What checking and inference cost: validation, OWL 2 RL, and HermiT, on tables of the family `served`.
+"""The cost of validation, of OWL 2 RL inference, and of HermiT on tables of the family `served`.
 
     python -m benchmarks ontology
 
-Wall and CPU seconds, those of Java among them; median of three. Each begins with a loaded graph, but for validation, which
-begins with the file.
+The table has medians of three runs in wall and CPU seconds, including Java. Validation is measured from the file, the other
+functions from a loaded graph.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ REPEATS = 3
 AXIOM = """
 k:BeverageOrVessel a owl:Class ; rdfs:label "beverage or vessel"@en ;
   owl:equivalentClass [ a owl:Class ; owl:unionOf ( k:Beverage k:Vessel ) ] .
-"""  # the shipped tabletop asks for no inference, so that there would be nothing to measure
+"""  # an axiom with a conclusion, since the shipped tabletop has none
 
 
 def main() -> None:
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def timed(call: Callable[[], object]) -> tuple[float, float]:
-    """Return the wall and CPU seconds of a call; the CPU seconds of processes that it starts count."""
+    """Return the wall and CPU seconds of a call, including the CPU seconds of child processes."""
     began, before = perf_counter(), sum(os.times()[:4])
     call()
     return perf_counter() - began, sum(os.times()[:4]) - before

@@ -1,7 +1,7 @@
-"""Every command, ended at any moment by kill -9, a crash or Ctrl-C: how many processes it leaves behind.
+"""The number of processes that each command leaves behind if it is ended by kill -9, a crash or Ctrl-C.
 
-python -m benchmarks.orphans             50 moments for each command and each end, as docs/figures/promises.md quotes them
-python -m benchmarks.orphans query 5     so many for one command
+python -m benchmarks.orphans             50 moments for each command and each end, as in docs/figures/promises.md
+python -m benchmarks.orphans query 5     five moments for one command
 """
 
 from __future__ import annotations
@@ -29,10 +29,9 @@ from confab.scene import load
 ENDS = {"kill -9": signal.SIGKILL, "crash": signal.SIGSEGV, "Ctrl-C": signal.SIGINT}
 MOMENTS = 50
 GRACE = 2.0
-"""Seconds after the end of a command in which its processes have to end."""
+"""Seconds after the end of a command within which its processes must end."""
 LONGEST, LATEST = 1.5, 10.0
-"""The moments are spread from the start of a command to its end, but at most to so many seconds after it first has a process, and
-after its start."""
+"""Maximum seconds of the last moment after the first child process of a command, and after the start of the command."""
 MARK = "CONFAB_ORPHANS"
 """Environment variable that marks the processes of a command."""
 ADOPT = 36
@@ -49,7 +48,7 @@ IMPORTED = (
     "confab.sim.film",
     "confab.sim.rollouts",
 )
-"""Imports of the commands, done once for all."""
+"""Modules that the commands need, which are imported once."""
 CALLS = (
     "verify one-arm-serving arm.json --rollouts 4 --workers 2 --perturb",
     "verify one-arm-serving arm.json --video NEW.mp4",
@@ -80,11 +79,11 @@ CALLS = (
     f"export {SCENE} -o NEW",
     "export one-arm-serving --trajectory -o NEW.json",
 )
-"""Calls of all commands but query, serve and mcp."""
+"""Calls of the commands except query, serve and mcp."""
 
 
 def commands(folder: Path) -> dict[str, Callable[[], object]]:
-    """Return the commands, by their calls; the files that they read are written into a folder."""
+    """Write the files that the commands read into a folder, and return the commands by their calls."""
     for module in (*IMPORTED, *(["unified_planning.shortcuts"] if find_spec("unified_planning") else [])):
         import_module(module)
     prepare(folder)
@@ -110,7 +109,7 @@ def commands(folder: Path) -> dict[str, Callable[[], object]]:
 
 
 def by_an_agent(folder: Path) -> None:
-    """Serve an agent that asks a slow query and waits."""
+    """Serve an agent that sends a slow query and waits for the answer."""
     hello = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "orphans", "version": "1"}}
     asked = {"name": "query", "arguments": {"scene": SCENE, "sparql": CROSS, "seconds": 300}}
     messages: list[dict[str, object]] = [
@@ -126,7 +125,7 @@ def by_an_agent(folder: Path) -> None:
 
 
 def served(scene: Path) -> None:
-    """Serve a scene and send it a slow query."""
+    """Serve a scene, and send a slow query to the server."""
     from urllib.parse import quote
     from urllib.request import urlopen
 
@@ -137,7 +136,7 @@ def served(scene: Path) -> None:
 
 
 def begun(run: Callable[[], object]) -> int:
-    """Run something in a process, and process group, of its own; return its number."""
+    """Run a function in a separate process and process group; return the process number."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns about forks with threads
         child = os.fork()
@@ -154,12 +153,12 @@ def begun(run: Callable[[], object]) -> int:
             code = 0
         finally:
             os._exit(code)
-    os.setpgid(child, child)  # the child does so, too; the order is arbitrary
+    os.setpgid(child, child)  # the child also calls this; either call may be the first
     return child
 
 
 def marked(mark: str) -> list[int]:
-    """Return the processes that run and have a mark in their environment."""
+    """Return the numbers of running processes with a mark in their environment."""
     found = []
     for place in Path("/proc").iterdir():
         if place.name.isdecimal() and int(place.name) != os.getpid():
@@ -173,7 +172,7 @@ def marked(mark: str) -> list[int]:
 
 
 def below(process: int) -> set[int]:
-    """Return the processes that run and descend from a process."""
+    """Return the numbers of running processes that descend from a process."""
     found: set[int] = set()
     try:
         children = [task.read_text().split() for task in Path(f"/proc/{process}/task").glob("*/children")]
@@ -188,7 +187,7 @@ def below(process: int) -> set[int]:
 
 
 def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple[int, int]:
-    """End a command after a time; return the numbers of processes that it had started and that are left."""
+    """End a command after a time; return the number of its child processes at this time, and of processes left behind."""
     mark = os.environ[MARK] = uuid4().hex
     before = below(os.getpid())
     child = begun(run)
@@ -201,14 +200,14 @@ def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple
         time.sleep(0.02)
     for orphan in rest:
         os.kill(orphan, signal.SIGKILL)
-    with suppress(ChildProcessError):  # none was left, or adopted
+    with suppress(ChildProcessError):  # no process was left behind or adopted
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
     return there, len(rest)
 
 
 def length(run: Callable[[], object]) -> float:
-    """Return the seconds of a command over which the moments are spread."""
+    """Return the seconds after the start of a command until the last moment."""
     begin, end = time.monotonic(), LATEST
     os.environ[MARK] = uuid4().hex
     child = begun(run)
@@ -224,7 +223,7 @@ def length(run: Callable[[], object]) -> float:
 
 
 def trials(run: Callable[[], object], sign: signal.Signals, moments: int) -> tuple[int, int]:
-    """Return at how many moments of a command it had started processes, and how many processes it left in all."""
+    """Return the number of moments at which a command had child processes, and the total number of processes left behind."""
     seconds, busy, orphans = length(run), 0, 0
     for number in range(moments):
         there, rest = left(run, sign, seconds * (number + 0.5) / moments)
@@ -233,7 +232,7 @@ def trials(run: Callable[[], object], sign: signal.Signals, moments: int) -> tup
 
 
 def main(arguments: Sequence[str] = ()) -> int:
-    """Print the table; return 1 if any process was left."""
+    """Print the table; return 1 if a process was left behind."""
     if ctypes.CDLL(None, use_errno=True).prctl(ADOPT, 1, 0, 0, 0):
         raise OSError(ctypes.get_errno(), "orphans can't be adopted here")
     moments, worst = int(arguments[1]) if len(arguments) > 1 else MOMENTS, 0

@@ -2,7 +2,7 @@
 
 python -m benchmarks outputs
 
-Each output of each command is given a file of each kind, under a name with the ending that the output wants.
+For each output of each command, a file of each kind is put at the output path before the command runs.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from confab.reasoner.vocabulary import OWL
 from confab.scene import load
 
 SCENE, FOLDER = "tearoom-scene.ttl", "HERE"
-"""The scene of the commands, and the word for the folder in which they work."""
+"""The scene of the commands, and the word that stands for their folder."""
 COLUMNS = "SELECT ?thing WHERE { ?thing a owl:NamedIndividual } ORDER BY ?thing"
 CONSTRUCTION = "CONSTRUCT WHERE { ?thing a owl:NamedIndividual }"
 
@@ -62,15 +62,15 @@ class Door:
     Parameters
     ----------
     call : str
-        As one writes it, with OUT for the file.
+        The words of the call, with OUT for the output file.
     file : str
-        The name that the output has.
+        The name of the output file.
     kind : str
-        The kind of output.
+        The kind of the output file.
     physics : bool
-        Whether it takes a rollout, so that only refusals are tried.
+        Whether the command executes a rollout. For such commands, only refusals are tried, since rollouts are slow.
     new : bool
-        Whether it replaces nothing, not even its own file.
+        Whether the command replaces no existing file, not even an earlier output.
     """
 
     call: str
@@ -81,7 +81,7 @@ class Door:
 
     @property
     def name(self) -> str:
-        """The command and its option."""
+        """The name of the command with its option."""
         command, *words = self.call.split()
         middle = [word for word in words if word in ("merge", "trust", "migrate")]
         into = [f"{option} {'' if place == 'OUT' else Path(self.file).name}".strip() for option, place in pairwise(words)
@@ -151,7 +151,7 @@ FILES = {
 }
 FILES |= {"report": "report.html", "generated": "generated.ttl", "edited": "edited.ttl"}
 LINKS = ("link", "hard link")
-"""To the scene that the command reads."""
+"""Kinds of links to the scene that the command reads."""
 OTHERS = ("folder", "pipe", "read-only", "its own", "empty", "none")
 THERE = (*FILES, *LINKS, *OTHERS)
 KIND_OF = {"memory": MEMORY, "plan": PLAN, "episode": EPISODE, "report": REPORT, "generated": GENERATED}
@@ -159,7 +159,7 @@ KIND_OF = {"memory": MEMORY, "plan": PLAN, "episode": EPISODE, "report": REPORT,
 
 @contextmanager
 def inside(folder: Path) -> Iterator[None]:
-    """Work in a folder for a while."""
+    """Change the working directory until the end of the block."""
     before = Path.cwd()
     os.chdir(folder)
     try:
@@ -182,22 +182,22 @@ def call(words: str) -> int:
 
 
 class Ontologies(BaseHTTPRequestHandler):
-    """Answers every request with an ontology of that address."""
+    """Request handler that answers every request with an ontology whose IRI is the requested address."""
 
     def do_GET(self) -> None:
-        """Send an ontology."""
+        """Respond with an ontology."""
         self.send_response(200)
         self.send_header("Content-Type", "text/turtle")
         self.end_headers()
         self.wfile.write(f"<http://{self.headers['Host']}{self.path}> a <{OWL}Ontology> .\n".encode())
 
     def log_message(self, format: str, *args: object) -> None:
-        """Log nothing."""
+        """Discard log messages."""
 
 
 @cache
 def web() -> HTTPServer:
-    """Return a server of ontologies on this machine."""
+    """Return a local HTTP server of ontologies."""
     server = HTTPServer(("127.0.0.1", 0), Ontologies)
     Thread(target=server.serve_forever, daemon=True).start()
     return server
@@ -220,7 +220,7 @@ def prepare(folder: Path) -> None:
 
 
 def answers(door: Door, whole: Path, there: tuple[str, ...] = THERE) -> Iterator[tuple[str, str]]:
-    """Yield for each kind of existing file the result of a command: ``refused``, ``replaced``, ``made`` or a fault."""
+    """Yield the result of a command for each kind of existing file, which is ``refused``, ``replaced``, ``made`` or a fault."""
     for what in there:
         if door.physics and (what in ("its own", "empty", "none") or KIND_OF.get(what) == door.kind):
             continue
@@ -238,7 +238,7 @@ def _answer(door: Door, what: str) -> str:
     if own and door.physics:
         out.write_text("another's")
     elif own and door.kind == MEMORY and "learn" not in door.call.split()[0] and "merge" not in door.call:
-        _put("memory", out)  # which these commands change
+        _put("memory", out)  # these commands change an existing memory
     elif own:
         call(words)
     else:
@@ -256,7 +256,7 @@ def _answer(door: Door, what: str) -> str:
 
 
 def _put(what: str, out: Path) -> None:
-    """Have something be where a command writes."""
+    """Put a file, link, folder or pipe at the output path of a command."""
     with suppress(FileNotFoundError):
         out.unlink()
     if what in FILES:
@@ -281,7 +281,7 @@ def _state(file: Path) -> tuple[int, bytes | None] | None:
 
 
 def main() -> int:
-    """Print the table; return 1 if an answer is another than promised."""
+    """Print the table; return 1 if a result is neither a refusal, a replacement nor a new file."""
     wrong = 0
     print("| command and output | writes | replaces, or makes | refuses |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:

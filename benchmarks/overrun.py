@@ -1,14 +1,15 @@
-"""How long commands and calls go on after their time limit; how long `confab validate` takes.
+"""The time that commands and calls continue after their time limit, and the time that `confab validate` takes.
 
-    python -m benchmarks.overrun [--limits 1,5] [--rows 3,7] [FILE.ttl …]    commands and calls, in hard scenes and in the files
-    python -m benchmarks.overrun validated                      what validation takes
+    python -m benchmarks.overrun [--limits 1,5] [--rows 3,7] [FILE.ttl …]    commands and calls, in hard scenes and in the given
+    files
+    python -m benchmarks.overrun validated                      the time of validation
 
-The longest limit comes first, in one scene after the other, until one takes longer; the others are tried in that scene.
-A call that ends before its limit proves nothing about it: its cell says "before".
+Each call is tried with the longest limit in several scenes, until a call reaches the limit. The other limits are tried in this
+scene. If a call ends before its limit, the cell of the table is "before".
 
-The limit is one of the clock, so a call is watched from outside: what CPU time it has used when the limit is over, and in the end,
-with that of all processes that it runs.
-On a busy machine the limit comes at another step, but a step takes the CPU time that it takes.
+Limits are in seconds of the wall clock. Another process reads the CPU time of a call and its child processes at the limit and
+at the end of the call. The difference is the overrun. It is measured in CPU time, which depends little on the load of the
+machine.
 """
 
 from __future__ import annotations
@@ -33,17 +34,17 @@ SCENES = {
     "full shelves": ("full", "--objects", "60"),
     "1,000 in each other's way": ("blocked", "--objects", "1000"),
 }
-"""Generated scenes that aren't planned in within five seconds, most of them."""
+"""Generated scenes. In most of them, planning takes more than five seconds."""
 VALIDATED = ("1,000 objects", "10,000 objects")
 EASY, TABLE = "200 objects", "the paper's table"
 SERVED = (EASY, "1,000 objects", "10,000 objects")
-"""Scenes with goals about a cup, for which there is a memory."""
+"""Scenes with goals about cups, for which a memory is learned."""
 LARGE = ("10,000 objects", "100,000 irrelevant objects")
 BODIES = (EASY, "three cups", TABLE)
-"""Scenes that physics can carry out."""
+"""Scenes with bodies, whose plans can be executed in physics."""
 SHIPPED = {TABLE: "beverage-serving", "three cups": "three-cups"}
 TRIED = 3
-"""Scenes in which a call is tried with the longest limit."""
+"""Maximum number of scenes in which a call is tried with the longest limit."""
 EVERY = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 COMMANDS: tuple[tuple[str, ...], ...] = (
     ("plan", "SCENE"),
@@ -77,9 +78,9 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("export", "BODIES", "--trajectory", "-o", "NEW.json"),
     ("import", "domain.pddl", "problem.pddl", "-o", "NEW.ttl"),
 )
-"""All commands with a time limit, and where each is tried.
+"""All commands with a time limit, each with the scene or the group of scenes in which it is tried.
 
-SCENE: in hard scenes, each beginning with another one; otherwise in those above, or in one.
+SCENE stands for hard scenes; successive commands begin with different scenes.
 """
 CALLS: tuple[tuple[str, str], ...] = (
     ("SCENE", "scene.plan(time_limit=S)"),
@@ -101,7 +102,7 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("LARGE", "within: confab.validate(scene.knowledge.path)"),
     ("LARGE", "within: scene.problem"),
 )
-"""Calls in Python with the scene in which they are made; `within` represents a block of `confab.within(S)`."""
+"""Calls in Python, each with its scene or group of scenes. `within` stands for a block of `confab.within(S)`."""
 BEGUN = """
 import os, sys
 from confab.reasoner.limits import Deadline
@@ -112,7 +113,7 @@ def after(cls, seconds):
     return begin(cls, seconds)
 Deadline.after = classmethod(after)
 """
-"""Marks the time from which a call counts."""
+"""Code that reports the begin of the time limit to the watching process."""
 COMMAND = "from confab.start import main; main()"
 CALL = """
 import confab
@@ -138,9 +139,10 @@ os._exit(3 if ended and ended.status.value == 'gave-up' else 0)
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended.
+    """The end of a process.
 
-    `took` are seconds of the clock since its limit began, `after` the seconds of CPU time after the limit; None: it ended before.
+    `took` is the wall time in seconds since the begin of the limit. `after` is the CPU time in seconds after the limit, or None
+    if the process ended before.
     """
 
     code: int
@@ -149,16 +151,16 @@ class Ended:
 
     @property
     def measured(self) -> bool:
-        """Whether the limit was reached before its end, or ended it early."""
+        """Whether the process reached its limit, or ended early because of the limit."""
         return self.after is not None or self.code == 3
 
     def share(self, seconds: float) -> str:
-        """Return the time used after the limit as a share of the limit, with the exit code."""
+        """Return the CPU time after the limit as a share of the limit, and the exit code, as text."""
         return f"{(self.after or 0.0) / seconds:.0%} ({self.code})" if self.measured else f"before ({self.code})"
 
 
 def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
-    """Run code in a process of its own until it ends; the code has to obey a limit of so many seconds."""
+    """Run code with a time limit in a separate process, and return the end of the process."""
     told, tell = os.pipe()
     with subprocess.Popen(
         [sys.executable, "-c", (BEGUN + code).replace("SECONDS", repr(seconds)), *arguments],
@@ -183,7 +185,7 @@ def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
 
 
 def cpu_seconds(process: int) -> float:
-    """Return the seconds of CPU time that a process and all that it runs have had."""
+    """Return the CPU seconds of a process and its child processes."""
     folder = Path("/proc") / str(process)
     try:
         own = int((folder / "schedstat").read_text().split()[0]) / 1e9
@@ -194,7 +196,7 @@ def cpu_seconds(process: int) -> float:
 
 
 def confab(*arguments: str) -> float:
-    """Run a command that has to succeed; return the seconds of CPU time that it took."""
+    """Run a command that must succeed; return its CPU seconds."""
     before = getrusage(RUSAGE_CHILDREN)
     command = [sys.executable, "-c", "from confab.start import main; main()", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -203,7 +205,7 @@ def confab(*arguments: str) -> float:
 
 
 def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str]) -> None:
-    """Print a row for each command and call, or for those chosen by number: by limit the share of it that was used after it."""
+    """Print a row for each command and call, or for the rows of the given numbers, with the overrun at each limit."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
         scenes = {Path(file).stem: file for file in files}
         for number, (name, family) in enumerate({**SCENES, EASY: ("served", "--objects", "200")}.items()):
@@ -252,7 +254,7 @@ def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str])
 
 
 def validated() -> None:
-    """Print what validation takes, a row for each scene."""
+    """Print the CPU seconds of validation for each scene."""
     print("| `confab validate` of | CPU s |\n|---|---|")
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
         file = str(Path(folder) / "scene.ttl")

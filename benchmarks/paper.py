@@ -1,4 +1,4 @@
-"""The paper's claims on its own task: expansions with and without hierarchy, search time, cold start."""
+"""The claims of the paper about its task: expansions with and without hierarchy, search time, and time of the first call."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REPEATS = 7
 
 
 def main() -> None:
-    """Print expansions per level, then times."""
+    """Print the expansions per level, and the times."""
     problem = read(load("beverage-serving")).problem
     print("| planner | status | expansions per level | in all |\n|---|---|---|---|")
     _row("paper mode, hierarchical", paper_plan(problem))

@@ -1,19 +1,20 @@
-"""The field's own problems: coverage, time and length beside pyperplan and Fast Downward; grounding beside its translator.
+"""Standard PDDL problems: coverage, time and plan length compared with pyperplan and Fast Downward, and time of grounding.
 
     python -m benchmarks pddl                        with problems in ../shared/pddl
-    CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
+    CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems in another folder
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
-    CONFAB_ALL=1 …                                   every problem, not only four per folder
+    CONFAB_ALL=1 …                                   all problems instead of four per folder
     CONFAB_DOMAINS=ferry,satellite …                 these folders only
-    CONFAB_PLANNERS=confab,lama-first …              these planners only: ``confab`` is the flat core alone, ``confab-whole`` what
-                                                     ``confab plan`` does without an engine, ``confab-engine`` what it does
-                                                     with an engine's name (or ``grounding``, ``read-back``; ``enhsp``, which
-                                                     takes numbers, where the peers' Python has up-enhsp)
+    CONFAB_PLANNERS=confab,lama-first …              these planners and tables only
 
-Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and problems, beside the domain or in
-a folder ``testing…`` below it. Where the peers can't be had, ours run alone. What a run
-gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem and what the planner's code is; a benchmark
-that was interrupted goes on from there. Delete the folder to measure anew.
+The planner ``confab`` is the flat core, ``confab-whole`` is ``confab plan`` without an engine, and ``confab-engine`` is
+``confab plan`` with an engine. The planner ``enhsp``, which supports numbers, needs up-enhsp. ``grounding`` and ``read-back`` are
+further tables.
+
+Each run is a separate process, limited to 30 s of CPU time and 4 GB. A folder has ``…/domain.pddl`` and problems, which are beside
+the domain or in a subfolder ``testing…``. If the other planners can't be installed, only Confab runs. Results are stored in
+``confab-out/pddl-runs`` by planner, problem and code of the planner, so that an interrupted benchmark can continue. Delete this
+folder to repeat all runs.
 """
 
 from __future__ import annotations
@@ -47,14 +48,14 @@ OURS = {
     "confab-whole": (*CORE, "planner/*.py", "planner/hierarchical/*.py"),
     "confab-engine": (*CORE, "confab/engines.py"),
 }
-"""The files that determine our plans."""
+"""The files that determine the plans of each planner of Confab."""
 ENGINE = "fast-downward"
-"""What ``confab-engine`` hands the level to."""
+"""The engine of the planner ``confab-engine``."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """The result for one problem: `plan` is None if there is none, `accepted` the verdict of unified-planning's validator."""
+    """The result for one problem. `plan` is None without a plan. `accepted` is the verdict of unified-planning's validator."""
 
     plan: tuple[str, ...] | None
     seconds: float
@@ -84,13 +85,13 @@ def main() -> None:
 
 
 def wanted() -> list[str]:
-    """Return the planners to run: all, or those named by CONFAB_PLANNERS."""
+    """Return the names of the planners and tables in CONFAB_PLANNERS, by default of the main ones."""
     named = os.environ.get("CONFAB_PLANNERS")
     return named.split(",") if named else ["confab", "pyperplan", "lama-first", "grounding", "read-back"]
 
 
 def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
-    """Yield (domain's name, domain, problem): four per folder, evenly spread, the first and the last included."""
+    """Yield the folder, the domain and the problem of four problems per folder, evenly spread from the first to the last."""
     named = os.environ.get("CONFAB_DOMAINS", "").split(",")
     for domain in sorted(folder.rglob("domain.pddl")):
         if named != [""] and domain.parent.name not in named:
@@ -105,12 +106,12 @@ def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
 
 
 def _measured(place: str) -> bool:
-    """Return whether the problems of a folder belong to the benchmark; training problems only on request."""
+    """Return whether the problems of a folder belong to the benchmark. Training problems belong to it only with CONFAB_ALL."""
     return place.startswith("testing") or ("CONFAB_ALL" in os.environ and place.startswith("training"))
 
 
 def peers() -> str:
-    """Return a Python that has the peers, made under ``confab-out`` the first time."""
+    """Return a Python with the other planners; by default they are installed under ``confab-out`` once."""
     if "CONFAB_PEERS" in os.environ:
         return os.environ["CONFAB_PEERS"]
     place = ROOT / "confab-out" / "peers"
@@ -122,7 +123,7 @@ def peers() -> str:
 
 
 def planners(python: str | None) -> dict[str, list[str]]:
-    """Return each planner's command; ``{domain}``, ``{problem}`` and ``{plan}`` are put in."""
+    """Return the command of each planner, with the placeholders ``{domain}``, ``{problem}`` and ``{plan}``."""
     files = ["{domain}", "{problem}", "{plan}"]
     confab = {
         "confab": [sys.executable, "-m", "benchmarks.pddl", *files],
@@ -134,7 +135,7 @@ def planners(python: str | None) -> dict[str, list[str]]:
     inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
     place = subprocess.run([python, "-c", inside], capture_output=True, text=True, check=True).stdout.strip()
     downward = [python, f"{place}/downward/fast-downward.py"]
-    jar = Path(place).parent / "up_enhsp" / "ENHSP" / "enhsp.jar"  # where somebody installed up-enhsp
+    jar = Path(place).parent / "up_enhsp" / "ENHSP" / "enhsp.jar"  # exists if up-enhsp is installed
     java = ["java", "-Xmx2g", "-XX:CompressedClassSpaceSize=64m", "-XX:ReservedCodeCacheSize=64m", "-jar", str(jar)]
     if jar.exists():
         confab["enhsp"] = [*java, "-o", "{domain}", "-f", "{problem}", "-sp", "{plan}"]
@@ -147,7 +148,7 @@ def planners(python: str | None) -> dict[str, list[str]]:
 
 
 def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
-    """Return the result of a planner on a problem, from an earlier run if neither has changed; our plans are validated."""
+    """Return the result of a planner for a problem, from an earlier run if available; plans of Confab are validated."""
     ours = name in OURS
     code = [file.read_bytes() for pattern in OURS.get(name, ()) for file in sorted(ROOT.glob(pattern))]
     texts = [*code, domain.read_bytes(), problem.read_bytes(), f"{name} {SECONDS} {BYTES}".encode()]
@@ -157,11 +158,11 @@ def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
         del found["problem"]
         return Run(**{**found, "plan": None if found["plan"] is None else tuple(found["plan"])})
     done = run(command, domain, problem)
-    if done.seconds > SECONDS + 1:  # a planner of several processes has no more than one of one process
+    if done.seconds > SECONDS + 1:  # the limit applies to each process of a planner, but also to their sum
         done = Run(None, done.seconds, done.output)
     verdict = None
     if ours and done.plan is not None:
-        with suppress(Exception):  # what its reader can't read, it can't judge
+        with suppress(Exception):  # unified-planning can't read some problems
             verdict = accepted(domain, problem, done.plan)
     done = Run(done.plan, done.seconds, done.output[-2000:], verdict)
     RUNS.mkdir(parents=True, exist_ok=True)
@@ -206,7 +207,7 @@ def _limit(cap: int) -> None:
 
 
 def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[str]]) -> None:
-    """Print solved problems, CPU time and plan length per domain and planner; check every plan of ours."""
+    """Print the number of solved problems, the CPU time and the plan length by domain and planner."""
     runs: dict[tuple[str, Path], Run] = {}
     for _, domain, problem in found:
         for name, command in commands.items():
@@ -236,7 +237,7 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
 
 
 def _ratio(runs: dict[tuple[str, Path], Run], name: str, here: Sequence[Path]) -> str:
-    """Return the geometric mean of length over lama-first's, where both have a plan."""
+    """Return the geometric mean of the plan lengths relative to lama-first, over problems that both planners solve, as text."""
     pairs = [(runs[name, p].plan, runs["lama-first", p].plan) for p in here if ("lama-first", p) in runs]
     ratios = [log(len(a) / len(b)) for a, b in pairs if a and b]
     return f", length × {exp(sum(ratios) / len(ratios)):.2f}" if ratios and name != "lama-first" else ""
@@ -250,7 +251,7 @@ def accepted(domain: Path, problem: Path, plan: Sequence[str]) -> bool:
     from unified_planning.plans import ActionInstance, SequentialPlan
 
     head, actions, rest = domain.read_text().partition("(:action")
-    head = re.sub(r"\((\S+) (\?\w+) \2\)", r"(\1 \2 \2_)", head)  # its reader takes (in ?obj ?obj) for one argument
+    head = re.sub(r"\((\S+) (\?\w+) \2\)", r"(\1 \2 \2_)", head)  # the reader merges the arguments of (in ?obj ?obj)
     task = PDDLReader().parse_problem_string(head + actions + rest, problem.read_text())
     steps = []
     for line in plan:
@@ -258,7 +259,7 @@ def accepted(domain: Path, problem: Path, plan: Sequence[str]) -> bool:
         manager = task.environment.expression_manager
         steps.append(ActionInstance(task.action(name), tuple(manager.ObjectExp(task.object(word)) for word in words)))
     validator = SequentialPlanValidator()
-    validator.skip_checks = True  # it refuses action costs that it then handles
+    validator.skip_checks = True  # the validator supports action costs but declares that it doesn't
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         result = validator.validate(task, SequentialPlan(steps))
@@ -277,7 +278,7 @@ TRUCKS = """(define (domain trucks) (:requirements :strips :typing)
 
 
 def trucks(size: int) -> str:
-    """Return a problem with some trucks, and twelve times as many parcels and places, all connected by roads."""
+    """Return a problem with `size` trucks, and twelve times as many parcels and places. All places are connected by roads."""
     vehicles, places, parcels = range(size), range(12 * size), range(12 * size)
     roads = " ".join(f"(road p{a} p{b})" for a in places for b in places if a != b)
     at = " ".join([*(f"(at t{i} p0)" for i in vehicles), *(f"(at x{i} p{i})" for i in parcels)])
@@ -288,7 +289,7 @@ def trucks(size: int) -> str:
 
 
 def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
-    """Print the time to ground, from the text on, beside that of Fast Downward's translator."""
+    """Print the time of parsing and grounding compared with Fast Downward's translator."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
     from confab.reasoner.pddl.importing import imported
@@ -320,7 +321,7 @@ def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
 
 
 def read_back(python: str) -> None:
-    """Print what becomes of Fast Downward's plan for a scene's primitive level: checked symbolically, then in physics."""
+    """Import Fast Downward's plans for the lowest level of scenes, and print the results of validation and of physics."""
     import confab
     from confab.pddl_commands import read_pddl_plan
     from confab.planner.validation import validate
@@ -347,7 +348,7 @@ def read_back(python: str) -> None:
 
 
 def _solve(domain: str, problem: str, target: str) -> None:
-    """Solve one problem with the search of one level and write its plan (run in a benchmarked process)."""
+    """Solve one problem with the flat search, and write the plan; runs in the benchmarked process."""
     gc.disable()
     from confab.planner.grounded.best_first import search
     from confab.planner.grounded.grounding import ground

@@ -1,10 +1,10 @@
-"""Perception compared with the truth, over random scenes and levels of noise: wrong and missing facts.
+"""Perceived facts compared with the truth in random scenes at several levels of noise: wrong and missing facts.
 
     python -m benchmarks.perception [SCENES]
 
-In each scene objects stand at random places, perturbed, some of them aside or lying, and vessels are filled or not; then a hand
-takes an object and lifts it. At each of these times the scene is perceived repeatedly, at every level of noise.
-The truth is known from the setup and the actions, and not from perception without noise.
+In each scene, objects stand at random places with perturbations. Some objects stand away from all places or lie, and some
+vessels are filled. Then a hand grasps an object and lifts it. After each of these steps, the scene is perceived repeatedly at
+every level of noise. The true facts follow from the setup and the actions, not from perception without noise.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ NOISE = (0.0, 0.002, 0.005, 0.01, 0.02)
 """Standard deviations of perceived positions in metres."""
 
 LOOKS = 4
-"""How often everything is looked at, per moment and level of noise."""
+"""Number of observations of the whole scene after each step, at each level of noise."""
 
 AT_REST = {"perceive_held": "nothing", "perceive_hand_position": "raised", "perceive_hand_tilt": "upright"}
-"""For each perceiver the special value of a hand at rest."""
+"""The value that each perceiver of hands has for a hand at rest."""
 
 Truth = dict[Symbol, str | None]
 
 
 @dataclass
 class Tally:
-    """Counts per situation type and level of noise.
+    """Counts by situation type and level of noise.
 
-    `looks` at something, `wrong` values that were seen and aren't true, and true values that were `missed`; a value that is taken
-    for another one counts as both.
+    `looks` counts observations of a symbol, `wrong` counts observed values that aren't true, and `missed` counts true values
+    that were not observed. A false value in place of a true value counts as both.
     """
 
     looks: Counter[tuple[str, float]] = field(default_factory=Counter)
@@ -51,7 +51,7 @@ class Tally:
     missed: Counter[tuple[str, float]] = field(default_factory=Counter)
 
     def add(self, world: PhysicsWorld, truth: Truth) -> None:
-        """Look at everything, at every level of noise."""
+        """Observe the scene at every level of noise, and count the values."""
         for noise in NOISE:
             world.noise = noise
             for _ in range(LOOKS):
@@ -65,7 +65,7 @@ class Tally:
         world.noise = 0.0
 
     def lines(self) -> Iterator[str]:
-        """Yield the table, in Markdown."""
+        """Yield the lines of the table in Markdown."""
         yield "| situation type | looks | " + " | ".join(f"{1000 * noise:g} mm" for noise in NOISE) + " |"
         yield "|---" * (2 + len(NOISE)) + "|"
         for situation in dict.fromkeys(situation for situation, _ in self.looks):
@@ -74,7 +74,7 @@ class Tally:
 
 
 def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally: Tally) -> bool:
-    """Set up the scene of a seed, look, let a hand take something, and look again; return whether it took something."""
+    """Set up the scene of a seed, and observe it before and after a hand grasps an object; return whether a hand grasped one."""
     rng = np.random.default_rng(seed)
     truth = _drawn(embodiment, symbols, rng)
     initial = {symbol: value for symbol, value in truth.items() if value is not None}
@@ -99,7 +99,7 @@ def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally:
 
 
 def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Generator) -> Truth:
-    """Return facts with objects at random places, vessels filled or not, and hands at rest."""
+    """Return facts in which objects are at random places, vessels have random contents, and hands are at rest."""
     places = iter(rng.permutation(list(embodiment.places)).tolist())
     truth: Truth = {}
     for symbol in symbols:
@@ -115,7 +115,7 @@ def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Gen
 
 
 def _disturb(world: PhysicsWorld, truth: Truth, rng: np.random.Generator) -> None:
-    """Shift one empty object of five off every place, and lay another of five on its side: both are at no place."""
+    """Shift one in five empty objects away from all places, and lay one in five on its side, so that they are at no place."""
     uses = world.embodiment.perceivers
     for symbol in [s for s in truth if uses[s.situation].perceiver == "perceive_place"]:
         name, draw = symbol.arguments[0], rng.random()
@@ -135,7 +135,7 @@ def _disturb(world: PhysicsWorld, truth: Truth, rng: np.random.Generator) -> Non
 
 
 def _free(world: PhysicsWorld, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
-    """Tell whether an object has room at a spot (2,), off every place and not off the table."""
+    """Return whether an object has room at a position (x and y in metres) that is on the table and away from all places."""
     gaps = [np.hypot(*(world.truth(other)[1][:2] - spot)) for other in world.bodies if other != name]
     away = world.nearest_place(np.array([*spot, 0.0]))[1]
     places = np.array([place.position[:2] for place in world.embodiment.places.values()])
@@ -144,7 +144,7 @@ def _free(world: PhysicsWorld, name: str, spot: np.ndarray[tuple[int, ...], np.d
 
 
 def _taken(world: PhysicsWorld, truth: Truth, rng: np.random.Generator, reach: SkillUse) -> tuple[str, str]:
-    """Let some hand reach for some object that stands at a place; return both, or empty names if none can."""
+    """Let a random hand reach for a random object at a place; return the names of both, or empty names if no hand can."""
     uses = world.embodiment.perceivers
     standing = [
         s.arguments[0] for s, v in truth.items() if uses[s.situation].perceiver == "perceive_place" and v is not None
@@ -156,14 +156,14 @@ def _taken(world: PhysicsWorld, truth: Truth, rng: np.random.Generator, reach: S
             perform(world, reach, {"hand": hand, "target": name})
         except SkillError:
             if not np.allclose(world.hands[hand].posture, world.hands[hand].hand.home):
-                return "", ""  # the hand has started, and is at no named place
+                return "", ""  # the hand has left its rest posture, and its position has no name
             continue
         return hand, name
     return "", ""
 
 
 def _set(embodiment: Embodiment, truth: Truth, kind: str, subject: str, value: str) -> None:
-    """Set the true values of a subject for the situation types of a perceiver."""
+    """Set the true values of an individual for the situation types of a perceiver."""
     for symbol in truth:
         use = embodiment.perceivers[symbol.situation]
         if use.perceiver == kind and symbol.arguments == (subject,):
@@ -171,7 +171,7 @@ def _set(embodiment: Embodiment, truth: Truth, kind: str, subject: str, value: s
 
 
 def perception(scenes: int = 30, tell: Callable[[str], None] = print) -> Tally:
-    """Print the table over some random scenes, with the development seeds from 5100."""
+    """Print the table for random scenes with development seeds from 5100."""
     scene = confab.load("beverage-serving")
     symbols = [s for s in scene.problem.initial if s.situation in scene.embodiment.perceivers]
     tally, took = Tally(), 0

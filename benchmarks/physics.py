@@ -1,15 +1,15 @@
-"""Physics, measured: plans beside stepping alone, film, determinism, speed by workers, perturbed rollouts.
+"""Measurements of the simulation: cost of plans and film, determinism, speed by workers, and perturbed rollouts.
 
-    python -m benchmarks.physics              everything below, then development seeds and reporting seeds
-    python -m benchmarks.physics plans        the plans of the shipped scenes beside the cost of stepping alone
-    python -m benchmarks.physics film         what filming costs
-    python -m benchmarks.physics same         the same seed in several processes and with several workers
+    python -m benchmarks.physics              all parts, then perturbed rollouts with development and reporting seeds
+    python -m benchmarks.physics plans        the cost of rollouts of shipped scenes compared with PyBullet's steps
+    python -m benchmarks.physics film         the cost of filming
+    python -m benchmarks.physics same         equal results of a seed in several processes and with several workers
     python -m benchmarks.physics speed        rollouts per minute by workers, and on a Ray cluster
-    python -m benchmarks.physics perception   perception held against the truth over thirty random scenes
+    python -m benchmarks.physics perception   perception compared with the truth in thirty random scenes
     python -m benchmarks.physics 5000 5020    perturbed rollouts of the beverage-serving plan, one per seed
-    python -m benchmarks.physics 5000 5020 three-cups    the same of another scene's plan
+    python -m benchmarks.physics 5000 5020 three-cups    perturbed rollouts of another scene
 
-Seeds from 5000 are for development: what fails there may be mended. Seeds from 9000 are for reporting only.
+Seeds from 5000 are for development: code may be changed because of their failures. Seeds from 9000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from confab.sim.verify import Rollout, expectations
 from confab.sim.world import PhysicsWorld
 
 WORKERS = 2
-"""Processes that share perturbed rollouts."""
+"""Number of processes that share perturbed rollouts."""
 
 
 def case(name: str, perturb: Perturbation | None = None, beads: bool = True) -> Trial:
-    """Return the plan of a shipped scene, to be rolled out."""
+    """Return the trial of a shipped scene's plan."""
     scene = confab.load(name)
     steps = scene.plan(mode="paper").plan.primitives
     return Trial(scene.embodiment, scene.problem.initial, steps, expectations(scene.problem, steps), perturb, beads)
@@ -61,7 +61,7 @@ def line(rollout: Rollout) -> str:
 
 
 def floor_of(trial: Trial) -> tuple[Rollout, float]:
-    """Return a rollout and the CPU seconds that it spent inside PyBullet's step: the cost of stepping alone."""
+    """Return a rollout, and the CPU seconds that it spent in PyBullet's simulation steps."""
     bare, spent = pybullet.stepSimulation, 0.0
 
     def step(**options: int) -> None:
@@ -78,7 +78,7 @@ def floor_of(trial: Trial) -> tuple[Rollout, float]:
 
 
 def plans() -> None:
-    """Print the nominal rollouts of the shipped scenes, second robot and table included, beside the stepping floor."""
+    """Print the rollouts of shipped scenes, and the ratio of their CPU time to the time of PyBullet's steps."""
     for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving", "two-cups"):
         for beads in (True, False):
             rollout, floor = floor_of(case(name, beads=beads))
@@ -90,7 +90,7 @@ def plans() -> None:
 
 
 def film() -> None:
-    """Print what filming the paper's plan adds."""
+    """Print the CPU time of filming the paper's plan."""
     with TemporaryDirectory() as folder:
         scene = confab.load("beverage-serving")
         (rollout,) = scene.plan(mode="paper").verify(video=Path(folder) / "run.mp4").rollouts
@@ -98,7 +98,7 @@ def film() -> None:
 
 
 def same_seed() -> None:
-    """Print whether a seed gives the same in this process, in three others, and with one and two workers."""
+    """Print whether a seed gives equal results in several processes and with several workers."""
     one, seeds = case("beverage-serving-moved", Perturbation()), range(5000, 5003)
     alone = rollouts(one, seeds)
     shared = [rollouts(one, seeds, workers) == alone for workers in (2, 3)]
@@ -140,7 +140,7 @@ def _per_minute(seeds: Sequence[int], begin: float) -> float:
 
 
 def _timed(name: str, one: Trial, seeds: Sequence[int], alone: list[Rollout], workers: int | str, kill: bool) -> None:
-    """Print the speed of some workers, with one of them possibly killed, and whether the results equal those of one process."""
+    """Print the speed of several workers, of which one may be killed, and whether their results equal those of one process."""
     with TemporaryDirectory() as folder:
         mark = Path(folder) / "died"
         begin = time.perf_counter()
@@ -160,7 +160,7 @@ def die_once(mark: Path, world: PhysicsWorld) -> None:
 
 
 def perturbed(seeds: Sequence[int], scene: str = "beverage-serving", workers: int | str = WORKERS) -> None:
-    """Print perturbed rollouts of a scene's plan, and how many were verified."""
+    """Print perturbed rollouts of a scene's plan, and the number of verified rollouts."""
     one, begin = case(scene, Perturbation()), time.perf_counter()
     done = rollouts(one, seeds, workers, lambda rollout: print(rollout.seed, line(rollout), flush=True))
     good, shares = sum(rollout.ok for rollout in done), [share for rollout in done for share in rollout.poured]
@@ -172,7 +172,7 @@ def perturbed(seeds: Sequence[int], scene: str = "beverage-serving", workers: in
 
 
 def main() -> None:
-    """Print everything but the faults, which `benchmarks.faults` prints; the reporting seeds last."""
+    """Print the results of all parts, with the reporting seeds last."""
     for part in (plans, film, same_seed, speed, perception):
         part()
     for title, seeds in (("development", range(5000, 5022)), ("reporting", range(9000, 9100))):

@@ -1,8 +1,8 @@
-"""Make pictures of the page with Chromium, wide and narrow, light and dark, to be looked at.
+"""Pictures of the page in Chromium, in wide and narrow windows, light and dark, for inspection by a person.
 
     python -m benchmarks.pictures INTO [PART OF A NAME …]
 
-Names: demo, objects (50 of them), house, failed, unsolvable, live (three moments), endpoint, compared.
+The names are demo, objects, house, failed, unsolvable, live, endpoint and compared.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ SIZES = (1280, 420)
 """Widths of the window in pixels."""
 TABLE = "beverage-serving"
 MOMENTS = (0, 14, 30)
-"""Numbers of done primitives at which the page of an execution is pictured."""
+"""Numbers of finished primitives at which the page of an execution is pictured."""
 DISTURBED = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 NOISE = 0.03
-"""Standard deviation in metres of the perceived positions with which a run fails."""
+"""Standard deviation of perceived positions in metres at which a run fails."""
 
 
 class Studio:
-    """A browser that pictures pages into a folder; `work` is a folder for what is in them."""
+    """A browser that writes pictures of pages into a folder. `work` is a folder for the pages."""
 
     def __init__(self, into: Path, work: Path, browser: Browser) -> None:
         self.into, self.work, self.browser = into, work, browser
 
     def take(self, name: str, address: str, ready: str = "document.querySelector('h1') !== null") -> None:
-        """Picture an address at each size, light and dark."""
+        """Picture a URL at each size of the window, light and dark."""
         for width in SIZES:
             for dark in (False, True):
                 self.browser.open(address, width, dark=dark)
@@ -51,13 +51,13 @@ class Studio:
         assert not self.browser.faults, self.browser.faults
 
     def file(self, name: str, html: str) -> str:
-        """Write a page into the work folder and return its address."""
+        """Write a page into the work folder, and return its URL."""
         write_whole(self.work / f"{name}.html", html)
         return (self.work / f"{name}.html").as_uri()
 
 
 def demo(studio: Studio) -> None:
-    """Picture the report of the main job."""
+    """Picture the report of `confab run`."""
     run(Job(TABLE, studio.work / "demo", memory=studio.work / "demo" / "memory.ttl"))
     studio.take("demo", (studio.work / "demo" / "report.html").as_uri())
 
@@ -107,7 +107,7 @@ def endpoint(studio: Studio) -> None:
 
 
 def compared(studio: Studio) -> None:
-    """Picture two runs beside each other."""
+    """Picture the comparison of two runs."""
     for goals in ((), ("cup1 LOCATION location8",)):
         run(Job(TABLE, new_folder(studio.work / "runs"), goals=goals, film=False))
     address = studio.file("compared", history_html(runs(studio.work / "runs"), "Runs", ("001", "002")))
@@ -120,7 +120,7 @@ SUBJECTS: dict[str, Callable[[Studio], None]] = {
 
 
 def main() -> None:
-    """Make the pictures whose names contain a given part, or all."""
+    """Make the pictures whose names contain a given text, by default all pictures."""
     if len(sys.argv) < 2 or not sys.argv[0].endswith("pictures.py"):
         print("nothing pictured: python -m benchmarks.pictures INTO [PART OF A NAME …]")
         return

@@ -1,11 +1,11 @@
-"""Whole calls, quantification and task recognition at scale: grounding, latency among irrelevant objects, round trips, peers.
+"""Times of whole calls, quantification and task recognition in scenes of growing size, compared with other systems.
 
     python -m benchmarks quantification
-    CONFAB_CLUTTER=1000,100000 python -m benchmarks quantification     with other worlds than up to a million
+    CONFAB_CLUTTER=1000,100000 python -m benchmarks quantification     with these numbers of irrelevant objects
     CONFAB_PEERS=PYTHON …                                              with a Python that has up-fast-downward already
 
-Each world and each size is a process of its own; times are the least of some repetitions, in seconds of wall clock, those of
-whole calls in seconds of the processor.
+Each world of each size is measured in a separate process. Times are the minimum of several repetitions. Whole calls are
+measured in CPU seconds, other functions in wall-clock seconds.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from time import perf_counter, process_time
 from typing import Any
 
 CALLS = (4, 50, 200, 1_000, 10_000)
-OBJECTS = (24, 70, 224)  # times twice as many places: a thousand to a hundred thousand ways to move one
+OBJECTS = (24, 70, 224)  # with twice as many places, this is a thousand to a hundred thousand moves
 RDFLIB_OBJECTS = (4, 12, 24, 70)
 PEER_OBJECTS = (4, 10, 20, 30)
 CLUTTER = tuple(int(float(k)) for k in os.environ.get("CONFAB_CLUTTER", "0,1e3,1e4,1e5,1e6").split(","))
@@ -55,14 +55,14 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) 
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> str:
-    """Return by which power of the size the time grows from the first measurement to the last."""
+    """Return the exponent of the power of the size with which the time grows from the first to the last measurement."""
     if len(sizes) < 2 or not all(sizes) or not all(seconds):
         return "–"
     return f"{log(seconds[-1] / seconds[0]) / log(sizes[-1] / sizes[0]):.2f}"
 
 
 def least(action: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Return the least time of some repetitions, fewer for slow functions."""
+    """Return the minimum time of several repetitions, which are fewer for slow functions."""
     best = float("inf")
     for _ in range(repeats):
         begin = perf_counter()
@@ -74,7 +74,7 @@ def least(action: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def measured(*arguments: object) -> dict[str, Any]:
-    """Return the output of a part of this module that runs in a process of its own."""
+    """Run a part of this module in a separate process, and return its output."""
     command = [sys.executable, "-m", "benchmarks.quantification", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     if done.returncode:
@@ -84,7 +84,7 @@ def measured(*arguments: object) -> dict[str, Any]:
 
 
 def scene(folder: Path, objects: int = 4, clutter: int = 0) -> Path:
-    """Return a generated scene of the family served."""
+    """Return a generated scene of the family `served`."""
     from confab.reasoner.generate import write_scene
 
     path = folder / f"served-{objects}-{clutter}.ttl"
@@ -97,7 +97,7 @@ def scene(folder: Path, objects: int = 4, clutter: int = 0) -> Path:
 
 
 def calls(folder: Path) -> None:
-    """Print the time of a call from the file to the plan, and of the command beside the import of rdflib."""
+    """Print the times of a call from file to plan, of the command, and of the import of rdflib."""
     found = [measured("call", scene(folder, objects), scene(folder, CALLS[1])) for objects in CALLS]
     names = ("load", "plan", "whole")
     rows = [[objects, one["steps"], *(one[name] for name in names)] for objects, one in zip(CALLS, found, strict=True)]
@@ -111,7 +111,7 @@ def calls(folder: Path) -> None:
 
 
 def call(path: str, before: str) -> dict[str, float]:
-    """Measure loading and planning in a scene, once everything is imported that another one needs."""
+    """Measure loading and planning in a scene after a first call has imported all modules."""
     import confab
 
     confab.load(before).plan()
@@ -124,12 +124,12 @@ def call(path: str, before: str) -> dict[str, float]:
         end = process_time()
         one = {"load": middle - begin, "plan": end - middle, "whole": end - begin}
         found.append({**one, "steps": len(result.plan.steps)})
-        del loaded, result  # freeing a store takes time, which isn't the next call's
+        del loaded, result  # frees the store before the next measurement
     return min(found, key=lambda one: one["whole"])
 
 
 def cold(script: str) -> float:
-    """Return the least seconds of the processor that a Python of its own takes for a script, all modules compiled."""
+    """Return the minimum CPU seconds of a separate Python process for a script, with compiled modules."""
     compiled = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     best = float("inf")
     for _ in range(REPEATS):
@@ -144,7 +144,7 @@ def cold(script: str) -> float:
 
 
 def grounding(folder: Path) -> None:
-    """Print how long B1_MOVE takes to quantify by SPARQL."""
+    """Print the time of the quantification of B1_MOVE by SPARQL."""
     found = [measured("ground", scene(folder, objects)) for objects in OBJECTS]
     names = ("sparql", "peak_mb")
     rows = [[one["rows"], *(one[name] for name in names)] for one in found]
@@ -172,7 +172,7 @@ def ground(path: str) -> dict[str, float]:
 
 
 def worlds(folder: Path) -> None:
-    """Print load rate and planning latency of one task in ever larger worlds, in memory and behind an endpoint."""
+    """Print the load rate and the planning time of one task in worlds of growing size, in memory and at an endpoint."""
     here, there = [], []
     for clutter in CLUTTER:
         path = scene(folder, clutter=clutter)
@@ -210,7 +210,7 @@ def worlds(folder: Path) -> None:
 
 
 def plan(source: str) -> dict[str, float | str]:
-    """Measure loading, task recognition and planning, in a file or behind an endpoint."""
+    """Measure loading, task recognition and planning with a file or an endpoint."""
     from confab.planner.hierarchical.planner import plan as fast
     from confab.planner.paper.hierarchy import plan as paper
     from confab.reasoner.graph.knowledge import load
@@ -232,7 +232,7 @@ def plan(source: str) -> dict[str, float | str]:
 
 @contextmanager
 def oxigraph(path: Path) -> Iterator[str]:
-    """Run the Oxigraph server on loopback with a scene and its imports, and yield its address."""
+    """Run the Oxigraph server on loopback with a scene and its imports, and yield the server's URL."""
     import urllib3
 
     from confab.reasoner.graph.knowledge import load
@@ -270,7 +270,7 @@ def oxigraph(path: Path) -> Iterator[str]:
 
 
 def rdflib_engine(folder: Path) -> None:
-    """Print how long rdflib's own SPARQL engine takes for the same query."""
+    """Print the time that rdflib's SPARQL engine takes for a quantification."""
     import rdflib
 
     from confab.reasoner.graph.knowledge import load
@@ -300,7 +300,7 @@ def rdflib_engine(folder: Path) -> None:
 
 
 def translator(folder: Path) -> None:
-    """Print how long Fast Downward's translator takes to ground the exported problem, beside ours."""
+    """Print the time that Fast Downward's translator takes to ground the exported problem, and the time of Confab."""
     from benchmarks.pddl import peers, planners
     from confab.planner.grounded.grounding import ground as ground_level
     from confab.planner.plan import Reason
@@ -342,7 +342,7 @@ def translator(folder: Path) -> None:
 
 
 def _translate(command: Sequence[str], folder: Path) -> float | None:
-    """Return the translator's own count of its CPU seconds, None at the cap."""
+    """Return the CPU seconds that the translator reports, or None if it exceeds the time limit."""
     names = {"{domain}": "domain.pddl", "{problem}": "problem.pddl", "{plan}": "output.sas"}
     full = [names.get(word, word) for word in command]
     try:

@@ -1,4 +1,4 @@
-"""README's picture: the film of the main job as an animation; `python -m benchmarks.readme_film`."""
+"""The animation in README.md, made from the film of the shipped plan by `python -m benchmarks.readme_film`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import confab
 
 TARGET = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "serving.webp"
 SIZE, EVERY, QUALITY = (840, 476), 2, 68
-"""Pixels; which frames of the film are taken; WebP's quality. Together less than 1 MB."""
+"""Width and height in pixels, step between the used frames, and quality of WebP, for an animation of less than 1 MB."""
 
 
 def main() -> None:

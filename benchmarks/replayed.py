@@ -2,10 +2,11 @@
 
     python -m benchmarks.replayed FROM TO [SCENE …]
 
-A plan is rolled out with each seed and exported as JSON. If the rollout is verified, the text is replayed in a new world with the
-same deviations. The replay reads the text and names of joints; it uses no skill, no planner, no touch and none of the controllers
-of the room `sim`. As in ROS, a path between two points is the cubic with their positions and velocities. Tracking is the largest
-distance of a hand's tip from its position at the commanded posture, both from PyBullet's kinematics.
+A plan is executed with each seed, and its trajectories are exported as JSON. If the rollout is verified, the exported text is
+replayed in a new world with the same deviations. The replay reads only the text and the names of joints. It uses neither
+skills, planners, touch nor the controllers of the folder `sim`. As in ROS, the path between two points is the cubic with their
+positions and velocities. The tracking error is the largest distance of a hand's tip from its position at the commanded posture,
+both from PyBullet's kinematics.
 """
 
 from __future__ import annotations
@@ -41,17 +42,17 @@ SCENES = (
 )
 
 GAIN, STEPS_PER_SECOND, AFTER, EVERY = 0.5, 240, 1.0, 4
-"""Position gain of the servos, simulation steps per second, seconds after the last command, steps between measurements."""
+"""Position gain of the servos, simulation steps per second, seconds after the last command, and steps per measurement."""
 
 CLOSING = 0.12
 """Speed limit of fingers in metres per second."""
 
 WIDE = 0.005
-"""Metres of tracking error that a replay may have."""
+"""Maximum tracking error of a replay in metres."""
 
 
 def text_of(scene: Scene, seed: int) -> str | None:
-    """Return the exported trajectories of a perturbed rollout as JSON; None if it isn't verified."""
+    """Return the exported trajectories of a perturbed rollout as JSON, or None if the rollout isn't verified."""
     steps, recorder, slots, now = scene.plan().plan.primitives, Recorder(), [], 0.0
     expected = expectations(scene.problem, steps)
     rollout = verify(
@@ -70,7 +71,7 @@ def seconds(duration: Mapping[str, int]) -> float:
 
 
 def replayed(scene: Scene, seed: int, text: str) -> tuple[list[str], float]:
-    """Return the goals that are open after a replay, and its tracking error in metres."""
+    """Return the unmet goals after a replay, and the tracking error in metres."""
     primitives = sorted(json.loads(text), key=lambda primitive: float(primitive["begin"]))
     end = max(float(primitive["end"]) for primitive in primitives) + AFTER
     with PhysicsWorld(scene.embodiment, scene.problem.initial, seed, Perturbation()) as world:
@@ -89,7 +90,7 @@ def replayed(scene: Scene, seed: int, text: str) -> tuple[list[str], float]:
 
 
 class Servo:
-    """The position servos of one hand, and a second robot that is set to each commanded posture."""
+    """The position servos of one hand, and a second robot that is placed in each commanded posture."""
 
     def __init__(self, world: PhysicsWorld, name: str, primitives: Sequence[Mapping[str, Any]]) -> None:
         hand = world.hands[name]
@@ -120,7 +121,7 @@ class Servo:
         self.other, *_ = load_robot(self.shadow, hand.robot)
 
     def command(self, now: float) -> None:
-        """Command the posture, the velocities and the fingers of a time."""
+        """Command the posture, the velocities and the positions of the fingers for a time."""
         self.posture, velocity = self.cubic(now)
         pybullet.setJointMotorControlArray(
             self.body,
@@ -147,7 +148,7 @@ class Servo:
                 )
 
     def cubic(self, now: float) -> tuple[Array, Array]:
-        """Return positions and velocities at a time: of the cubic between two points, or rest outside of all points."""
+        """Return positions and velocities at a time, from the cubic between two points. Outside of all points, the hand rests."""
         after = int(np.searchsorted(self.times, now, side="right"))
         if after in (0, len(self.times)):
             edge = self.positions[min(after, len(self.times) - 1)]
@@ -173,7 +174,7 @@ class Servo:
 
 
 def main() -> None:
-    """Print a line per replay, and the sums."""
+    """Print a line for each replay, and the totals."""
     begin, end, *names = sys.argv[1:]
     same = wide = total = 0
     for name in names or SCENES:

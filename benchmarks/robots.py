@@ -1,8 +1,8 @@
-"""The problems of the deliberation workshop in pyrobosim.
+"""The problems of a workshop on deliberation, executed in the simulator pyrobosim.
 
-``python -m benchmarks.robots WORLDS [problems|disturbed] [-n SEEDS] [-p 1 2 3 4]``. WORLDS is the folder of the workshop's world
-files. Goals are checked by the objects of pyrobosim, not by our perception. A line for each run is written to
-``confab-out/robots``.
+``python -m benchmarks.robots WORLDS [problems|disturbed] [-n SEEDS] [-p 1 2 3 4]``. WORLDS is the folder of the workshop's
+world files. Goals are checked against the state of pyrobosim, not against Confab's perception. A line for each run is written
+to ``confab-out/robots``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
 
 PLANNING = Limits(seconds=300.0)
-"""Of the wall clock: long, since the machine may have other work."""
+"""Limit of planning in wall-clock seconds, which allows for a busy machine."""
 
 OUT = Path("confab-out") / "robots"
 SCENES = {1: "rooms-snacks", 2: "rooms-waste", 3: "rooms-breakfast", 4: "rooms-battery"}
@@ -38,11 +38,11 @@ WANTED: Mapping[int, tuple[tuple[str, str | bool], ...]] = {
     2: (("waste0", "dumpster"), ("waste1", "dumpster"), ("dumpster", False)),
     3: (("bread0", "table"), ("butter0", "table"), ("fridge", False), ("pantry", False)),
 }
-"""The goals as the workshop states them: on which location an object is, or whether a location is open."""
+"""The goals of the workshop: the location of an object, or whether a location is open."""
 
 
 def at_goal(world: Any, problem: int) -> bool:
-    """Return whether the goals of a problem hold of pyrobosim's own objects."""
+    """Return whether the goals of a problem hold in the state of pyrobosim."""
     if problem == 4:
         return at_goal(world, 2) and at_goal(world, 3)
     for name, wanted in WANTED[problem]:
@@ -57,7 +57,7 @@ def at_goal(world: Any, problem: int) -> bool:
 
 
 class Watched(InterfaceWorld):
-    """A world that notes the least charge of the battery, and is disturbed once before an action."""
+    """A world that records the minimum charge of the battery, and is disturbed once before an action."""
 
     least = 100.0
     disturbed = ""
@@ -65,7 +65,7 @@ class Watched(InterfaceWorld):
     hand: Callable[[Any], str] | None = None
 
     def execute(self, step: Step) -> Report:
-        """Execute a primitive, after another hand has disturbed the world if it is time."""
+        """Execute a primitive; before the chosen primitive, disturb the world."""
         self.due -= 1
         world = self.transport.world  # type: ignore[attr-defined]
         if self.due == 0 and self.hand is not None:
@@ -76,7 +76,7 @@ class Watched(InterfaceWorld):
 
 
 def another_hand(draw: random.Random) -> Callable[[Any], str]:
-    """Return a function that moves an object, shuts a door or a location, or carries the robot elsewhere."""
+    """Return a function that moves an object, shuts a door or a location, or moves the robot to another place."""
 
     def moves(world: Any) -> str:
         robot = world.robots[0]
@@ -136,7 +136,7 @@ def run(scene: Scene, problem: int, worlds: Path, seed: int, disturbed: bool) ->
 
 
 def main() -> None:
-    """Run the problems and print a row for each."""
+    """Run the problems, and print a row for each run."""
     parser = argparse.ArgumentParser()
     parser.add_argument("worlds", type=Path)
     parser.add_argument("what", nargs="?", choices=("problems", "disturbed"), default="problems")

@@ -1,14 +1,14 @@
-"""The default planner: scale, other planners, lengths, random tables compared with exhaustive search, the benefit of each part.
+"""The default planner: scaling, other planners, plan lengths, random tables compared with exhaustive search, and ablations.
 
     python -m benchmarks search
-    CONFAB_SEARCH=scale,random …     some of: scale, hands, peers, optimal, lengths, random, parts
-    CONFAB_TABLES=2000 …             so many random tables (200 if not given)
-    CONFAB_SECONDS=480 …             no further random table after so many seconds
-    CONFAB_ROWS=FILE …               store each random table's row there, and continue from the stored rows
-    CONFAB_PEER_ROWS=FILE …          the same for the peers' runs
+    CONFAB_SEARCH=scale,random …     parts: scale, hands, peers, optimal, lengths, random, parts (all by default)
+    CONFAB_TABLES=2000 …             number of random tables (200 by default)
+    CONFAB_SECONDS=480 …             seconds after which no further random table is tried
+    CONFAB_ROWS=FILE …               store the row of each random table in a file, and continue from the stored rows
+    CONFAB_PEER_ROWS=FILE …          store the runs of other planners in a file
 
-Seconds are CPU seconds, which a busy machine changes little; medians of several runs. Nothing here was looked at while the
-planner was developed with other seeds than those below 60,000: random tables come from seeds above 3,000,000, families from 100 on.
+Times are medians of several runs in CPU seconds, which depend little on the load of the machine. Seeds below 60,000 were used
+for the development of the planner. Random tables have seeds from 3,000,000, and families have seeds from 100.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ from worlds.truth import StateSpace, TooManyError
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SEED, TABLES = 100, int(os.environ.get("CONFAB_SEEDS", "3_000_000"))
 PARTS_SEED, BUDGET = 110, 20.0
-"""Memory's lessons, tables of 4 and 6 objects, have seeds 100 and 101; the budget is in CPU seconds."""
+"""Seed of the tables for ablations, and time limit in CPU seconds. The memory's lessons have the seeds 100 and 101."""
 LENGTHS = Path(__file__).with_name("lengths.json")
 
 
 def main() -> None:
-    """Print the tables; exit with an error if a family falls back, a plan is wrong or a proof false."""
+    """Print the tables; exit with an error if an easy family needs steps of a lower level, or a plan or a proof is wrong."""
     sections: dict[str, Callable[[], None]] = {
         "scale": scale,
         "hands": hands,
@@ -77,7 +77,7 @@ def main() -> None:
 
 
 def scene(family: str, n: int, hands: int = 2, seed: int = SEED) -> tuple[Problem, float]:
-    """Return a generated scene as a problem, and the seconds that reading it takes."""
+    """Return the problem of a generated scene, and the CPU seconds of reading the scene."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{family}-{n}.ttl"
         write_scene(path, family, n, hands, 0, seed)
@@ -87,7 +87,7 @@ def scene(family: str, n: int, hands: int = 2, seed: int = SEED) -> tuple[Proble
 
 
 def timed(function: Callable[[], Any], runs: int = 5) -> tuple[Any, float]:
-    """Return a function's result and the median seconds of some runs."""
+    """Return the result of a function, and the median CPU seconds of several calls."""
     seconds = []
     for _ in range(runs):
         gc.collect()
@@ -105,7 +105,7 @@ def cold(problem: Problem, program: Compiled, improve: int | None = None) -> Cal
 
 
 def check(problem: Problem, outcome: Outcome, what: str, easy: bool = True) -> None:
-    """Stop the benchmark if a plan isn't one, or an easy family needed a lower level."""
+    """Stop the benchmark if a plan is invalid, or if an easy family needed steps of a lower level."""
     if outcome.plan is None or validate(problem, outcome.plan):
         sys.exit(f"{what}: {outcome.status.value}, not a valid plan: {outcome.reason}")
     if easy and outcome.fallbacks:
@@ -113,7 +113,7 @@ def check(problem: Problem, outcome: Outcome, what: str, easy: bool = True) -> N
 
 
 def scale() -> None:
-    """Plan served tables of growing size, in process; each plan from methods learned in the same call."""
+    """Plan for tables of the family `served` of growing size, with methods that are learned during each call."""
     python = peers_with_gtpyhop()
     print(
         "| n | read ms | compile ms | plan ms | improved ms | steps 1/2/3 | improved | expansions 1/2/3 | GTPyhop ms | its steps |"
@@ -143,12 +143,12 @@ def scale() -> None:
 
 
 def hands() -> None:
-    """Plan all families up to n = 50, and with more hands."""
+    """Plan for all families with up to 50 objects, and with more hands."""
     print("| family | hands | n | plan ms | steps 1/2/3 | expansions 1/2/3 | cache hits/misses | fallbacks |")
     print("|---|---|---|---|---|---|---|---|")
     cases = [(family, 2, n) for family in FAMILIES for n in (4, 10, 20, 50)]
     cases += [(family, number, n) for family in ("served", "swap", "rotate") for number in (4, 8) for n in (20, 50)]
-    cases += [("packed", 2, n) for n in (4, 10, 20, 50)]  # full tables without any free place
+    cases += [("packed", 2, n) for n in (4, 10, 20, 50)]  # full tables have no free place
     for family, number, n in cases:
         problem = scene(family, n, number)[0] if family != "packed" else packed("packed", n, SEED)
         program = compiled(problem)
@@ -167,7 +167,7 @@ def hands() -> None:
 
 
 def peers_with_gtpyhop() -> str:
-    """Return the peers' Python, with gtpyhop in it."""
+    """Return the Python of the other planners, with gtpyhop installed."""
     python = peers()
     if subprocess.run([python, "-c", "import gtpyhop"], capture_output=True, check=False).returncode:
         subprocess.run([python, "-m", "pip", "install", "-q", "gtpyhop"], check=True)
@@ -175,7 +175,7 @@ def peers_with_gtpyhop() -> str:
 
 
 def gtpyhop(python: str, problem: Problem) -> tuple[str, str]:
-    """Return the milliseconds and steps that GTPyhop takes with hand-written methods."""
+    """Return the milliseconds and the number of steps of GTPyhop with handwritten methods."""
     at = {s.arguments[0]: v for s, v in problem.initial.items() if s.situation == "LOCATION"}
     drinks = {s.arguments[0]: v for s, v in problem.initial.items() if s.situation == "BEVERAGE"}
     reach: dict[str, list[str]] = {}
@@ -207,7 +207,7 @@ def gtpyhop(python: str, problem: Problem) -> tuple[str, str]:
 
 
 def lengths() -> None:
-    """Compare the length of the first and of the shortened plan with the best known (`lengths.json` has the sources)."""
+    """Compare the lengths of the first and the shortened plan with the best known lengths (sources in `lengths.json`)."""
     known: dict[str, dict[str, Any]] = json.loads(LENGTHS.read_text()) if LENGTHS.exists() else {}
     print(
         "| family | n | first | improved | first ms | improving ms | best known | source | ratio | at least | ratio |"
@@ -238,11 +238,11 @@ def lengths() -> None:
 
 
 def at_least(problem: Problem) -> int:
-    """Return how many primitives any plan of a table has at least that leaves the hands empty and raised, by counting.
+    """Return a lower bound on the number of primitives of a table's plan that leaves the hands empty and raised.
 
-    An object that changes its place, or a bottle that is poured from, is grasped and put down at least once (reach, grasp, lift;
-    reach, put down, lift): twice where no hand reaches both its places. A pour takes four primitives (reach, tilt, stand upright,
-    lift). Where cup and bottle are moved once at most, some hand that moves the bottle must reach a place of the cup, else one more
+    An object that changes its place, and a bottle that is poured from, is grasped and put down at least once, which takes six
+    primitives. If no hand reaches both places of the object, it is grasped and put down twice. A pour takes four primitives. If
+    cup and bottle are each moved at most once, a hand that moves the bottle must reach a place of the cup; otherwise one more
     move is counted.
     """
     reach: dict[str, set[str]] = {}
@@ -258,7 +258,7 @@ def at_least(problem: Problem) -> int:
     ]
     moved = {thing for thing in at if at[thing] != to[thing]} | {bottle for bottle, _ in pours}
     moves = {thing: 1 if reach.get(at[thing], set()) & reach.get(to[thing], set()) else 2 for thing in moved}
-    more: set[str] = set()  # each bottle and each cup is counted once more at most
+    more: set[str] = set()  # at most one additional move for each bottle and each cup
     for bottle, cup in pours:
         hands = reach.get(at[bottle], set()) & reach.get(to[bottle], set())
         there = reach.get(at[cup], set()) | reach.get(to[cup], set())
@@ -271,9 +271,9 @@ def at_least(problem: Problem) -> int:
 
 
 def random_tables() -> None:
-    """Plan random tables of 10³ to 10⁶ reachable states, against all of them (`worlds.truth`).
+    """Plan for random tables of 10³ to 10⁶ reachable states, and compare with a search of all states (`worlds.truth`).
 
-    With `CONFAB_ROWS=FILE` each table's row is written there as it comes, and those that are there already aren't done again.
+    With `CONFAB_ROWS=FILE`, the row of each table is stored in the file, and stored rows aren't measured again.
     """
     wanted = int(os.environ.get("CONFAB_TABLES", "200"))
     end = perf_counter() + float(os.environ.get("CONFAB_SECONDS", "inf"))
@@ -310,9 +310,9 @@ def random_tables() -> None:
 
 
 def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Return the truth about a table and the planner's answer; None for a table of another size or without a step."""
+    """Return the result of the exhaustive search and of the planner, or None for a table of another size or without steps."""
     problem = random_table(seed)
-    if seed % 3:  # on two of three tables the hands reach less, so that more are unsolvable
+    if seed % 3:  # hands reach fewer places on two of three tables, so that more tables are unsolvable
         rng = Random(f"reach {seed}")
         pairs = frozenset(p for p in sorted(problem.relations["canReach"]) if rng.random() > 0.18 * (seed % 3))
         problem = replace(problem, relations={"canReach": pairs})
@@ -325,7 +325,7 @@ def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
     solvable = truth.shortest is not None
     row = {"seed": seed, "states": truth.states, "solvable": solvable, "shortest": truth.shortest, "status": None}
     done = [r["solvable"] for r in rows if r["status"] is not None]
-    if solvable and done.count(True) > 2 * done.count(False):  # so that a run cut short has its third, too
+    if solvable and done.count(True) > 2 * done.count(False):  # an incomplete run also has such tables
         return row
     begin = process_time()
     outcome = plan(problem)
@@ -341,7 +341,7 @@ def compared(seed: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
 
 @contextmanager
 def budget(seconds: float) -> Iterator[None]:
-    """Raise `LimitError`, which planners take for their own limit, after `seconds` of CPU time."""
+    """Raise `LimitError` in the block after `seconds` of CPU time; planners handle the error like their own limit."""
 
     def stop(*_: object) -> None:
         raise LimitError(f"{seconds:g} s of CPU")
@@ -365,15 +365,15 @@ def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
 
 
 class Forgetful(dict[str, list[Method]]):
-    """Methods of which none is kept."""
+    """A store of methods that keeps no method."""
 
     def setdefault(self, behavior: str, default: list[Method]) -> list[Method]:
-        """Return the default, without keeping it."""
+        """Return the default without storing it."""
         return default
 
 
 def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome]]:
-    """Return planning calls, by the part that each leaves out."""
+    """Return planning calls that each omit one part of the planner, by the name of the part."""
     limits, level = Limits(expansions=10**7), problem.domain.levels[-1]
     only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
     flat = replace(problem, domain=Domain(problem.domain.situations, only, problem.domain.first_ids))
@@ -392,7 +392,7 @@ def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome
 
 
 def parts() -> None:
-    """Switch each part off in turn, for `BUDGET` CPU seconds each, to measure its contribution."""
+    """Measure the contribution of each part of the planner by omitting it, for `BUDGET` CPU seconds each."""
     experience = Experience("lessons")
     for family, objects, seed in product(("served", "swap", "full"), (4, 6), (100, 101)):
         teach(experience, lesson(family, objects, seed))

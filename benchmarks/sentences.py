@@ -2,9 +2,9 @@
 
     python -m benchmarks.sentences                     two hundred sentences of this checkout, with seed 1
     python -m benchmarks.sentences 50 7                fifty, with seed 7
-    python -m benchmarks.sentences 200 1 COMMIT        of another commit
+    python -m benchmarks.sentences 200 1 COMMIT        two hundred sentences of a commit
 
-A reader rates each: understood at once, at the second reading, or not.
+A reader rates each sentence as understood at once, understood at the second reading, or not understood.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ END = re.compile(r"(?<=[.?!:;])\s+(?=[A-Z`*\"])")
 
 
 def docstrings(source: str) -> Iterator[str]:
-    """Yield all docstrings of a module: those of definitions and those below constants."""
+    """Yield all docstrings of a module, including texts below constants."""
     for node in ast.walk(ast.parse(source)):
         body = getattr(node, "body", ())
         for statement in body if isinstance(body, list) else ():
@@ -61,7 +61,7 @@ def drawn(files: dict[str, str], count: int, seed: int) -> list[tuple[str, str]]
 
 
 def files_of(commit: str) -> dict[str, str]:
-    """Return the modules and pages of a commit; without one, those of this checkout."""
+    """Return the modules and pages of a commit, by default of this checkout."""
 
     def git(*words: str) -> str:
         return subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=True).stdout

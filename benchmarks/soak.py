@@ -1,10 +1,10 @@
-"""Many episodes in one process: memory, time, files and PyBullet's clients after them as before.
+"""Test that many episodes in one process don't increase its memory, its time per episode, its files, or PyBullet's clients.
 
     python -m benchmarks.soak              1,000 symbolic episodes and 100 in physics
-    python -m benchmarks.soak 1000 10      so many of each
+    python -m benchmarks.soak 1000 10      these numbers of episodes
 
-An episode loads the scene, plans, carries the plan out and learns. Memory is counted when a tenth of the episodes is over and
-everything is warm; time is CPU time, of the first and the last tenth.
+An episode loads a scene, plans, executes the plan and learns. Memory is compared after a tenth of the episodes and at the end.
+CPU time is compared between the first and the last tenth.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ PAGE = 4096
 
 
 def resident() -> float:
-    """Return the megabytes that this process has in memory."""
+    """Return the resident memory of this process in megabytes."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 2**20
 
 
 def files() -> int:
-    """Return how many files this process has open."""
+    """Return the number of open files of this process."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
 def clients() -> int:
-    """Return how many physics servers this process is connected to."""
+    """Return the number of PyBullet servers to which this process is connected."""
     return sum(bool(pybullet.isConnected(client)) for client in range(64))
 
 
 def symbolic(folder: Path) -> None:
-    """Live one episode in the symbolic world, and learn from it."""
+    """Execute one episode in the symbolic world, and learn from it."""
     scene = confab.load("living-room")
     memory = Memory.of(scene)
     done = scene.execute(scene.plan())
@@ -51,13 +51,13 @@ def symbolic(folder: Path) -> None:
 
 
 def physics(folder: Path) -> None:
-    """Carry one plan out in physics."""
+    """Execute one plan in physics."""
     scene = confab.load("one-arm-serving")
     assert scene.plan().verify().verified
 
 
 def soak(episode: Callable[[Path], None], many: int) -> str:
-    """Run so many episodes; return a row with the state after a tenth of them and at the end."""
+    """Run episodes; return a row with the measurements after a tenth of the episodes and at the end."""
     times = []
     tenth = max(many // 10, 1)
     with tempfile.TemporaryDirectory() as name:

@@ -1,9 +1,9 @@
-"""Mechanisms that are wrong: shipped ones of which a part is moved, a limit widened or an axis turned.
+"""Detection of faulty mechanisms: shipped mechanisms with a moved part, a wider limit or a turned axis.
 
     python -m benchmarks.solids [MUTANTS [SEED]]
 
-Whether a mutant is wrong is judged by PyBullet's distances between its shapes, not by the check that is measured: somewhere on the
-way of a joint two solids are 3 mm or more inside each other. A mutant is harmless if nothing is inside anything anywhere.
+The distances of PyBullet between shapes tell whether a mutant is faulty, independently of the tested validation. A mutant is
+faulty if two solids overlap by 3 mm or more at a value of a joint. A mutant is harmless if no solids overlap at any value.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from confab.sim.linkage import written
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 SHIPPED = ("kitchen-corner", "centrifuge", str(EXAMPLES / "workshop/workshop.ttl"), str(EXAMPLES / "sluice/sluice.ttl"))
-"""Scenes with mechanisms; those that import one of them have no others."""
+"""Scenes with mechanisms. Scenes that import one of these scenes add no mechanisms."""
 
 WRONG, HARMLESS = 0.003, 0.0
-"""Metres of overlap from which on a mutant is wrong, and up to which it is harmless."""
+"""Minimum overlap of a faulty mutant, and maximum overlap of a harmless mutant, in metres."""
 
 VALUES = 25
 """Number of values of each joint at which PyBullet's distances are computed."""
@@ -36,7 +36,7 @@ VALUES = 25
 
 @dataclass(frozen=True)
 class Mutant:
-    """A scene's embodiment with one change, and how deep two of its solids overlap on the way of a joint."""
+    """The embodiment of a scene with one change, and the maximum overlap of two solids over the values of a joint, in metres."""
 
     scene: str
     change: str
@@ -45,12 +45,12 @@ class Mutant:
 
     @property
     def refused(self) -> bool:
-        """Whether validation finds a solid that passes through another one."""
+        """Whether validation finds a solid that passes through another solid."""
         return next(iter(through_a_solid(self.embodiment)), None) is not None
 
 
 def mutants(seed: int = 0, scenes: Sequence[str] = SHIPPED) -> Iterator[Mutant]:
-    """Yield mutants of shipped mechanisms without end."""
+    """Yield mutants of the shipped mechanisms, without end."""
     rng = np.random.default_rng(seed)
     shipped = [(Path(name).stem, confab.load(name).embodiment) for name in scenes]
     while True:
@@ -67,7 +67,7 @@ def mutants(seed: int = 0, scenes: Sequence[str] = SHIPPED) -> Iterator[Mutant]:
 
 
 def _changed(link: Link, rng: np.random.Generator) -> tuple[str, Link]:
-    """Return a link of which a part is moved, a limit widened or the axis turned."""
+    """Return a link with a moved part, a wider limit or a turned axis."""
     kind = ("part", "limit", "axis")[rng.integers(3)]
     if kind == "part":
         part = link.parts[rng.integers(len(link.parts))]
@@ -87,7 +87,7 @@ def _changed(link: Link, rng: np.random.Generator) -> tuple[str, Link]:
 
 
 def depth_of(embodiment: Embodiment, mechanism: Mechanism) -> float:
-    """Return in metres how deep PyBullet has solids of a mechanism in each other or in others, over the ways of its joints."""
+    """Return the maximum overlap in metres, by PyBullet, of a mechanism's solids with any solids over the values of its joints."""
     client = pybullet.connect(pybullet.DIRECT)
     try:
         own, numbers = _loaded(client, mechanism)
@@ -112,7 +112,7 @@ def _loaded(client: int, mechanism: Mechanism) -> tuple[int, Mapping[str, int]]:
 def _swept(
     client: int, own: int, others: Sequence[int], mechanism: Mechanism, link: Link, numbers: Mapping[str, int]
 ) -> float:
-    """Return how deep a link gets into something on the way of its joint; a neighbour may be shut or wide open."""
+    """Return the maximum overlap of a link over the values of its joint, with neighbouring joints shut or wide open."""
     deepest, names = 0.0, {-1: mechanism.name} | {number: name for name, number in numbers.items()}
     owners: list[Mechanism | Link] = [mechanism, *mechanism.links]
     parts = {one.name: {part.name for part in one.parts} for one in owners}
@@ -143,7 +143,7 @@ def _depth(client: int, one: tuple[int, int], other: tuple[int, int]) -> float:
 
 
 def main() -> None:
-    """Print how many wrong mutants are refused, and how many harmless ones and shipped mechanisms are."""
+    """Print the numbers of faulty mutants, harmless mutants and shipped mechanisms that validation refuses."""
     most, seed = (int(word) for word in [*sys.argv[1:], *("40", "0")[len(sys.argv) - 1 :]])
     counts: Counter[tuple[str, bool]] = Counter()
     for mutant in mutants(seed):

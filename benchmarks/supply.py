@@ -1,9 +1,9 @@
-"""The dependencies: each package of the lock files with its licence, as stated by the package.
+"""The licences of all packages in the lock files, as the packages state them.
 
     python -m benchmarks.supply
 
-What isn't for this system, or isn't installed, is listed without one. `make lock` pins versions and hashes; `make` installs
-nothing else.
+Packages for other systems, and packages that aren't installed, are listed without a licence. The command `make lock` pins
+versions and hashes of packages. The command `make` installs only pinned packages.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SHORT = 60
 
 
 def licence(package: str) -> str:
-    """Return the licence that an installed package states, or why there is none to read."""
+    """Return the licence that an installed package states, or the reason why no licence is available."""
     try:
         said = metadata(package)
     except PackageNotFoundError:
@@ -35,7 +35,7 @@ def licence(package: str) -> str:
 
 
 def main() -> None:
-    """Print a table: licences, how many packages have each, and which."""
+    """Print a table of the licences, with the number and the names of the packages."""
     found: dict[str, set[str]] = {name: {p for p, _ in PINNED.findall((ROOT / name).read_text())} for name in LOCKS}
     light, all_of = found["requirements.lock"], set().union(*found.values())
     by_licence: dict[str, list[str]] = defaultdict(list)

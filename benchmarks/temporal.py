@@ -7,8 +7,8 @@
     CONFAB_PLANNERS=confab,lpg,tamer …                   these planners only
     CONFAB_KINDS=worlds CONFAB_COUNT=1000 …              the random worlds only
 
-Each run is a process of its own with 30 s of CPU. Plans of ours are judged by unified-planning's TimeTriggeredPlanValidator, with
-conflicting events 1 ms apart.
+Each run is a separate process, limited to 30 s of CPU time. Plans of Confab are judged by unified-planning's
+TimeTriggeredPlanValidator, with conflicting events 1 ms apart.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _ratio(rows: dict[str, dict[str, float | None]], planner: str) -> str:
 
 
 def _run(planner: str, domain: Path, problem: Path) -> dict[str, float | bool] | None:
-    """Return makespan and verdict of a planner's plan; None if it finds none in time."""
+    """Return the makespan and the verdict of a planner's plan, or None if the planner finds no plan in time."""
     if planner == "confab":
         command = [sys.executable, "-m", "benchmarks.temporal", "one", str(domain), str(problem)]
     else:

@@ -1,4 +1,4 @@
-"""The paper's equations on the paper's table: expansions by episode, with memory, and without levels."""
+"""The paper's equations in the paper's task: expansions by episode, with memory, and without levels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FLAT = 200_000
 
 
 def flat(scene: confab.Scene) -> Outcome:
-    """Return the result of the paper's search with primitives as the only level."""
+    """Return the outcome of the paper's search on the level of primitives alone."""
     problem = scene.problem
     lowest = problem.domain.levels[-1]
     behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level == lowest}

@@ -1,7 +1,7 @@
-"""Exported behaviour trees in their engines: ``python -m benchmarks.trees [--runner RUNNER] [--disturbances N]``.
+"""Execution of exported behaviour trees, run by ``python -m benchmarks.trees [--runner RUNNER] [--disturbances N]``.
 
-Ten plans are ticked by py_trees, and by BehaviorTree.CPP if a runner is given: ``benchmarks/btcpp/runner.cpp``, compiled with the
-library. Then goals and other facts that plans change are undone at random, in py_trees and under our executive.
+The trees of ten plans are ticked by py_trees. With a runner (the compiled ``benchmarks/btcpp/runner.cpp``), they are also
+ticked by BehaviorTree.CPP. Then changed facts are undone at random during executions by py_trees and by Confab.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ NAMES = (
 
 
 class Undone(SymbolicWorld):
-    """A world in which one fact that was changed is as at first again, after some primitives."""
+    """A world in which one changed fact gets its initial value again after some primitives."""
 
     def __init__(self, problem: Problem, after: int, draw: random.Random) -> None:
         super().__init__(problem)
         self.left, self.draw = after, draw
 
     def execute(self, step: Step) -> Report:
-        """Execute a primitive, then undo something if it is time."""
+        """Execute a primitive; after the chosen primitive, undo a change."""
         said = super().execute(step)
         self.left -= 1
         if self.left == 0:
@@ -88,7 +88,7 @@ def by_btcpp(problem: Problem, tree: Tree, path: Path, runner: Path) -> tuple[bo
 
 
 def order_kept(done: list[str], plan: Plan) -> str:
-    """Return whether the primitives came in the plan's order; `in parallel` if only pairs without a common individual didn't."""
+    """Return whether primitives have the plan's order, with the answer ``in parallel`` if only independent pairs differ."""
     if done == [str(step) for step in plan.primitives]:
         return "yes"
     individuals = {individual for step in plan.primitives for individual in step.arguments}
@@ -103,7 +103,7 @@ def order_kept(done: list[str], plan: Plan) -> str:
 
 
 def main() -> None:
-    """Tick ten plans, then disturbed ones."""
+    """Print the results of ten plans, and of plans with disturbances."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--runner", type=Path)
     parser.add_argument("--disturbances", type=int, default=50)

@@ -1,4 +1,4 @@
-"""The vocabulary as a page, made from the ontology files: `make vocabulary` writes docs/vocabulary.md, and a test compares it."""
+"""The page docs/vocabulary.md, which `make vocabulary` writes from the ontology files and a test compares with them."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ a property to its range; *one* means at most one value.
 
 
 def page() -> str:
-    """Return the page."""
+    """Return the text of the page."""
     return "\n".join([HEAD, *(part(ontology.ROOT / name) for name in FILES)])
 
 
 def part(file: Path) -> str:
-    """Return the part of the page about one file: its head, and a table for each of its sections."""
+    """Return the part of the page about one ontology file: a heading, and a table for each section of the file."""
     graph = rdflib.Graph().parse(file)
     (about,) = graph.subjects(RDF.type, OWL.Ontology)
     space, prefix = (graph.value(about, VANN[f"preferredNamespace{end}"]) for end in ("Uri", "Prefix"))
@@ -51,7 +51,7 @@ def part(file: Path) -> str:
 
 
 def sections(text: str) -> list[tuple[str, list[str]]]:
-    """Return the titles of a file's sections, as its comments give them, with the terms that each declares."""
+    """Return the sections of a file: the title in a comment, and the terms that the section declares."""
     found: list[tuple[str, list[str]]] = []
     for line in text.splitlines():
         if match := re.match(r"#{5,}\s+(.+)", line):
@@ -62,7 +62,7 @@ def sections(text: str) -> list[tuple[str, list[str]]]:
 
 
 def row(graph: rdflib.Graph, term: URIRef) -> str:
-    """Return a term as a row of its table."""
+    """Return the row of the table for a term."""
     kinds = [word for kind, word in KINDS.items() if (term, RDF.type, kind) in graph] or [
         local_name(str(kind)) for kind in sorted(graph.objects(term, RDF.type), key=str)
     ]

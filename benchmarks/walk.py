@@ -15,7 +15,7 @@ SCENE = os.environ.get("CONFAB_SCENE", "beverage-serving")
 
 
 def entered(call: Callable[[], object]) -> dict[str, int]:
-    """Return the files of this repository in which a call enters a function, with their lines; not what only importing runs."""
+    """Return the files of this repository of which a call enters a function, with their numbers of lines; imports don't count."""
     call()
     files: set[str] = set()
 
@@ -34,7 +34,7 @@ def entered(call: Callable[[], object]) -> dict[str, int]:
 
 
 def main() -> None:
-    """Print the table: files and lines in all and in `planner/`, for the default mode and the paper's."""
+    """Print the numbers of files and lines, in total and in `planner/`, for the default mode and the paper's mode."""
     print("| mode | files, lines in all | in `planner/` | which |\n|---|---|---|---|")
     for mode in ("guarded", "paper"):
         files = entered(lambda mode=mode: confab.load(SCENE).plan(mode=mode))  # type: ignore[misc]
