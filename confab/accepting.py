@@ -65,7 +65,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
     found = getattr(given, "plan", None)
     if not isinstance(found, Plan):
         raise KnowledgeError(
-            f"wanted a plan, what has one in it (a result, an execution) or a file's name; got {type(given).__name__}"
+            f"wanted a plan, an object with a plan (a result, an execution) or a file's name; got {type(given).__name__}"
         )
     return found
 
@@ -73,7 +73,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
 def check_goal(scene: str, problem: Problem) -> None:
     """Raise `KnowledgeError` if a problem has no behaviour or no goal, or a goal whose value isn't in its situation type."""
     if not problem.domain.behaviors:
-        raise KnowledgeError(f"{scene} has no behaviours, so that nothing can be done; import a domain that has some")
+        raise KnowledgeError(f"{scene} has no behaviours, so that no plan is possible; import a domain with behaviours")
     if not problem.goal:
         raise KnowledgeError(f"{scene} has no task with goals; plan in a scene that has one, or give a goal")
     allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}
@@ -81,7 +81,9 @@ def check_goal(scene: str, problem: Problem) -> None:
         counted = problem.domain.situations[symbol.situation].quantity is not None
         if not counted and value not in allowed[symbol.situation]:
             values = allowed[symbol.situation] - {TRUE, FALSE}
-            raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
+            raise KnowledgeError(
+                f"the goal of {symbol} is {value}, which is no value of this symbol{nearest(value, values)}"
+            )
 
 
 @contextmanager
@@ -149,7 +151,7 @@ def sparql_of(given: str | Path) -> str:
     if isinstance(given, Path):
         given = str(given)
     if not isinstance(given, str):
-        raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a ready query; got {given!r}")
+        raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a shipped query; got {given!r}")
     if any(sign in given for sign in "{}?\n"):
         return given
     path = Path(given)
@@ -163,5 +165,5 @@ def sparql_of(given: str | Path) -> str:
     if given in ready:
         return ready[given].read_text(encoding="utf-8")
     if given.replace("-", "").isalpha() and " " not in given:
-        raise KnowledgeError(f"no ready query '{given}'{nearest(given, ready)} (ready: {', '.join(ready)})")
+        raise KnowledgeError(f"no shipped query '{given}'{nearest(given, ready)} (shipped: {', '.join(ready)})")
     return given

@@ -114,7 +114,7 @@ def server(folder: Path) -> MCPServer[Any]:
     made = Server(
         "confab",
         version=__version__,
-        instructions="Plans of a robot from an ontology, with reasons, proofs that there is none, and checks in physics.",
+        instructions="Plans of a robot from an ontology, with reasons, proofs of unsolvability, and checks in physics.",
         log_level="ERROR",
     )
     kept = Kept()
@@ -132,7 +132,7 @@ def server(folder: Path) -> MCPServer[Any]:
         except TimeoutExpired:
             raise ToolError(f"gave up after {seconds:g} s; give more time (seconds)") from None
         except WorkerError as error:
-            raise ToolError(f"the process that worked it out ended early (exit {error.status})") from None
+            raise ToolError(f"the process of this call ended early (exit {error.status})") from None
         except Exception as error:
             raise ToolError(
                 f"a fault of this program, not of the call: {type(error).__name__}: {error}"[:SHOWN]
@@ -171,7 +171,9 @@ def server(folder: Path) -> MCPServer[Any]:
     @made.tool()
     async def why(
         scene: SceneName,
-        step: Annotated[str, Field(description="Its number on the first level, or L3#12; all steps if left out")] = "",
+        step: Annotated[
+            str, Field(description="Number of the step on the first level, or L3#12; by default all steps")
+        ] = "",
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
@@ -194,7 +196,7 @@ def server(folder: Path) -> MCPServer[Any]:
     async def verify(
         scene: SceneName,
         goals: Goals = [],  # noqa: B006
-        rollouts: Annotated[int, Field(description="How often", ge=1, le=answers.ROLLOUTS)] = 1,
+        rollouts: Annotated[int, Field(description="Number of rollouts", ge=1, le=answers.ROLLOUTS)] = 1,
         seed: int = 0,
         seconds: Seconds = 120.0,
     ) -> str:
@@ -207,6 +209,6 @@ def server(folder: Path) -> MCPServer[Any]:
         try:
             return kept.whole(number)
         except KeyError:
-            raise ResourceError(f"there is no answer {number}: the latest {KEPT} that were cut are kept") from None
+            raise ResourceError(f"there is no answer {number}: only the latest {KEPT} cut answers are kept") from None
 
     return made

@@ -112,7 +112,7 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
         faults = validate(problem, plan)
         if not faults:
             return outcome(Status.SOLVED, plan)
-    return outcome(Status.GAVE_UP, reason=f"its plan is none here: {faults[0].text}")
+    return outcome(Status.GAVE_UP, reason=f"its plan is invalid: {faults[0].text}")
 
 
 def unified(domain: str, problem: str) -> unified_planning.model.Problem:
@@ -183,7 +183,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
         return first, *_directly(factory.engine(first)(), domain, problem, deadline)
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
-        raise KnowledgeError(f"{said} derived predicates, as what is defined would be; plan without --engine")
+        raise KnowledgeError(f"{said} derived predicates, which definitions become; plan without --engine")
     late = first or "unified-planning", "TIMEOUT", list[str]()
     _tell(late[0], deadline)
     try:

@@ -224,7 +224,7 @@ def _differences(
         weight = (a[1] if a else 0.0) - (b[1] if b else 0.0)
         if abs(weight) > 1e-12:
             if asks == "":
-                found.append(Why("how often it is chosen at all", "", "", weight, "how often it is chosen at all"))
+                found.append(Why("how often the rule is chosen", "", "", weight, "how often the rule is chosen"))
                 continue
             says, says_other = (say.asked(x[0], r) if x else "" for x, r in zip((a, b), roles, strict=True))
             found.append(Why(asks, a[0][1] if a else "–", b[0][1] if b else "–", weight, says, says_other))

@@ -82,9 +82,7 @@ def runs(folder: str | Path) -> list[Run]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise KnowledgeError(
-            f"{folder}: no such folder; 'confab run SCENE -o FOLDER --keep' begins one, which is then FOLDER here"
-        )
+        raise KnowledgeError(f"{folder}: no such folder; 'confab run SCENE -o {folder} --keep' creates the folder")
     files = [folder / RECORD, *sorted(folder.glob(f"*/{RECORD}"))]
     found = [_read(file) for file in files if file.is_file()]
     if not found:

@@ -298,7 +298,7 @@ class Known:
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
         if not found and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
-            log.warning("confab: the scene doesn't speak of %s; is the prefix the right one?", ", ".join(unheard))
+            log.warning("confab: the scene has no term %s; is the prefix right?", ", ".join(unheard))
         columns = ["subject", "predicate", "object"] if kind == "triples" else columns
         rows = tuple(tuple(self._cell(term) for term in row) for row in found)
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
@@ -330,7 +330,7 @@ class Known:
             with suppress(KnowledgeError), within((limits or QueryLimits()).seconds):
                 write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:
-            log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
+            log.warning("confab: %s; the scene can be queried, but not planned in", fault)
         self._told = True
         return self.knowledge
 

@@ -270,7 +270,7 @@ class Memory:
         read, links = parse(found, "what was written", self.names), load_links(file, self.names, found)
         if read != self.experience or len(links) != len(self.links):
             raise KnowledgeError(
-                "what was written can't be read again as it was learned, so the memory stays as it was; please report it"
+                "the written file differs from the memory, so the old file is kept; please report this fault"
             )
 
     @property

@@ -221,9 +221,7 @@ def _plan(
     in_part = problem is seen.problem and not seen.whole
     if needs_others_meanwhile(problem):
         if problem.weights:
-            raise KnowledgeError(
-                "a task whose steps need others meanwhile takes no soft goals; drop the :weight of its goals"
-            )
+            raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
         problem = problem if seen.whole else whole()
         outcome, timed = concurrent(problem, deadline)
         queries = scene.knowledge.round_trips - asked
@@ -395,9 +393,7 @@ class Result:
         from confab.planner.causal_links import purposes
 
         if needs_others_meanwhile(self.problem):
-            raise KnowledgeError(
-                "steps of this plan need others meanwhile; reasons are told of sequences of steps only"
-            )
+            raise KnowledgeError("steps of this plan must overlap; reasons are given for sequences of steps only")
         return purposes(self.problem, self.plan)
 
     def why(self, step: AnyStep) -> Because:

@@ -406,7 +406,7 @@ def preferred(accept: str, offered: Sequence[str]) -> str:
         for kind in offered
     ]
     if not any(scores):
-        raise HTTPException(406, f"it can be had as {', '.join(offered)}")
+        raise HTTPException(406, f"available media types: {', '.join(offered)}")
     return offered[scores.index(max(scores))]
 
 

@@ -37,5 +37,5 @@ def _leave(code: int) -> NoReturn:
 
 def _interrupted(*_: object) -> None:
     """Print the message about an interrupt and end the process. The module `confab.cli` may not be imported yet."""
-    os.write(2, b"confab: interrupted; every file is as it was before, or whole\n")
+    os.write(2, b"confab: interrupted; every file is unchanged or complete\n")
     os._exit(130)

@@ -32,8 +32,8 @@ LONGEST = 2_000
 """Maximum number of characters of a message."""
 
 WITHOUT_PHYSICS = (
-    "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
-    "pip install pybullet compiles it; all but physics works without"
+    "this needs physics, and PyBullet isn't installed; pip install pybullet has wheels for Python 3.10 and 3.11, and compiles "
+    "for other versions; all functions except physics work without PyBullet"
 )
 
 
@@ -58,9 +58,9 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     except MemoryError:
         _end(GAVE_UP, "gave up: there isn't enough memory for this")
     except RecursionError as error:
-        _end(GAVE_UP, f"gave up: something is nested too deeply to be worked on; where, is said in {_log(error)}")
+        _end(GAVE_UP, f"gave up: the input is nested too deeply; the position is in {_log(error)}")
     except (KeyboardInterrupt, click.Abort):
-        _end(INTERRUPTED, "interrupted; every file is as it was before, or whole")
+        _end(INTERRUPTED, "interrupted; every file is unchanged or complete")
     except OSError as error:
         try:
             sys.stdout.flush()
@@ -165,7 +165,7 @@ def _open_streams() -> None:
         sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
     if 1 in closed:
         sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
-        _end(MISUSE, "stdout is closed, so that nothing could be answered; nothing was done")
+        _end(MISUSE, "stdout is closed, so that no result can be printed; nothing was done")
 
 
 def _is_open(stream: int) -> bool:

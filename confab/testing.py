@@ -233,7 +233,7 @@ def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: l
             before = {**problem.initial, **world.observe()}
             expected = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, before)
             if expected is None:
-                ended = f"ended at {step}, whose preconditions aren't seen to hold"
+                ended = f"ended at {step}, whose preconditions aren't observed"
                 break
             begin = perf_counter()
             verdict = world.execute(step)
@@ -258,13 +258,19 @@ def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: l
     text = f"{done} of {len(steps)} primitives done, {failed} attempts failed{longest}"
     checks.append(Check("execution", not ended if steps else None, "; ".join(filter(None, (text, ended)))))
     never = sorted({str(symbol) for symbol in wanted if symbol not in seen})
-    text = f"done by the verdict, and not seen: {'; '.join(lies[:3])}" if lies else "what was reported as done was seen"
+    text = (
+        f"reported as done, but not observed: {'; '.join(lies[:3])}"
+        if lies
+        else "the effects of each finished primitive were observed"
+    )
     text += f"; never perceived, so not checked: {', '.join(never[:5])}" if never else ""
     checks.append(Check("effects", not lies if done else None, text))
     text = f"failed without a code: {', '.join(nameless[:3])}" if nameless else "every failure has a code"
     checks.append(Check("failures", not nameless if failed else None, text if failed else "nothing failed"))
     if understated:
-        checks.append(Check("understated", None, f"reported as failed, but done as seen: {', '.join(understated[:3])}"))
+        checks.append(
+            Check("understated", None, f"reported as failed, but observed as done: {', '.join(understated[:3])}")
+        )
 
 
 def _missing(problem: Problem, before: State, expected: Mapping[Symbol, str], seen: State) -> str:

@@ -291,12 +291,12 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
         if tops:
             shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in tops[:6])
             raise KnowledgeError(
-                f"'{asked}' is said of {len(tops)} steps: {shown}; ask for one, e.g. {number_of(plan, tops[0])}"
+                f"'{asked}' names {len(tops)} steps: {shown}; give one, e.g. {number_of(plan, tops[0])}"
             )
     alike = [step for step in steps if words == labels.name(step.behavior).lower()]
     if alike:
         shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in alike[:6])
-        raise KnowledgeError(f"'{asked}' is said of {len(alike)} steps: {shown}; ask for one")
+        raise KnowledgeError(f"'{asked}' names {len(alike)} steps: {shown}; give one")
     known = [text for step in steps for text in (labels.step(step), str(step))]
     raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, 'confab explain SCENE lists its steps')}")
 

@@ -73,7 +73,7 @@ def scene_text(interface: Interface, model: Model, name: str, title: str) -> tup
         The interface has no scene query, or the query has no result.
     """
     if not interface.scene_query:
-        raise KnowledgeError(f"{interface.name} has no e:sceneQuery, so its world model makes no scene")
+        raise KnowledgeError(f"{interface.name} has no e:sceneQuery, so its world model can't be imported")
     iri = f"https://example.org/{as_iri_part(name)}"
     store = ox.Store()
     store.extend(ox.Quad(*triple) for triple in _triples(model, iri + "#"))
@@ -82,7 +82,7 @@ def scene_text(interface: Interface, model: Model, name: str, title: str) -> tup
         raise KnowledgeError(f"{interface.scene_query} is no CONSTRUCT query")
     found = sorted(set(answer), key=str)
     if not found:
-        raise KnowledgeError(f"{interface.scene_query} makes nothing of the world model of {interface.name}")
+        raise KnowledgeError(f"{interface.scene_query} has no result for the world model of {interface.name}")
     text = _turtle(iri, [interface.iri.rpartition("#")[0]], found, title)
     return text, len({triple.subject for triple in found})
 
@@ -118,7 +118,7 @@ def scene_of_graph(source: Path, query: str, path: Path) -> int:
         raise KnowledgeError(f"{source}, {file.name}: {error}") from error
     found = sorted(set(answer), key=str) if isinstance(answer, ox.QueryTriples) else []
     if not found:
-        raise KnowledgeError(f"{file.name} makes nothing of {source}")
+        raise KnowledgeError(f"{file.name} has no result for {source}")
     spaces = {term.value.rpartition("#")[0] for triple in found for term in triple if isinstance(term, ox.NamedNode)}
     iri = f"https://example.org/{as_iri_part(path.stem)}"
     text = _turtle(iri, sorted(spaces & {*ontology.shipped()}), found, f"Scene of {source.name}")

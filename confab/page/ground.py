@@ -103,7 +103,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
         {place.name: seen(*place.position[:2]) for place in places.values()},
         tuple(areas),
         robots=tuple((robot.name, seen(*robot.position[:2])) for robot in embodiment.robots),
-        note="to scale, seen from the side of the camera that films",
+        note="to scale, seen from the side of the film's camera",
     )
 
 
@@ -145,7 +145,9 @@ def _connected(problem: Problem) -> Ground | None:
     places = networkx.kamada_kawai_layout(graph)
     spots = {name: (round(STRETCH * float(x), 4), round(float(y), 4)) for name, (x, y) in places.items()}
     ways = tuple(sorted((min(pair), max(pair)) for pair in graph.edges))
-    return Ground(spots, ways=ways, metric=False, note="places have no coordinates: lines are what connects them")
+    return Ground(
+        spots, ways=ways, metric=False, note="places have no coordinates; lines connect them as static relations do"
+    )
 
 
 def _in_order(problem: Problem) -> Ground | None:

@@ -764,7 +764,7 @@ main()
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (INTERRUPTED, "")
-    assert done.stderr == "confab: interrupted; every file is as it was before, or whole\n"
+    assert done.stderr == "confab: interrupted; every file is unchanged or complete\n"
 
 
 @pytest.mark.parametrize(
@@ -799,7 +799,7 @@ main()
         env={**os.environ, "PYTHONPATH": str(Path(confab.__file__).parents[1])},
     )
     assert done.returncode == INTERRUPTED, done.stderr
-    assert done.stderr.splitlines()[-1] == "confab: interrupted; every file is as it was before, or whole"
+    assert done.stderr.splitlines()[-1] == "confab: interrupted; every file is unchanged or complete"
     assert all(line.startswith("confab: ") for line in done.stderr.splitlines() if line)  # click ends the line of ^C
     assert not list(tmp_path.rglob("*.*"))
 
@@ -816,7 +816,7 @@ def test_ctrl_c_is_one_though_a_library_makes_another_error_of_it(capsys: pytest
     with pytest.raises(SystemExit) as end:
         run_to_end(call)
     assert end.value.code == INTERRUPTED
-    assert capsys.readouterr().err == "confab: interrupted; every file is as it was before, or whole\n"
+    assert capsys.readouterr().err == "confab: interrupted; every file is unchanged or complete\n"
     assert signal.getsignal(signal.SIGINT) is before
 
 

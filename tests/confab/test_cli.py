@@ -96,7 +96,7 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
         (["plan", "beverage-serving", "--goal", "cup1 LOCATION location4"], 1, "location4"),
         (["plan", "beverage-serving", "--mode", "magic"], 2, "unknown mode 'magic'"),
         (["plan", "beverage-serving", "--memory", "none.ttl"], 2, "no such memory file"),
-        (["query", "beverage-serving", "SELEKT"], 2, "no ready query 'SELEKT'"),
+        (["query", "beverage-serving", "SELEKT"], 2, "no shipped query 'SELEKT'"),
         (["query", "beverage-serving", "--show", "B2_PIK"], 2, "did you mean 'B2_PICK'"),
         (["plan", "domains/tabletop.ttl"], 2, "no scene"),
         (["verify", "beverage-serving", "broken.ttl"], 2, "broken.ttl"),

@@ -72,7 +72,7 @@ def test_a_level_of_ones_choice_is_planned() -> None:
         ("UNSOLVABLE_PROVEN", Status.UNSOLVABLE, "e: no plan exists on level 3"),
         ("UNSOLVABLE_INCOMPLETELY", Status.GAVE_UP, "e: unsolvable incompletely"),
         ("TIMEOUT", Status.GAVE_UP, "e: timeout"),
-        ("SOLVED_SATISFICING", Status.GAVE_UP, "e: its plan is none here: the goal"),
+        ("SOLVED_SATISFICING", Status.GAVE_UP, "e: its plan is invalid: the goal"),
     ],
 )
 def test_what_is_no_plan_is_said_to_be_none(
