@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def families() -> None:
-    """Plan for tables of all families, several times for the seconds."""
+    """Plan several times for tables of all families, and print a row for each table."""
     print("| family | n | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:

@@ -289,7 +289,7 @@ def trucks(size: int) -> str:
 
 
 def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
-    """Print the time of parsing and grounding compared with Fast Downward's translator."""
+    """Print the times of parsing and grounding, and those of Fast Downward's translator."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
     from confab.reasoner.pddl.importing import imported

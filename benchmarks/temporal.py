@@ -114,7 +114,7 @@ def _run(planner: str, domain: Path, problem: Path) -> dict[str, float | bool] |
 
 
 def one(domain: Path, problem: Path) -> None:
-    """Print the makespan of our plan of one problem, and whether the validator accepts it."""
+    """Print the makespan of Confab's plan for one problem, and whether the validator accepts the plan."""
     from confab.planner.plan import Limits
     from confab.planner.solve import Request, solve
     from confab.planner.timed import concurrent

@@ -1,7 +1,7 @@
 """An MCP server on stdio: language models' agents plan, replan, query, validate, explain and verify by its tools.
 
-Each call runs in a separate process. The process ends with the call, at its time limit, when the client cancels the call, or
-with the server. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the complete
+Each call runs in a separate process. The process ends when the call or the server ends, at the time limit, or when the client
+cancels the call. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the complete
 text. The server reads files of one folder only. The only files that it writes are files of reach facts.
 """
 

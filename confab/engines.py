@@ -40,8 +40,7 @@ ENGINE_SECONDS = 60.0
 IMPORTING = 1.0
 """Seconds that the import of unified-planning can take; no engine is started if less time is left."""
 READING = 0.93
-"""Share of the remaining time after which an engine is stopped. The rest of the time is for reading and validating the engine's
-plan."""
+"""Share of the remaining time that an engine may use. The rest of the time is for reading and validating the engine's plan."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines without support for numbers."""
 WITH_DEFINITIONS = {"up_fast_downward"}

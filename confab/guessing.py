@@ -204,7 +204,7 @@ def described(kind: str) -> Mapping[str, str]:
 
 
 def places(kind: str) -> Iterator[tuple[str, str, int]]:
-    """Yield the kinds of objects that are reachable from a kind, each with the expression that leads to it and its distance."""
+    """Yield each kind of object that is reachable from `kind`, the expression that leads to the object, and the number of steps."""
     waiting, seen = [(kind, "confab." if kind == "confab" else "", 0)], {kind}
     while waiting:
         here, before, far = waiting.pop(0)

@@ -407,7 +407,7 @@ def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[s
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with its noun.
+    """Return a number and a noun, in the singular or the plural.
 
     Examples
     --------
@@ -435,7 +435,7 @@ def undisturbed(target: str | Path) -> AbstractContextManager[None]:
 
 
 def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
-    """Yield the failed first-level steps of an episode, each with the problem in the state of the failure and the failed path."""
+    """Yield each failed first-level step of an episode, with the problem in the state of the failure and the primitive's path."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments

@@ -59,7 +59,7 @@ class Conformance:
         return all(check.passed is not False for check in self.checks)
 
     def __getitem__(self, name: str) -> Check:
-        """Return the check with a name."""
+        """Return the check that has the given name."""
         return next(check for check in self.checks if check.name == name)
 
     def __str__(self) -> str:

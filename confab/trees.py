@@ -56,7 +56,7 @@ class Element:
 
     The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. Fallback and Sequence
     begin with their first child in each tick. Once is a sequence that resumes at the running child. `name` is the name of a
-    subtree, a mark or a leaf. `key` identifies a leaf.
+    subtree, of a leaf, or of a mark (the flag of a finished step). `key` identifies a leaf.
     """
 
     kind: str

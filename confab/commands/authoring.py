@@ -267,7 +267,7 @@ def export(
     seed: int,
     time_limit: float | None,
 ) -> None:
-    """Write PDDL, trajectories or a behaviour tree."""
+    """Export a level as PDDL, or a plan as trajectories or a tree."""
     from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.scene import load
 

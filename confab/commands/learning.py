@@ -166,7 +166,7 @@ def show(memory: str, most: int, as_json: bool) -> None:
 )
 @click.option("--trust", is_flag=True, help="Let all counts guide the search; by default planning is strict.")
 def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
-    """Merge the counts of memories, in any order or repeatedly."""
+    """Merge the counts of memories into one memory."""
     from confab.memory import Memory, undisturbed
 
     with undisturbed(out):

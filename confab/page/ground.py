@@ -129,7 +129,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return at least three places in a layout in which places connected by static relations are near each other, or None."""
+    """Return a layout of at least three places in which static relations connect near places, or None."""
     import networkx
 
     values = _values(problem)
@@ -151,7 +151,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return at least three places without coordinates and connections in rows, ordered by name, or None."""
+    """Return rows of at least three places without coordinates and connections, ordered by name, or None."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial

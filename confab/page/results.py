@@ -225,7 +225,7 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on levels that planning gave up, and on the conditions of these levels that the plan violates."""
+    """Return notes on levels without a refinable plan, and on the conditions of these levels that the plan violates."""
     if outcome is None:
         return []
     broken = [broken.text for left in outcome.left for broken in left.broken]
