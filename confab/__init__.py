@@ -81,16 +81,20 @@ _HOMES = {
 def __getattr__(name: str) -> object:
     """Import a public name on first access, so that the command line starts fast."""
     if name not in _HOMES:
-        from importlib.util import find_spec
-
-        if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` calls this first
+        if name.startswith("_"):
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
+        from dis import opmap
+
         from confab.hints import MODULE
         from confab.reasoner.names import GUESSING, WrongNameError
 
         if "confab.guessing" not in GUESSING:
             GUESSING.append("confab.guessing")
-        raise WrongNameError("the module confab", name, _sys.modules[__name__], lambda: MODULE)
+        error = WrongNameError("the module confab", name, _sys.modules[__name__], lambda: MODULE)
+        caller = _sys._getframe(1)
+        if caller.f_lasti >= 0 and caller.f_code.co_code[caller.f_lasti] == opmap["IMPORT_FROM"]:
+            raise ImportError(str(error), name="confab")  # Python replaces the message of an AttributeError here
+        raise error
     from importlib import import_module
 
     return getattr(import_module(_HOMES[name]), name)

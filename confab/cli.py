@@ -20,7 +20,7 @@ from confab.terminal import Ending, run_to_end
 GROUPS = {  # in the order of the help
     "Plan and act": ("plan", "run", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
-    "Look": ("report", "runs"),
+    "Look": ("scenes", "report", "runs"),
     "Ask": ("query", "serve", "mcp", "picture"),
     "Author": ("validate", "new", "generate", "convert", "fetch"),
     "Exchange": ("import", "export"),
@@ -30,6 +30,7 @@ COMMANDS = {
     "run": ("planning", "run"),
     "report": ("reporting", "report"),
     "runs": ("reporting", "runs"),
+    "scenes": ("reporting", "scenes"),
     "verify": ("planning", "verify"),
     "execute": ("planning", "execute"),
     "serve": ("asking", "serve"),
@@ -72,12 +73,13 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command with a name; for an unknown name, the error suggests the most similar name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from confab.guessing import chosen
+            from confab.hints import COMMANDS as WORDS
+            from confab.hints import meant
             from confab.reasoner.names import nearest
 
             helps = {name: getattr(self.get_command(ctx, name), "help", "") or "" for name in COMMANDS}
-            meant = chosen(args[0], helps)
-            hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], COMMANDS)
+            right = meant(args[0], helps, WORDS)
+            hint = f"; did you mean '{right}'?" if right else nearest(args[0], COMMANDS)
             raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
         return super().resolve_command(ctx, args)
 

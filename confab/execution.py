@@ -24,7 +24,7 @@ from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import nearest, right_names
+from confab.reasoner.names import RightNames, nearest, right_names
 from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
@@ -295,9 +295,9 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
 # ------------------------------------------------------------------------------------------------------------- at the front desk
 
 
-@right_names("an execution", "confab.hints", "EXECUTION")
+@right_names("an execution", "confab.hints", "EXECUTION", "scene.execute() or scene.read_episode(FILE)")
 @dataclass(frozen=True)
-class Execution:
+class Execution(metaclass=RightNames):
     """The result of executing a task: an episode, and the scene in which it happened."""
 
     scene: Known

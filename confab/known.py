@@ -16,7 +16,7 @@ from confab.accepting import Facts, Stated, several, sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
-from confab.reasoner.names import GUESSING, Named, Names, nearest, right_names
+from confab.reasoner.names import GUESSING, Named, Names, RightNames, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.reading.problem import Reading, read, read_names
 from confab.reasoner.symbols import Behavior, Fact, Problem
@@ -35,9 +35,9 @@ log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
 
 
-@right_names("a scene", "confab.hints", "SCENE")
+@right_names("a scene", "confab.hints", "SCENE", "confab.load(SCENE)")
 @dataclass
-class Known:
+class Known(metaclass=RightNames):
     """A scene that can be read, queried and edited. The subclass `confab.scene.Scene` adds planning and acting.
 
     Attributes

@@ -34,7 +34,7 @@ from confab.reasoner.memory.experience import (
 from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
-from confab.reasoner.names import Names, right_names
+from confab.reasoner.names import Names, RightNames, right_names
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ SHOWN = 3
 
 @right_names("a memory", "confab.hints", "MEMORY", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
 @dataclass
-class Memory:
+class Memory(metaclass=RightNames):
     """A confabulation memory: experience from planning and execution.
 
     Attributes

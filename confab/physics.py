@@ -15,7 +15,7 @@ from confab.planner.plan import Plan
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
-from confab.reasoner.names import right_names
+from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.symbols import FALSE, Fact, State
 from confab.sim.engine import Engine
 from confab.sim.rollouts import Done, Trial, wilson
@@ -55,9 +55,9 @@ class ReportJson(TypedDict):
     rollouts: list[SeenRolloutJson]
 
 
-@right_names("a report", "confab.hints", "REPORT")
+@right_names("a report", "confab.hints", "REPORT", "scene.verify() or scene.read_report(FILE, PLAN)")
 @dataclass(frozen=True)
-class Report:
+class Report(metaclass=RightNames):
     """The report of a verification: the rollouts of a plan, and the film of the first rollout.
 
     A rollout is good if every primitive had its expected effects and no final observation contradicts a goal. `trusted` has the

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,7 +24,7 @@ from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import right_names
+from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
@@ -290,9 +290,9 @@ AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 """The notations of a step of a plan, as `Result.why` describes them."""
 
 
-@right_names("a result", "confab.hints", "RESULT")
+@right_names("a result", "confab.hints", "RESULT", "scene.plan()")
 @dataclass
-class Result:
+class Result(metaclass=RightNames):
     """The result of planning: the outcome, with the plan if one was found, and the scene of the call.
 
     `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
@@ -300,12 +300,12 @@ class Result:
     task.
     """
 
-    scene: Known
+    scene: Known = field(compare=False)
     problem: Problem
     outcome: Outcome
     seconds: dict[str, float]
     queries: int = 0
-    part: Reading | None = None
+    part: Reading | None = field(default=None, compare=False)
     goals: tuple[str, ...] = ()
     timed: TimedPlan | None = None
 

@@ -22,6 +22,8 @@ from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
+from confab.reasoner.vocabulary import CORE
+from confab.table import Table
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
     from confab.why import Account
 
 
-@right_names("a scene", "confab.hints", "SCENE")
+@right_names("a scene", "confab.hints", "SCENE", "confab.load(SCENE)")
 class Scene(Known):
     """A scene: an ontology file with all its imports.
 
@@ -383,3 +385,17 @@ def scenes() -> list[str]:
     True
     """
     return list(ontology.scenes())
+
+
+def described() -> Table:
+    """Return a table of the shipped scenes: name, title, description, and whether physics can verify plans for the scene."""
+    import pyoxigraph as ox
+
+    terms, rows = "http://purl.org/dc/terms/", []
+    for name, file in ontology.scenes().items():
+        said: dict[str, str] = {}
+        for quad in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
+            said.setdefault(quad.predicate.value, getattr(quad.object, "value", ""))
+        physics = "symbols only" if said.get(CORE + "symbolicOnly") == "true" else "physics"
+        rows.append((name, said.get(terms + "title", ""), physics, said.get(terms + "description", "")))
+    return Table(("scene", "title", "verified by", "description"), tuple(rows))

@@ -197,13 +197,13 @@ def _usage(error: Any) -> str:
         sys.exit(MISUSE)
     command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from confab.guessing import chosen
+        from confab.hints import OPTIONS, meant
 
         options = [each for each in error.ctx.command.params if isinstance(each, click.Option)]
         helps = {one: each.help or "" for each in options for one in each.opts if one.startswith("--")}
-        meant = chosen(error.option_name, helps)
-        if meant:  # click suggests only options of similar spelling
-            return f"no such option '{error.option_name}'. Did you mean '{meant}'?; see {command} --help"
+        right = meant(error.option_name, helps, OPTIONS)
+        if right:  # click suggests only options of similar spelling
+            return f"no such option '{error.option_name}'. Did you mean '{right}'? See {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 

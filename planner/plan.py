@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol, overload
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
-from confab.reasoner.names import right_names
+from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Step:
     level: int
     behavior: str
     arguments: tuple[str, ...]
-    bindings: Mapping[str, str] = field(default_factory=dict)
+    bindings: Mapping[str, str] = field(default_factory=dict, hash=False)
     rank: float | None = None
     steps: tuple[Step, ...] = ()
 
@@ -64,9 +64,9 @@ class Step:
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
-@right_names("a plan", "confab.planner.forms", "PLAN")
+@right_names("a plan", "confab.planner.forms", "PLAN", "scene.plan() or scene.read_plan(FILE)")
 @dataclass(frozen=True, repr=False)
-class Plan(Sequence[Step]):
+class Plan(Sequence[Step], metaclass=RightNames):
     """A tree of steps that leads from the initial state to the goal.
 
     As a sequence, a plan contains the steps of its first level.

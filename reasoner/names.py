@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABCMeta
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
@@ -9,7 +10,7 @@ from functools import wraps
 from importlib import import_module
 from inspect import getattr_static, signature
 from types import FunctionType
-from typing import NoReturn, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, NoReturn, ParamSpec, TypeVar
 
 C = TypeVar("C", bound=type)
 P = ParamSpec("P")
@@ -105,8 +106,26 @@ TYPED = 0.85
 """Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
 FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong one."""
+CONSTRUCTORS = (
+    "load loads open read parse make create new build from_file from_json from_dict from_path from_graph from_pddl from_ttl "
+    "from_text from_string from_rdf from_owl from_yaml"
+)
+"""Names under which users look for the call that creates an object."""
 GUESSING: list[str] = []
 """Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one."""
+
+
+class RightNames(ABCMeta):
+    """Metaclass of classes with `right_names`: errors for unknown attributes of the class name the call that creates an object."""
+
+    if not TYPE_CHECKING:  # type checkers report wrong names by themselves
+
+        def __getattr__(cls, name: str) -> NoReturn:
+            """Raise `WrongNameError` with the name that was probably meant."""
+            if name.startswith("_"):
+                raise AttributeError(f"type object '{cls.__name__}' has no attribute '{name}'")
+            kind, hints = cls._creation
+            raise WrongNameError(f"the class of {kind}", name, cls, hints)
 
 
 def right_names(kind: str, module: str = "", table: str = "", made: str = "") -> Callable[[C], C]:
@@ -119,7 +138,8 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
     module, table : str
         Module and name of a mapping from correct names to words with the same meaning; imported when a name is wrong.
     made : str, optional
-        The call that creates such an object; the error of the constructor without arguments mentions it.
+        The call that creates such an object. Errors of the constructor without arguments, and errors for names such as
+        ``from_file`` of the class, mention it.
     """
 
     def hints() -> Mapping[str, str]:
@@ -130,6 +150,7 @@ def right_names(kind: str, module: str = "", table: str = "", made: str = "") ->
         def lacking(self: object, name: str) -> NoReturn:
             raise WrongNameError(kind, name, type(self), hints)
 
+        type.__setattr__(cls, "_creation", (kind, lambda: {made: CONSTRUCTORS, **hints()}))
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
         if made:
             begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class

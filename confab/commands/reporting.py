@@ -1,4 +1,4 @@
-"""The commands report and runs, which write pages of saved plans, executions, verifications and runs."""
+"""The commands report, runs and scenes: pages of saved results, kept runs, and the shipped scenes."""
 
 from __future__ import annotations
 
@@ -82,4 +82,15 @@ def runs(folder: Path, names: tuple[str, ...], out: Path | None, as_json: bool) 
         told(out, f"{len(found)} runs")
         return
     table = compared(found, *names) if names else listed(found)
+    show_result(table.records() if as_json else table)
+
+
+@command(epilog=examples("scenes"))
+@AS_JSON
+@QUIET
+def scenes(as_json: bool) -> None:
+    """List the shipped scenes with their titles."""
+    from confab.scene import described
+
+    table = described()
     show_result(table.records() if as_json else table)

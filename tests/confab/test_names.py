@@ -43,10 +43,32 @@ def test_each_wrong_name_of_a_scene_a_result_and_the_module_says_the_right_one(
 
 def test_right_names_are_what_the_hints_say(scene: confab.Scene, result: confab.Result) -> None:
     for there, hints in ((scene, SCENE), (result, RESULT)):
-        for right in hints:
+        for right in (one for one in hints if not one.startswith("confab.")):
             found: object = there
             for name in right.partition("(")[0].split("."):
                 found = getattr(found, name)
+
+
+@pytest.mark.parametrize(
+    ("source", "right"),
+    [
+        ("from confab import Planner", r"use confab.load\(SCENE\).plan\(\)"),
+        ("from confab import load, solve", r"use confab.load\(SCENE\).plan\(\)"),
+        ("confab.Scene.load('x')", r"use confab.load\(SCENE\)"),
+        ("confab.Scene.from_file('x')", r"use confab.load\(SCENE\)"),
+        ("confab.Result.from_json('x')", r"use scene.plan\(\)"),
+        ("Plan.from_json('x')", r"use scene.plan\(\) or scene.read_plan\(FILE\)"),
+        ("confab.Memory.open('x')", r"confab.Memory.load\(FILE\)"),
+    ],
+)
+def test_a_wrong_import_or_class_method_names_the_call_that_creates_the_object(source: str, right: str) -> None:
+    with pytest.raises((ImportError, AttributeError), match=right):
+        exec(source)
+
+
+def test_steps_are_hashable_and_a_result_equals_its_copy(result: confab.Result) -> None:
+    assert len(set(result.plan)) == len(result.plan)
+    assert pickle.loads(pickle.dumps(result)) == result
 
 
 def test_a_misspelt_name_says_the_most_similar_one(scene: confab.Scene) -> None:
@@ -157,7 +179,13 @@ def test_a_wrong_access_to_a_scene_or_its_objects_says_the_right_one(scene: conf
 
 @pytest.mark.parametrize(
     ("line", "right"),
-    [(["solve"], "plan"), (["simulate"], "verify"), (["verify", "x", "--n-episodes", "3"], "--rollouts")],
+    [
+        (["ls"], "scenes"),
+        (["init"], "new"),
+        (["plan", "x", "--format", "json"], "--json"),
+        (["simulate"], "verify"),
+        (["verify", "x", "--n-episodes", "3"], "--rollouts"),
+    ],
 )
 def test_the_command_line_understands_commands_and_options_by_their_words(line: list[str], right: str) -> None:
     done = subprocess.run([sys.executable, "-m", "confab", *line], capture_output=True, text=True, check=False)
