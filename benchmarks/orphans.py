@@ -166,7 +166,7 @@ def marked(mark: str) -> list[int]:
                 if f"{MARK}={mark}".encode() in (place / "environ").read_bytes():
                     state = (place / "stat").read_text().rpartition(")")[2].split()[0]
                     found += [int(place.name)] * (state != "Z")
-            except OSError:  # it has just ended
+            except OSError:  # the process has just ended
                 continue
     return found
 
@@ -176,7 +176,7 @@ def below(process: int) -> set[int]:
     found: set[int] = set()
     try:
         children = [task.read_text().split() for task in Path(f"/proc/{process}/task").glob("*/children")]
-    except OSError:  # it has just ended
+    except OSError:  # the process has just ended
         return found
     for child in (int(number) for numbers in children for number in numbers):
         with suppress(OSError):

@@ -296,7 +296,7 @@ def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:
     """Return the quads and the prefixes of a memory file."""
     if not memory.is_file():
         raise KnowledgeError(f"{memory}: no such memory file")
-    Memory.load(memory)  # its error message is more precise than the parser's
+    Memory.load(memory)  # `Memory.load` has more precise error messages than the parser
     parser = ox.parse(path=str(memory), format=ox.RdfFormat.TURTLE, base_iri=memory.resolve().as_uri())
     quads = list(parser)
     return quads, dict(parser.prefixes)

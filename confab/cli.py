@@ -17,7 +17,7 @@ from click.exceptions import Exit
 from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
-GROUPS = {  # in the order of the help
+GROUPS = {  # in the order in which the help lists them
     "Plan and act": ("plan", "run", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
     "Look": ("scenes", "report", "runs"),

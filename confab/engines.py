@@ -73,7 +73,7 @@ def plan_by_engine(
         problem.
     level : int, optional
     seconds : float, optional
-        Time limit of the whole call; by default `ENGINE_SECONDS`. The engine may be stopped as soon as a plan file is complete.
+        Time limit of the whole call; by default `ENGINE_SECONDS`. A plan that the engine writes within the limit is used.
 
     Raises
     ------

@@ -123,7 +123,7 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
     Raises
     ------
     KnowledgeError
-        There is no run of such a name.
+        A run with one of these names doesn't exist.
     """
     by_name = _by_name(those, (one, other))
     return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))
@@ -160,7 +160,7 @@ def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) ->
     Raises
     ------
     KnowledgeError
-        There is no run of such a name.
+        A run with one of these names doesn't exist.
     """
     from confab.page.frozen import page_html
 

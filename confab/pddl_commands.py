@@ -64,7 +64,8 @@ def exported(problem: Problem, level: int | None) -> Exported:
 
     Raises
     ------
-    KnowledgeError The scene has no such level, or no level at all.
+    KnowledgeError
+        The scene has no such level, or no level at all.
     """
     levels = problem.domain.levels
     if not levels:

@@ -96,7 +96,7 @@ class PlanOptions:
 
     @property
     def limit(self) -> float | Deadline | None:
-        """The time limit in seconds; the default for the optimal search is `OPTIMAL_SECONDS`, otherwise there is no limit."""
+        """The time limit of the call; only the optimal search has a default, which is `OPTIMAL_SECONDS`."""
         return OPTIMAL_SECONDS if self.time_limit is None and self.strategy == "optimal" else self.time_limit
 
 

@@ -10,7 +10,7 @@ A GET of ``/page.json?after=VERSION`` is answered with status 204 if no newer ve
 
 The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), which
 form lanes with growing time limits. A query that exceeds the limit of a lane is started again in the next lane with lower
-priority. Therefore short queries never wait for long queries. A query is cancelled when its client disconnects. Requests from
+priority. Short queries never wait for long queries. A query is cancelled when its client disconnects. Requests from
 other machines and from web pages of other sites are refused.
 """
 
@@ -411,7 +411,7 @@ def preferred(accept: str, offered: Sequence[str]) -> str:
 
 
 class Connection(H11Protocol):
-    """A connection that is dropped if a request doesn't arrive completely within `SLOWEST` seconds.
+    """A connection that is dropped if a request isn't received, or an answer isn't delivered, within `SLOWEST` seconds.
 
     If more than `MOST` connections are open, the connection that has waited longest for a request is dropped.
     """

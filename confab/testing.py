@@ -55,7 +55,7 @@ class Conformance:
 
     @property
     def passed(self) -> bool:
-        """Whether no check failed."""
+        """Whether every check passed or was impossible."""
         return all(check.passed is not False for check in self.checks)
 
     def __getitem__(self, name: str) -> Check:

@@ -489,7 +489,7 @@ def _fact_told(
     ]
     try:
         symbol, value = parse_fact(problem, fact)
-    except KnowledgeError:  # the whole scene may have an individual that the problem hasn't
+    except KnowledgeError:  # the whole scene may have an individual that the problem lacks
         problem, outcome, labels = replan([*goals, fact])
         symbol, value = parse_fact(problem, fact)
     else:

@@ -173,7 +173,7 @@ def run(
     gui: bool,
     time_limit: float | None,
 ) -> None:
-    """Validate, plan, verify in physics, learn and report."""
+    """Validate a scene, plan, verify the plan, learn and report."""
     from confab.history import new_folder
     from confab.running import Job
     from confab.running import run as run_all
