@@ -21,6 +21,8 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
+# Each core takes its half of the tests, file by file, and what the other hasn't begun; the slowest tests are listed at the end.
+SHARED := -n auto --dist worksteal --durations 10
 # Compiled modules are kept, whatever the environment says: tests start hundreds of processes.
 export PYTHONDONTWRITEBYTECODE :=
 
@@ -33,13 +35,13 @@ demo: $(VENV)/installed
 	@$(BIN)/confab run --memory confab-out/run-memory.ttl
 
 test: $(VENV)/installed$(if $(CI),-bench)
-	@$(BIN)/python -m pytest -n auto
+	@$(BIN)/python -m pytest $(SHARED)
 
 check: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest $(SHARED)
 
 vocabulary: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.vocabulary

@@ -219,14 +219,14 @@ def test_the_same_input_gives_the_same_plan_in_any_process() -> None:
     code = (
         "from worlds.families import family\nfrom confab.planner.hierarchical.planner import plan\n"
         "for f in ('served', 'full', 'blocked'):\n"
-        "    print([(str(s), sorted(s.bindings.items())) for s in plan(family(f, 12)).plan.walk()])"
+        "    print([(str(s), sorted(s.bindings.items())) for s in plan(family(f, 6)).plan.walk()])"
     )
     root = Path(__file__).parents[2]
     printed = {
         subprocess.run(
             [sys.executable, "-c", code], cwd=root, env={"PYTHONHASHSEED": seed}, capture_output=True, check=True
         ).stdout
-        for seed in ("0", "1", "2")
+        for seed in ("0", "1")
     }
     assert len(printed) == 1
 

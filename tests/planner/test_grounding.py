@@ -164,7 +164,7 @@ def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem, apar
 
 
 @given(problems(), flags)
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_every_operator_is_what_the_behaviour_does(problem: Problem, apart: bool) -> None:
     task = grounded(problem, apart)
     if not isinstance(task, Task):

@@ -27,7 +27,7 @@ def course(problem: Problem) -> list[State]:
 
 @pytest.mark.parametrize("number", (2, 16, 20, 26))
 def test_from_any_state_of_a_plan_the_rest_is_planned_soon(number: int) -> None:
-    problem = family("served", 8)
+    problem = family("served", 5)
     here = replace(problem, initial=course(problem)[number])
     outcome = plan(here, limits=Limits(expansions=10_000))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
@@ -35,7 +35,7 @@ def test_from_any_state_of_a_plan_the_rest_is_planned_soon(number: int) -> None:
 
 
 def test_steps_of_a_lower_level_that_bring_something_to_rest_are_told() -> None:
-    problem = family("served", 8)
+    problem = family("served", 5)
     held = next(state for state in course(problem) if "in_hand" in state.values())
     outcome = plan(replace(problem, initial=held))
     assert outcome.plan is not None

@@ -70,7 +70,7 @@ CONDITIONS = st.recursive(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(st.lists(CONDITIONS, max_size=4), st.lists(SIMPLE, max_size=1))
 def test_folded_conditions_hold_in_the_same_states_among_those_where_the_known_ones_hold(
     conditions: list[Condition], known: list[Condition]

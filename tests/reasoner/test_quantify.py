@@ -50,7 +50,7 @@ def test_the_query_can_be_read_and_run() -> None:
     assert len(graph.select(text)) == 8
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(text=worlds())
 def test_query_and_enumeration_give_the_same_behaviours_in_any_world(text: str) -> None:
     with TemporaryDirectory() as folder:

@@ -44,7 +44,7 @@ def solvable(problem: Problem, most: int) -> bool | None:
     return False
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(text=worlds())
 def test_the_slice_has_a_plan_exactly_if_the_world_has_one(text: str) -> None:
     with TemporaryDirectory() as folder:
