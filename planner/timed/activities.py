@@ -1,7 +1,7 @@
-"""The facts that each step of a sequence reads and changes at its beginning, throughout, and at its end.
+"""The facts that each step of a sequence reads and changes at its begin, throughout its duration, and at its end.
 
-The sequence consists of steps, or of begins and ends of steps if some steps are possible only during others. It is simulated
-once on symbols, and the facts that each condition reads are recorded.
+The sequence consists of whole steps, or of begins and ends of steps if some steps are possible only during other steps. The
+sequence is simulated once on symbols, and the simulation records the facts that each condition reads.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Key: TypeAlias = "tuple[str, object]"
 
 
 class EventKind(Enum):
-    """An event of a sequence: a step begins, ends, or is done as a whole."""
+    """The kind of an event in a sequence: a step begins, a step ends, or a whole step is executed."""
 
     BEGIN = "begin"
     END = "end"
@@ -32,23 +32,26 @@ class EventKind(Enum):
 
 
 StepEvent: TypeAlias = "tuple[int, EventKind]"
-"""The number of a step, and its event."""
+"""The number of a step, and the kind of the event."""
 
 
 class InapplicableError(Exception):
-    """A step isn't applicable at its position in the sequence; the message says which and why."""
+    """A step isn't applicable at its position in the sequence; the message names the step and the reason."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """The reads and the changes (cell, old and new value) at one moment or throughout."""
+    """The facts that a step reads and the cells that it changes, at one moment or throughout its duration.
+
+    `writes` maps each changed cell to the old and the new value.
+    """
 
     reads: frozenset[Key] = frozenset()
     writes: Mapping[Cell, tuple[str, str]] | None = None
 
     @property
     def changes(self) -> Mapping[Cell, tuple[str, str]]:
-        """The cells that change, each with its value before and after."""
+        """The cells that change, each with the values before and after."""
         return self.writes or {}
 
 
@@ -63,11 +66,11 @@ class Activity:
     middle: Access
     end: Access
     at: Fraction | None = None
-    """The fixed time of an event."""
+    """The fixed time of a step that is an external event, in seconds; None for other steps."""
 
     @property
     def accesses(self) -> tuple[Access, Access, Access]:
-        """The accesses at the begin, throughout and at the end."""
+        """The accesses at the begin, throughout the duration, and at the end."""
         return self.begin, self.middle, self.end
 
 
@@ -107,9 +110,9 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEve
     ----------
     problem : Problem
     steps : sequence of Step
-        Without sub-steps.
+        Steps without sub-steps.
     events : iterable of StepEvent
-        Each step as a whole, or its begin and later its end.
+        The events of each step: either the whole step, or the begin and later the end.
 
     Raises
     ------
@@ -127,12 +130,12 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEve
 
 
 def in_sequence(steps: Sequence[Step]) -> Iterator[StepEvent]:
-    """Yield the events of steps that are executed one after another."""
+    """Yield the events of whole steps that are executed one after another."""
     yield from ((number, EventKind.WHOLE) for number in range(len(steps)))
 
 
 class _Course:
-    """Steps simulated on symbols."""
+    """The simulation of a sequence of steps on symbols."""
 
     def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
         self.problem, self.steps = problem, steps
@@ -153,7 +156,7 @@ class _Course:
         return self.pieces[name]
 
     def begin(self, number: int) -> None:
-        """Begin a step: test its conditions, make its first effects, and register the later ones."""
+        """Begin a step: test its conditions, make the effects at its begin, and record the effects at its end."""
         step, pieces = self.steps[number], self.piece(number)
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
@@ -164,13 +167,13 @@ class _Course:
         self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
 
     def end(self, number: int) -> None:
-        """End a step: make the registered effects, and test its last conditions."""
+        """End a step: make the recorded effects, test the conditions at its end, and make the effects at its end."""
         for cell, (_, after) in self.made[number]["middle"].changes.items():
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
 
     def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
-        """Execute a part of a step, or only return its changes."""
+        """Return the reads and changes of a part of a step; make the changes if `put`."""
         if not piece.preconditions and not piece.effects and not piece.amounts:
             return Access()
         facts = self.facts

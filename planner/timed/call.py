@@ -1,4 +1,4 @@
-"""From a plan to a timed plan: the necessary order, a schedule, the actors of each turn, and the check."""
+"""Scheduling of a plan: the necessary order of its primitives, a schedule, the actors of each turn, and the check."""
 
 from __future__ import annotations
 
@@ -29,29 +29,31 @@ from confab.planner.validation import Cell, validate
 from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
-"""Maximum number of seconds for a schedule if no limit is given; exchanges of turns are also bounded by their work."""
+"""Default time limit of scheduling, in seconds; the work of exchanging turns is also limited."""
 
 
 @dataclass(frozen=True)
 class Timed:
-    """The result of scheduling: a timed plan that the checker accepts, or the reason that there is none."""
+    """The result of scheduling: a timed plan that the checker accepts, or the reason why no timed plan was found."""
 
     plan: TimedPlan | None = None
     reason: Reason | None = None
 
 
 def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, shorten: bool = True) -> Timed:
-    """Return a plan in time for the goals of a plan; its steps may be others, by other actors and in another order.
+    """Return a timed plan for the goals of a plan.
+
+    The timed plan may have other steps than the given plan, other actors, and another order.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        A plan of it.
+        A plan of the problem.
     seconds : float, optional
-        Limit of the search for a short schedule.
+        Time limit of the search for a short schedule.
     shorten : bool
-        Whether a short schedule is wanted; otherwise the first one is returned that keeps all windows and deadlines.
+        Whether to search for a short schedule; otherwise return the first schedule that keeps all windows and deadlines.
     """
     from confab.planner.timed.sharing import evenly_shared, shared
 
@@ -79,19 +81,19 @@ def in_time(
     separation: Fraction = Fraction(0),
     events: Sequence[StepEvent] | None = None,
 ) -> Timed:
-    """Return a plan in time.
+    """Return a timed plan with the steps of a plan.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        A plan of it.
+        A plan of the problem.
     seconds : float, optional
-        Limit of the search for a short schedule.
+        Time limit of the search for a short schedule.
     separation : Fraction
-        The time between conflicting events, in seconds: PDDL's epsilon.
+        The minimum time between conflicting events, in seconds (epsilon in PDDL).
     events : sequence of StepEvent, optional
-        The order in which the primitives begin and end; by default they are executed one after another.
+        The order of the begins and ends of the primitives; by default the primitives are executed one after another.
     """
     until = perf_counter() + (SECONDS if seconds is None else seconds)
     steps = plan.primitives
@@ -122,7 +124,7 @@ def in_time(
             if not faults:
                 return Timed(timed)
         if not choices.of and until:
-            until = 0.0  # the turns of the plan, in its order
+            until = 0.0  # keeps the turns of the plan in the plan's order
             continue
         if not choices.of:
             said = faults[0].text if timed is not None else "its steps have no order"
@@ -131,7 +133,10 @@ def in_time(
 
 
 def _late(problem: Problem, order: Order, network: Network, choices: Choices, found: CandidateSchedule) -> Reason:
-    """Return which times the latest activity of a schedule misses: windows of individuals, a deadline, or a fixed time."""
+    """Return the reason why a schedule is late.
+
+    The reason names the times that the latest activity misses: windows of individuals, deadlines, or a fixed time.
+    """
     i, times = found.begins.latest, problem.times or Times()
     one = order.activities[i]
     begin = found.begins.begins[i] * network.unit
@@ -168,7 +173,10 @@ def _written(window: tuple[Fraction, Fraction | None]) -> str:
 def _timed(
     problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
 ) -> TimedPlan | None:
-    """Return a schedule as a timed plan with the actors of its turns; None if its levels have no sequential order."""
+    """Return a schedule as a timed plan with the actors of its turns.
+
+    Return None if the steps of some level have no sequential order.
+    """
     renamed: dict[int, dict[str, str]] = {}
     for resource, line in enumerate(found.turns):
         for own, number in line:
@@ -202,7 +210,7 @@ def _timed(
 
 
 def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins) -> list[int]:
-    """Return the slack of each activity: the time by which it could begin later without a longer makespan."""
+    """Return the slack of each activity: the time by which the activity can begin later without a longer makespan."""
     latest = [begins.makespan - lasts for lasts in durations]
     order = sorted(range(len(latest)), key=lambda i: -begins.begins[i])
     for _ in range(len(latest)):
@@ -218,9 +226,9 @@ def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], 
 
 
 def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
-    """Return a timed plan whose tree is in the order of its schedule, such that its steps could also be executed in sequence.
+    """Return a timed plan whose steps are sorted in the order of the schedule, so that they form a valid plan in sequence.
 
-    If there is no such order, the tree's own order is kept if it is valid; otherwise None is returned.
+    If the sorted steps aren't a valid plan, return the given timed plan; return None if its steps aren't a valid plan either.
     """
     own = None if validate(problem, timed.plan) else timed
     numbers = {slot.step.path: i for i, slot in enumerate(timed.slots)}

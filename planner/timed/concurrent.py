@@ -1,16 +1,14 @@
-"""Plans that need concurrency: the begins and ends of steps as operators of the flat core, with a simple temporal network.
+"""Plans that require concurrency: the begins and the ends of steps are operators of a grounded task.
 
-A behaviour that gives a symbol a value only for its own duration is cut into its begin and its end. Other behaviours are cut
-only if no plan is found otherwise. A first search ignores durations, and its plan is scheduled. If the plan has no schedule, a
-second search keeps a temporal network of the events since the last time at which no step was running, and drops nodes in which
-a step can't end in time.
+Some behaviours give a symbol a value only during their execution. The planner cuts such a behaviour into a begin and an end. Other
+behaviours are cut only if the planner finds no plan without these cuts. A first search ignores durations, and its plan is
+scheduled. If the plan has no schedule, a second search keeps a simple temporal network of events. The network contains the events
+since the last time at which no step was running (the *window*). The second search drops nodes in which a step can't end in time.
+The heuristic is the length of a relaxed plan plus the number of running steps.
 
-state       bits of the cut task, as in `confab.planner.grounded.best_first` window the events since the last time at which no
-            step was running, each with its reads and writes
-h           relaxed-plan heuristic of a state, and one for each running step
-
-Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008; Coles et al., "Extending the use of
-inference in temporal planning as forwards search", ICAPS 2009 (steps that need no cut).
+The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The distinction
+of behaviours that need no cut follows Coles et al., "Extending the use of inference in temporal planning as forwards search",
+ICAPS 2009.
 """
 
 from __future__ import annotations
@@ -58,22 +56,22 @@ _Key: TypeAlias = "tuple[int, tuple[int, ...]]"
 
 
 def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -> tuple[Outcome, Timed]:
-    """Return a plan with required concurrency, in time.
+    """Return a timed plan whose steps may have to run concurrently.
 
     Parameters
     ----------
     problem : Problem
-        Of one level.
+        A problem with one level.
     limits : Limits
     separation : Fraction
-        The time between conflicting events, in seconds.
+        The minimum time between conflicting events, in seconds.
 
     Returns
     -------
     Outcome
-        Its plan has the steps in the order of their begins; the status is never unsolvable.
+        The outcome with the steps in the order of their begins; the status is never unsolvable.
     Timed
-        The plan in time, if there is one.
+        The timed plan, or the reason why no timed plan was found.
     """
     began = perf_counter()
 
@@ -110,10 +108,10 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
 
 @dataclass(frozen=True)
 class _Cut:
-    """A problem with some behaviours cut into begin and end.
+    """A problem in which some behaviours are cut into a begin and an end.
 
-    If `guarded`, no other behaviour may change or require a symbol that a cut behaviour requires throughout, between its begin
-    and end.
+    If `guarded`, a cut behaviour reserves the symbols that it requires throughout its duration. No other behaviour may change or
+    reserve a reserved symbol.
     """
 
     whole: Problem
@@ -122,7 +120,7 @@ class _Cut:
 
     @cached_property
     def problem(self) -> Problem:
-        """The problem with begins and ends in place of these behaviours."""
+        """The problem with begins and ends instead of the cut behaviours."""
         domain = self.whole.domain
         situations, behaviors = dict(domain.situations), dict[str, Behavior]()
         for name, behavior in domain.behaviors.items():
@@ -143,7 +141,7 @@ class _Cut:
         return replace(self.whole, domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}))
 
     def held(self) -> frozenset[str]:
-        """Return the situation types that cut behaviours require throughout and that others change."""
+        """Return the situation types that cut behaviours require throughout and that other behaviours change."""
         behaviors = self.whole.domain.behaviors
         return frozenset(
             situation
@@ -153,12 +151,15 @@ class _Cut:
         )
 
     def asked(self, name: str) -> list[tuple[str, tuple[str, ...]]]:
-        """Return the symbols that a cut behaviour requires throughout."""
+        """Return the symbols that a cut behaviour requires throughout its duration."""
         asked = timing_of(self.whole.domain.behaviors[name]).asked(Span.THROUGHOUT)
         return [(c.situation, c.arguments) for c in asked if isinstance(c, ValueCondition)]
 
     def guard(self, behavior: Behavior) -> Behavior:
-        """Return a behaviour that changes no reserved symbol; a cut behaviour reserves symbols from its begin to its end."""
+        """Return a behaviour with additional preconditions, so that it changes no reserved symbol.
+
+        The begin of a cut behaviour reserves symbols, and its end releases them.
+        """
         name, _, part = behavior.name.partition("@")
         held = self.held()
         own = [cell for cell in self.asked(name) if cell[0] in held] if part else []
@@ -174,7 +175,7 @@ class _Cut:
         )
 
     def parts(self, behavior: Behavior, running: SituationType) -> Iterator[Behavior]:
-        """Yield the begin and the end of a behaviour as behaviours."""
+        """Yield the begin and the end of a behaviour as two behaviours."""
         timing, its = timing_of(behavior), tuple(parameter.name for parameter in behavior.parameters)
         begun = [(Span.START, e) for e in timing.made(Span.START)]
         asked, _ = projected([one for one in timing.conditions if one[0] is not Span.END], begun)
@@ -187,7 +188,7 @@ class _Cut:
         yield replace(ended, cost=0.0, price=None)
 
     def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[StepEvent]]:
-        """Return the steps of a sequence of operators, numbered in the order of their begins, and the events."""
+        """Return the steps of a sequence of operators, in the order of their begins, and the events of the steps."""
         steps: list[Step] = []
         events: list[StepEvent] = []
         open_: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -219,7 +220,7 @@ def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effec
 
 @dataclass(frozen=True)
 class _Event:
-    """An event of a window: the number of its step, whether it begins or ends it, its reads and its writes."""
+    """An event of a window: the step's number, whether the step begins or ends, and the symbols that are read and changed."""
 
     step: int
     begins: bool
@@ -230,18 +231,18 @@ class _Event:
 
 @dataclass(frozen=True)
 class _Node:
-    """A state with its path: the events since no step was running, and the operators that will end the running steps."""
+    """A search node: a state, the events of the window, the durations of the steps, and the running steps."""
 
     state: int
     window: tuple[_Event, ...]
     lasts: tuple[int, ...]
     running: Mapping[int, int]  # the operator that ends a step, and the step's number in the window
-    held: int  # bits required throughout by running steps
+    held: int  # bits that running steps require throughout their durations
 
 
 @dataclass
 class _Finder:
-    """Searches sequences of operators of a cut task."""
+    """The search for sequences of operators of a cut task."""
 
     cut: _Cut
     task: Task
@@ -274,23 +275,26 @@ class _Finder:
 
     @cached_property
     def facts(self) -> Facts:
-        """The initial state, by which durations are estimated."""
+        """The facts of the initial state, which determine the durations during the search."""
         return Facts(self.cut.whole, self.cut.whole.initial)
 
     def without_durations(self, limits: Limits) -> Iterator[list[int]]:
-        """Yield a sequence of operators that leads to the goal with no step running, if a search without durations finds one."""
+        """Yield a sequence of operators from a search that ignores durations, if the search finds a plan.
+
+        No step is running at the end of the sequence.
+        """
         first = search(self.task, limits, limits.end(FIRST))
         self.counts.add(first.counts)
         if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
             yield whole
 
     def ending(self, operator: int) -> int | None:
-        """Return the operator that ends the step begun by an operator; None if it can never end."""
+        """Return the operator that ends a step which the given operator begins; None if the step can't end."""
         name, arguments = self.named[operator]
         return self.end_of.get((name.partition("@")[0], arguments))
 
     def completed(self, operators: list[int]) -> list[int] | None:
-        """Return operators followed by the ends of running steps; None if an end is impossible or undoes a goal."""
+        """Return operators followed by the ends of the running steps; None if an end is impossible or undoes a goal."""
         state, _ = self.task.carried_out(self.task.initial, operators)
         if not state & self.marks:
             return operators
@@ -304,7 +308,7 @@ class _Finder:
         return None if state & self.marks else operators
 
     def in_time(self) -> Iterator[list[int]]:
-        """Yield sequences that a search with durations finds, the greedy one first."""
+        """Yield sequences of operators that a search with durations finds."""
         task, evaluate = self.task, heuristic(self.task)
         root = _Node(task.initial, (), (), {}, 0)
         began = evaluate(task.initial)
@@ -343,24 +347,28 @@ class _Finder:
                     break
 
     def key(self, node: _Node) -> _Key:
-        """Return the identity of a node: the state, and the time that each running step has been occupied by others."""
+        """Return the identity of a node: the state, and the `busy` time of each running step."""
         busy = sorted((end, self.busy(node, step)) for end, step in node.running.items())
         return node.state, tuple(number for pair in busy for number in pair)
 
     def busy(self, node: _Node, step: int) -> int:
-        """Return the minimum time between the begin of a step and the events of the window for which its end waits."""
+        """Return the minimum time from the begin of a running step to the events that its end must wait for."""
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
         return 0 if times is None else times[-1]
 
     def ranked(self, evaluation: Evaluation) -> list[int]:
-        """Return the applicable operators of a state, the preferred ones first."""
+        """Return the applicable operators of a state, the preferred operators first."""
         possible = set(evaluation.applicable)
         preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
         return [*preferred, *sorted(possible.difference(preferred))]
 
     def after(self, node: _Node, operator: int) -> _Node | None:
-        """Return the node after an operator; None if it isn't applicable, violates a running step, or delays an end too long."""
+        """Return the node after an operator; None if the node isn't allowed.
+
+        A node isn't allowed if the operator is inapplicable, violates a condition of a running step, or delays the end of a running
+        step too long.
+        """
         task = self.task
         state = task.applied(node.state, operator)
         if state is None or state == node.state:
@@ -394,7 +402,10 @@ class _Finder:
         return found if self.times(found, running) is not None else None
 
     def access(self, operator: int) -> tuple[int, int]:
-        """Return the reads and writes of an operator, a bit per symbol, including symbols that get their old value back."""
+        """Return the symbols that an operator reads, and the symbols that it sets, as two masks.
+
+        The masks include symbols that the operator sets to their old value.
+        """
         if operator not in self.accesses:
             name, arguments = self.named[operator]
             behavior = self.cut.whole.domain.behaviors[name.partition("@")[0]]
@@ -415,7 +426,7 @@ class _Finder:
         return self.accesses[operator]
 
     def bits(self, cells: Iterable[tuple[str, tuple[str, ...]]], terms: Mapping[str, str]) -> int:
-        """Return the bits of symbols with the given individuals."""
+        """Return the mask of symbols in which the individuals in `terms` replace variables."""
         found = 0
         for situation, arguments in cells:
             cell = situation, tuple(terms.get(a, a) for a in arguments)
@@ -424,16 +435,16 @@ class _Finder:
 
     @cached_property
     def accesses(self) -> dict[int, tuple[int, int]]:
-        """The reads and writes of the operators examined so far."""
+        """The stored results of `access`, by operator."""
         return {}
 
     @cached_property
     def places(self) -> dict[tuple[str, tuple[str, ...]], int]:
-        """The bits of symbols in accesses."""
+        """The bit of each symbol that an operator reads or sets."""
         return {}
 
     def held(self, end: int) -> int:
-        """Return the bits that a running step requires throughout: those that its end requires and its begin doesn't change."""
+        """Return the bits that the end of a running step requires; 0 if the behaviour has separate conditions at its end."""
         if end not in self._held:
             whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
             asked = self.task.changes_of(end)[0]
@@ -446,11 +457,10 @@ class _Finder:
         return {}
 
     def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest times of the steps of a window if some running steps end next.
+        """Return the earliest begins of the steps of a window if the running steps in `ending` end next.
 
-        None if one of them would end too late.
-
-        The last entry is the time from the begin of the first ending step to the events that its end waits for.
+        The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
+        a step would end too late.
         """
         events = list(node.window)
         for end, step in ending.items():
@@ -484,7 +494,7 @@ class _Finder:
         came_from: Mapping[_Key, tuple[_Key, int] | None],
         key: _Key,
     ) -> list[int]:
-        """Return the operators that lead to a node."""
+        """Return the operators on the path to a node."""
         found = []
         while (step := came_from[key]) is not None:
             key, operator = step

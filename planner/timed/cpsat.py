@@ -1,8 +1,8 @@
-"""A shorter schedule, and a lower bound, by the constraint solver CP-SAT of OR-Tools (the extra `time`).
+"""Shorter schedules and lower bounds, computed by the constraint solver CP-SAT of OR-Tools (the extra `time`).
 
-Turns are intervals that don't overlap on their resource. A turn that several actors could take is an optional interval on each
-of these actors; exactly one of the intervals is present. The solver chooses the order of turns and their actors; the earliest
-begins follow from these.
+Turns are intervals that don't overlap on their resource. A turn that several actors could take has an optional interval on each
+of these actors; exactly one of the intervals is present. The solver chooses the order of the turns and the actor of each turn.
+The earliest begins of the activities follow from these choices.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from confab.planner.timed.order import BEGIN, END, Order
 from confab.planner.timed.schedules import CandidateSchedule, Choices, TurnId, durations_with, turn_edges
 
 WORK = 8.0
-"""Maximum deterministic time of the solver, about seconds."""
+"""Maximum deterministic time of the solver; the unit is about a second."""
 LARGEST = 2**40
-"""Maximum makespan in units of the network."""
+"""Maximum makespan for which the solver is used, in units of the network."""
 
 
 def shorter(
     order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int, seconds: float
 ) -> tuple[CandidateSchedule, int]:
-    """Return the best schedule that the solver finds, at least as short as a given one, and a lower bound.
+    """Return the best schedule that the solver finds, at least as short as the given schedule, and a lower bound.
 
     Parameters
     ----------
     order : Order
     network : Network
     choices : Choices
-        Of the same order.
+        The choices of actors for the same order.
     found : CandidateSchedule
-        A schedule.
+        A schedule for the same order.
     bound : int
-        A lower bound of the makespan.
+        A lower bound on the makespan.
     seconds : float
-        Limit of the search.
+        Time limit of the solver.
     """
     if seconds <= 0 or found.makespan > LARGEST:
         return found, bound
@@ -51,7 +51,7 @@ def shorter(
     status = solver.Solve(model)
     best = max(bound, round(solver.BestObjectiveBound()))
     if network.tick > network.separation and any(network.least(*edge) > network.separation for edge in network.edges):
-        best = bound  # a gap of one tick in this model could be smaller
+        best = bound  # the model rounds some gaps up to one tick
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         return found, bound if status == cp_model.INFEASIBLE else best
     turns = made.turns(solver)
@@ -62,7 +62,7 @@ def shorter(
 
 
 class _Model:
-    """The variables and constraints of a schedule."""
+    """The variables and the constraints of the solver's model of a schedule."""
 
     def __init__(
         self, model: Any, order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int
@@ -93,7 +93,7 @@ class _Model:
             model.AddHint(variable, hint)
 
     def duration(self, activity: int) -> Any:
-        """Return the duration of an activity: a number, or a variable if it depends on the actor."""
+        """Return the duration of an activity as a number, or as a variable if the duration depends on the actor."""
         its = {m[activity] for m in self.choices.lasts.values() if activity in m} | {self.network.durations[activity]}
         return next(iter(its)) if len(its) == 1 else self.model.NewIntVar(min(its), max(its), "")
 
@@ -153,7 +153,7 @@ class _Model:
                 model.AddNoOverlap([i for i, _ in intervals])
 
     def turns(self, solver: Any) -> list[list[TurnId]]:
-        """Return the turns of each resource in the order of the solution."""
+        """Return the turns of each resource in the order of the solver's solution."""
         found: list[list[TurnId]] = [[] for _ in self.order.resources]
         for key in sorted(self.begin_of, key=lambda one: (solver.Value(self.begin_of[one]), one)):
             able = self.choices.of.get(key, (key[0],))

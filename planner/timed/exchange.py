@@ -1,7 +1,7 @@
 """Alternative actors for the turns of a plan.
 
-The other actor belongs to every class of the one that it replaces, every symbol about it has the same initial value, and the
-static facts (relations, classes, numbers of durations) allow its steps. The checker decides whether the result is a plan.
+An alternative actor belongs to the same classes as the actor of the plan, and their symbols have the same initial values. The
+static facts allow the steps of the alternative actor. The plan checker decides whether the result is a plan.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
     ----------
     problem : Problem
     plan : Plan
-        Its primitives are the steps of the order's activities.
+        A plan whose primitives are the steps of the order's activities.
     order : Order
     network : Network
-        Of the same order; its unit is that of the durations.
+        The network of the same order.
     """
     actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
     every = _of_the_classes(problem, actors)
@@ -63,14 +63,14 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
 
 
 def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, str]]) -> Plan:
-    """Return a plan with other actors of its primitives, and of the steps above them.
+    """Return a plan in which other actors execute the primitives, and in which the steps above name these actors.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-    renamed : mapping of primitive to the names of its actors
-        By the numbers of the primitives.
+    renamed : mapping of int to mapping of str to str
+        The new name of each replaced actor, by the number of the primitive.
     """
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
 
@@ -91,7 +91,10 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
 
 
 def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
-    """Return for each actor the others of all of its classes whose symbols have the same initial values."""
+    """Return, for each actor, the other actors of the same classes whose symbols have the same initial values.
+
+    An actor in the goal has no alternatives.
+    """
     actors = list(actors)
     kinds: dict[str, set[str]] = {
         a: {kind for kind, members in problem.classes.items() if a in members} for a in actors
@@ -114,7 +117,10 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
 
 
 def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
-    """Return a function that tests whether all steps that name an actor lie inside some primitives, or outside of them."""
+    """Return a function that tests whether a turn can have another actor.
+
+    The test requires that each step that names the actor has either all of the actor's primitives in the turn, or none.
+    """
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
     naming: dict[str, list[set[int]]] = defaultdict(list)
     for step in plan.walk():

@@ -1,7 +1,8 @@
-"""A simple temporal network over the begins of activities, and the earliest begins that satisfy it.
+"""A simple temporal network over the begins of activities, and the earliest begins that satisfy the network.
 
-Times are integers in a unit that divides every duration, so that no value is rounded. An edge (i, j, c) says that `j` begins at
-least `c` after `i` begins. Dechter, Meiri and Pearl, "Temporal constraint networks", Artificial Intelligence 49 (1991).
+Times are integers in a unit that divides every duration. Therefore no value is rounded. An arc (i, j, c) means that activity `j`
+begins at least `c` units after activity `i` begins. Simple temporal networks are due to Dechter, Meiri and Pearl, "Temporal
+constraint networks", Artificial Intelligence 49 (1991).
 """
 
 from __future__ import annotations
@@ -22,25 +23,26 @@ ALWAYS: tuple[Window, ...] = ((0, None),)
 
 @dataclass(frozen=True)
 class Network:
-    """The constants of a network. Durations aren't constant: they may depend on the chosen actors.
+    """A simple temporal network.
 
     Attributes
     ----------
     unit : Fraction
-        Seconds.
+        The unit of all times, in seconds.
     separation : int
         The minimum time between conflicting events.
     tick : int
-        The minimum time between an event and an end that the event must precede. (Events at the same instant are ordered: ends
-        come first, in the order of the activities.)
+        The minimum time between an event and an end that the event must precede. At the same instant, ends come before begins,
+        and ends have the order of the activities.
     durations : list of int
+        The duration of each activity with the actors of the plan; other actors may have other durations.
     edges : tuple of Edge
     at : list of int or None
-        The fixed begin of an activity.
+        The fixed begin of each activity, if any.
     latest : list of tuple of pairs
         The latest times of the begin (0) or the end (1) of each activity.
     windows : list of tuple of pairs
-        Windows of each activity, sorted by their begins; without windows it can never take place.
+        The time windows of each activity, sorted by their begins; an activity without windows can't take place.
     """
 
     unit: Fraction
@@ -53,11 +55,11 @@ class Network:
     windows: list[tuple[Window, ...]]
 
     def least(self, i: int, high: int, j: int, low: int) -> int:
-        """Return the minimum time from the begin or end of one activity to the begin or end of another."""
+        """Return the minimum time from the begin or end of activity `i` to the begin or end of activity `j`."""
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
     def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
-        """Return for each activity its successors, each with the minimum time between the two begins."""
+        """Return the successors of each activity, each with the minimum time between the two begins."""
         found: list[dict[int, int]] = [{} for _ in durations]
         for i, high, j, low in edges:
             apart = (
@@ -70,17 +72,20 @@ class Network:
 
 @dataclass(frozen=True)
 class Begins:
-    """The earliest begins, and for each the activity that it waits for (-1: none).
+    """The earliest begins of activities.
 
     Attributes
     ----------
-    begins, waits_for : list of int
+    begins : list of int
+        The begin of each activity.
+    waits_for : list of int
+        The activity that determines the begin of each activity; -1 if there is none.
     makespan : int
     late : int
-        The sum of the times by which activities are late: after a latest time, their last window, or their fixed time. If it is 0,
-        the begins satisfy the network.
+        The sum of the times by which activities miss their latest times, windows or fixed times. If the sum is 0, the begins
+        satisfy the network.
     latest : int
-        The activity that is late by the most; -1 if none is late.
+        The activity with the greatest lateness; -1 if no activity is late.
     """
 
     begins: list[int]
@@ -96,7 +101,7 @@ class Begins:
 
 
 def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[Fraction] = ()) -> Network:
-    """Return the network of an order. The unit of the network also divides the times in `more`."""
+    """Return the network of an order; the unit of the network also divides the times in `more`."""
     fixed = [one.at for one in order.activities]
     ends = [end for windows in order.windows.values() for window in windows for end in window if end is not None]
     times = [separation, *(one.duration for one in order.activities), *ends, *order.latest.values(), *more]
@@ -124,17 +129,17 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
 
 
 def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
-    """Return the earliest begins that satisfy a network and further edges; None if the edges exclude each other.
+    """Return the earliest begins that satisfy the edges of a network and additional edges; None if the edges form a cycle.
 
-    An activity that misses its times is late: see `Begins`.
+    Activities may miss their latest times, windows or fixed times (`Begins.late`).
 
     Parameters
     ----------
     network : Network
     edges : iterable of Edge
-        In addition to those of the network.
+        Additional edges.
     durations : sequence of int, optional
-        In place of the network's.
+        Durations that replace the durations of the network.
     """
     lasts = network.durations if durations is None else durations
     arcs = network.arcs((*network.edges, *edges), lasts)
@@ -162,7 +167,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
-    """Return the time by which an activity is late."""
+    """Return the time by which an activity misses its latest times, windows or fixed time; 0 if it misses none."""
     late, end, fixed = 0, begin + lasts, network.at[i]
     for which, by in network.latest[i]:
         late = max(late, (end if which == END else begin) - by)
@@ -177,7 +182,7 @@ def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
 def _move(
     network: Network, lasts: Sequence[int], begins: list[int], waits: list[int], i: int, j: int, apart: int
 ) -> None:
-    """Move the begin of `j` so that it satisfies an arc from `i`."""
+    """Move the begin of activity `j` to a later time if an arc from activity `i` requires this."""
     wanted = begins[i] + apart
     if wanted > begins[j]:
         begins[j], waits[j] = _fitting(network.windows[j], wanted, lasts[j]), i
@@ -190,7 +195,7 @@ def _settled(
     begins: list[int],
     waits: list[int],
 ) -> bool:
-    """Move begins until all arcs of a cyclic network are satisfied; return whether that terminates."""
+    """Move begins until they satisfy all arcs of a cyclic network; return False if no begins satisfy the arcs."""
     waiting, count = deque(range(len(lasts))), [0] * len(lasts)
     queued = [True] * len(lasts)
     while waiting:
@@ -210,7 +215,10 @@ def _settled(
 
 
 def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int:
-    """Return the first time from `begin` on at which an activity fits into a window, otherwise one after the last window opens."""
+    """Return the first time, not before `begin`, at which an activity fits into a window.
+
+    If the activity fits into no window, return the begin of the last window, or `begin` if it is later.
+    """
     for low, high in windows:
         first = max(low, begin)
         if high is None or first + lasts <= high:

@@ -1,12 +1,12 @@
 """The necessary order of activities: precedences, and turns that can be exchanged.
 
-Two accesses to one key conflict unless both only read. Conflicting accesses keep the order of the sequence, so that every
-schedule is equivalent to the sequence. There is one exception: a *turn* changes a symbol from its first value and back again.
-The turns of a symbol (or of an actor, with all symbols about it) can be taken in any order, one at a time. (Example: a hand
-picks up and puts down many objects.)
+Two accesses to the same symbol conflict if one of them changes the symbol. Conflicting accesses keep the order of the sequence.
+Therefore every schedule is equivalent to the sequence. Turns are an exception. A *turn* is a part of the sequence that changes a
+symbol from its first value and back again. The turns of a symbol can be taken in any order, one at a time. The same holds for the
+turns of an actor, with all symbols about the actor. For example, each turn of a hand picks up and puts down an object.
 
-Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998); blocks: Siddiqui and Haslum, "Block-structured plan
-deordering", AI 2012.
+The theory is described by Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998). Turns are blocks in the sense of
+Siddiqui and Haslum, "Block-structured plan deordering", AI 2012.
 """
 
 from __future__ import annotations
@@ -23,16 +23,14 @@ from confab.reasoner.symbols import FALSE, Problem, Times
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]
-"""The begin (0) or end (1) of an activity isn't later than the begin or end of another one: activity, which, activity, which."""
+"""A precedence: an activity, its begin (0) or end (1), another activity, and its begin or end, which comes later."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """Activities that use a resource without interruption, from the first event in `lows` to the last in `highs`.
+    """Activities that use a resource without interruption, from the first event in `lows` to the last event in `highs`.
 
-    An event is a begin or an end.
-
-    Turns that only read can be taken at the same time.
+    An event is the begin or the end of an activity. Turns that only read a symbol can be taken at the same time.
     """
 
     members: tuple[int, ...]
@@ -43,7 +41,10 @@ class Turn:
 
 @dataclass(frozen=True)
 class Resource:
-    """A symbol or an actor whose turns exclude each other, in the order of the sequence. `actor` is the name of an actor."""
+    """A symbol or an actor, with turns that exclude each other, in the order of the sequence.
+
+    `actor` is the name of the actor; None for a symbol.
+    """
 
     turns: tuple[Turn, ...]
     actor: str | None = None
@@ -51,7 +52,7 @@ class Resource:
 
 @dataclass(frozen=True)
 class Order:
-    """Activities with the constraints on every schedule of them.
+    """Activities with the constraints that every schedule of these activities satisfies.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class Order:
     latest : mapping of (activity, begin or end) to seconds
         The latest time of an event that achieves a goal with a deadline.
     windows : mapping of activity to pairs of seconds
-        The time windows: begin and end lie within one of them.
+        The time windows of an activity; begin and end must lie within the same window.
     """
 
     activities: tuple[Activity, ...]
@@ -73,13 +74,13 @@ class Order:
 
 @dataclass(frozen=True)
 class _Record:
-    """An access to a key: from the begin or end `low` of an activity to its begin or end `high`."""
+    """An access to a symbol by an activity, from the begin or end `low` to the begin or end `high` of the activity."""
 
     activity: int
     low: int
     high: int
-    written: tuple[str, str] | None  # value before and after, if it changes
-    position: int  # of `low` among the events
+    written: tuple[str, str] | None  # the values before and after, or None for a read access
+    position: int  # the position of `low` among the events
 
 
 def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[StepEvent]) -> Order:
@@ -89,7 +90,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     ----------
     problem : Problem
     activities : sequence of Activity
-        As `confab.planner.timed.activities.activities` returns them for the same events.
+        The result of `confab.planner.timed.activities.activities` for the same events.
     events : iterable of StepEvent
 
     Raises
@@ -160,19 +161,19 @@ def _records(
 
 
 def _returns(problem: Problem, cell: Cell, records: Sequence[_Record]) -> bool:
-    """Return whether a symbol returns to its first value in the end, and has other values in between."""
+    """Return whether some activity changes a symbol, and the last change restores the first value."""
     written = [record.written for record in records if record.written is not None]
     first = written[0][0] if written else FALSE
     return bool(written) and written[-1][1] == first
 
 
 def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
-    """Return whether a symbol is about one actor only."""
+    """Return whether exactly one argument of a symbol is an actor."""
     return sum(argument in actors for argument in cell[1]) == 1
 
 
 def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
-    """Return the turns of the symbols that groups of records access."""
+    """Return the turns of several symbols together; each group contains the accesses to one symbol."""
     first = [next(r.written[0] for r in records if r.written is not None) for records in groups]
     order = sorted(
         ((record.position, i, record) for i, records in enumerate(groups) for record in records),
@@ -206,14 +207,17 @@ def _actor(
     starts: Mapping[int, int],
     ends: Mapping[int, int],
 ) -> Resource:
-    """Return the turns of an actor: it is busy in a turn, or a symbol about it differs from its first value."""
+    """Return an actor with its turns.
+
+    During a turn, the actor executes an activity, or some symbol about the actor differs from its first value.
+    """
     its = sorted((n for n, one in enumerate(activities) if actor in one.actors), key=lambda n: starts[n])
     busy = [_Record(n, BEGIN, END, ("", ""), starts[n]) for n in its]
     return Resource(_turns([busy, *cells.values()], ends), actor)
 
 
 def _idle(problem: Problem, actors: Iterable[str]) -> list[str]:
-    """Return the individuals that belong to all classes of an actor and take no turn."""
+    """Return the individuals that belong to all classes of an actor and aren't actors of the sequence."""
     known = set(actors)
     kinds = {a: [frozenset(m) for m in problem.classes.values() if a in m] for a in known}
     others = {one for its in kinds.values() if its for one in frozenset.intersection(*its)}
@@ -254,7 +258,7 @@ def _chained(
 def _touching(
     records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]], ends: Mapping[int, int]
 ) -> Iterator[Edge]:
-    """Yield the edges between an access to all holders of a value and the changes of its holders."""
+    """Yield the edges between a read access to the holders of a value and the changes of these holders."""
     if not values:
         return
     touches: dict[Key, list[_Record]] = defaultdict(list)
@@ -277,7 +281,7 @@ def _touching(
 def _latest(
     problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]
 ) -> dict[tuple[int, int], Fraction]:
-    """Return the latest times of the events that change goals with a deadline last."""
+    """Return the latest times of events; each event is the last change of a goal with a deadline."""
     found: dict[tuple[int, int], Fraction] = {}
     for symbol, seconds in times.deadlines.items():
         its = records.get((symbol.situation, symbol.arguments), ())
@@ -288,7 +292,10 @@ def _latest(
 
 
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
-    """Return the time windows of restricted activities: an activity lies within a window of each individual that it names."""
+    """Return the time windows of activities that name individuals with time windows.
+
+    An activity must lie within a window of each individual that it names.
+    """
     found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
     for number, one in enumerate(activities):
         for individual in dict.fromkeys((*one.step.arguments, *one.actors)):
@@ -301,7 +308,7 @@ def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tu
 def common(
     one: Sequence[tuple[Fraction, Fraction | None]], other: Sequence[tuple[Fraction, Fraction | None]]
 ) -> tuple[tuple[Fraction, Fraction | None], ...]:
-    """Return the intersections of two sets of windows.
+    """Return the intersections of the windows of two sets.
 
     >>> common([(Fraction(0), Fraction(9))], [(Fraction(5), None)])
     ((Fraction(5, 1), Fraction(9, 1)),)

@@ -1,4 +1,4 @@
-"""A behaviour cut at its begin and its end: conditions and effects at the begin, throughout, and at the end.
+"""The pieces of a behaviour: its conditions and effects at the begin, throughout its duration, and at the end.
 
 ==========  ==========================================  =========================================================
 piece       conditions                                  effects
@@ -38,7 +38,11 @@ SECOND = Fraction(1)
 
 @dataclass(frozen=True)
 class Pieces:
-    """The pieces of a behaviour. Each has its parameters and, after them, `fixed`: variables that the preconditions determine."""
+    """The pieces of a behaviour.
+
+    The parameters of each piece are the parameters of the behaviour, followed by `fixed`, the variables that the preconditions
+    determine.
+    """
 
     whole: Behavior
     fixed: tuple[Parameter, ...]
@@ -49,7 +53,7 @@ class Pieces:
 
 
 def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
-    """Return the pieces of a behaviour of a problem."""
+    """Return the pieces of a behaviour."""
     timing = timing_of(behavior)
     fixed = _fixed(behavior)
 
@@ -90,9 +94,9 @@ def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts:
 
 
 def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-    """Return the duration of a step when it begins, in seconds; None if it isn't a number, or negative.
+    """Return the duration of a step at its begin, in seconds; None if the duration isn't a number or is negative.
 
-    `arguments` are terms as `terms_at` returns them.
+    `arguments` is a result of `terms_at`.
     """
     stated = timing_of(behavior).duration
     if stated is None:
@@ -106,9 +110,9 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
 
 
 def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the actors of a step.
+    """Return the actors that the behaviour of a step names, otherwise the first argument in `resting`.
 
-    Those that its behaviour names, otherwise the first argument in `resting`, which is the result of `default_actors`.
+    `resting` is the result of `default_actors`.
     """
     stated = timing_of(behavior).actors
     if stated:
@@ -120,7 +124,10 @@ def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, restin
 
 
 def default_actors(problem: Problem) -> frozenset[str]:
-    """Return the individuals of the classes that have a situation type with a rest value, if no behaviour names an actor."""
+    """Return the individuals whose class is the first argument of a situation type with a rest value.
+
+    Return no individuals if some behaviour names its actors.
+    """
     if any(timing_of(behavior).actors for behavior in problem.domain.behaviors.values()):
         return frozenset()
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}

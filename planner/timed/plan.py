@@ -1,4 +1,4 @@
-"""A plan in time, as the planner returns it."""
+"""Timed plans: plans with a begin and an end for each primitive."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from functools import cached_property
 from confab.planner.plan import Plan, Step
 
 THESE_STEPS = "these steps"
-"""A bound on schedules of the same steps: conflicting steps in the order of the plan, turns in any order and by any actor."""
+"""The name of a lower bound on all schedules of the same steps.
+
+The schedules keep the order of conflicting steps. Turns may have any order and any possible actor.
+"""
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A primitive in time: its begin and end in seconds, its actors, and its slack."""
+    """A primitive of a timed plan, with its begin, end and slack in seconds, and its actors."""
 
     step: Step
     begin: Fraction
@@ -25,28 +28,28 @@ class Slot:
 
     @property
     def critical(self) -> bool:
-        """Whether any delay of it increases the makespan."""
+        """Whether any delay of the primitive increases the makespan."""
         return not self.slack
 
 
 @dataclass(frozen=True)
 class TimedPlan:
-    """A plan in time.
+    """A plan with a schedule of its primitives.
 
     Attributes
     ----------
     plan : Plan
-        The tree of steps, each level in an order in which its steps could also be executed in sequence.
+        The tree of steps; the steps of each level could also be executed one after another in this order.
     slots : tuple of Slot
-        Its primitives, in the order of the plan.
+        The primitives in the order of the plan.
     bound : Fraction
-        Lower bound of the makespan, in seconds.
+        Lower bound on the makespan, in seconds.
     bounds : str
-        The schedules that are bounded: `THESE_STEPS`.
+        The schedules to which the bound applies: `THESE_STEPS`.
     scheduler : str
         The name of the scheduler.
     arcs : tuple of (int, int)
-        Pairs of primitives, by number, of which the second waits for the first.
+        Pairs of numbers of primitives; the second primitive waits for the first.
     """
 
     plan: Plan
@@ -63,12 +66,15 @@ class TimedPlan:
 
     @cached_property
     def serial(self) -> Fraction:
-        """The duration of the primitives in sequence, in seconds."""
+        """The sum of the durations of all primitives, in seconds."""
         return sum((slot.end - slot.begin for slot in self.slots), Fraction(0))
 
     @cached_property
     def intervals(self) -> Mapping[tuple[int, ...], tuple[Fraction, Fraction]]:
-        """The begin and end of every step, by its path: a step with sub-steps lasts from the first of them to the last."""
+        """The begin and the end of every step in seconds, by path.
+
+        A step with sub-steps lasts from the first begin to the last end of its sub-steps.
+        """
         found = {slot.step.path: (slot.begin, slot.end) for slot in self.slots}
         for step in reversed(list(self.plan.walk())):
             if step.steps:
@@ -77,7 +83,10 @@ class TimedPlan:
         return found
 
     def lanes(self) -> Iterator[tuple[str, list[Slot]]]:
-        """Yield each actor with its primitives in the order of their begins; last, under an empty name, those without an actor."""
+        """Yield each actor with its primitives in the order of their begins.
+
+        The last pair contains the primitives without an actor, under an empty name.
+        """
         names = sorted({actor for slot in self.slots for actor in slot.actors})
         for name in names:
             yield name, sorted((s for s in self.slots if name in s.actors), key=lambda s: (s.begin, s.end))

@@ -1,7 +1,7 @@
-"""A schedule of an order: the order of turns of each resource, the actor of each turn, and the begins of activities.
+"""Schedules of activities: the order of the turns of each resource, the actor of each turn, and the begins of activities.
 
-The first schedule is greedy: turns are taken in the order of the sequence, each by the actor that is free first. Then turns on
-the critical path are exchanged (a tabu search on blocks: Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
+The first schedule is greedy. Turns are taken in the order of the sequence, and the actor that is free first takes the turn. Then
+a tabu search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
 problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
 """
 
@@ -16,19 +16,23 @@ from confab.planner.timed.network import Begins, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn
 
 ROUNDS = 100
-"""Maximum number of exchanges without a shorter schedule."""
+"""Maximum number of exchanges of turns without a better schedule."""
 MOST_ARCS = 400_000
-"""Maximum number of arcs processed by exchanges of turns."""
+"""Maximum number of arcs that exchanges of turns process."""
 TABU = 8
-"""Number of exchanges during which an exchange can't be undone."""
+"""Number of exchanges during which the search doesn't undo an exchange."""
 
 TurnId = tuple[int, int]
-"""The numbers of a resource and of one of its turns."""
+"""The number of a resource, and the number of a turn of this resource."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """The possible actors of turns: for each turn the resources, its own first, with the durations of its members there."""
+    """The possible actors of turns.
+
+    `of` contains the resources that can take a turn, the resource of the plan first. `lasts` contains the durations of the turn's
+    activities for another resource.
+    """
 
     of: Mapping[TurnId, tuple[int, ...]] = field(default_factory=dict)
     lasts: Mapping[tuple[TurnId, int], Mapping[int, int]] = field(default_factory=dict)
@@ -36,7 +40,7 @@ class Choices:
 
 @dataclass
 class CandidateSchedule:
-    """The order of turns of each resource; `begins` follows from it."""
+    """The order of the turns of each resource, and the begins of activities that follow from this order."""
 
     turns: list[list[TurnId]]
     begins: Begins
@@ -50,18 +54,20 @@ class CandidateSchedule:
 def shortest(
     order: Order, network: Network, choices: Choices, until: float, bound: int = 0
 ) -> CandidateSchedule | None:
-    """Return the best schedule that greed and exchanges find until a time on the clock of `perf_counter`.
+    """Return the best schedule that the greedy construction and the exchanges of turns find; None if they find none.
 
-    None if none is found in which the activities can follow one another. The schedule may be late (`Begins.late`). The search ends
-    with a schedule that isn't late and is as short as the lower bound.
+    The schedule may be late (`Begins.late`). The search stops at a schedule that isn't late and whose makespan is the lower bound.
 
     Parameters
     ----------
     order : Order
     network : Network
-        Of the same order.
+        The network of the same order.
     choices : Choices
     until : float
+        The end of the search on the clock of `perf_counter`.
+    bound : int
+        A lower bound on the makespan.
     """
     search = _Search(order, network, choices)
     starts = [search.evaluated(turns) for turns in search.starts()]
@@ -72,7 +78,7 @@ def shortest(
 
 
 def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
-    """Yield the edges by which turns are taken one after another; turns that only read are taken at the same time."""
+    """Yield the edges that order the turns of each resource; turns that only read a symbol may overlap."""
     for line in turns:
         last: Turn | None = None
         readers: list[Turn] = []
@@ -88,7 +94,7 @@ def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge
 
 
 def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
-    """Return the durations of activities for a choice of actors."""
+    """Return the durations of activities if the actors take the given turns."""
     found = list(network.durations)
     for resource, line in enumerate(turns):
         for turn in line:
@@ -108,22 +114,25 @@ class _Search:
                     self.turns_of[member].append((resource, number))
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
-        """Return the schedule for an order of turns; None if there is none."""
+        """Return the schedule for an order of turns; None if the order has no schedule."""
         durations = durations_with(self.network, self.choices, turns)
         begins = earliest(self.network, turn_edges(self.order, turns), durations)
         return None if begins is None else CandidateSchedule(turns, begins)
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
-        """Yield the turns of the sequence, and those with each turn taken by the actor that is free first."""
+        """Yield the orders of turns of the first schedules.
+
+        The first order keeps the actors of the sequence. In the second order, the actor that is free first takes each turn.
+        """
         own = [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)]
         yield own
         if self.choices.of:
             yield self.shared()
 
     def shared(self) -> list[list[TurnId]]:
-        """Return the turns in the order of the sequence, each with the actor that can begin it first.
+        """Return the turns in the order of the sequence; the actor with the least work takes each turn.
 
-        Only the work of each actor is counted here; an actor takes no other turn before its turn is over.
+        An actor takes no other turn before its turn is over.
         """
         work = [0] * len(self.order.resources)
         lines: list[list[TurnId]] = [[] for _ in self.order.resources]
@@ -148,13 +157,13 @@ class _Search:
         return lines
 
     def cost(self, turn: TurnId, resource: int) -> int:
-        """Return the work of a turn for an actor."""
+        """Return the work of a turn for a resource: the sum of the durations of its activities."""
         its = self.choices.lasts.get((turn, resource), {})
         members = self.order.resources[turn[0]].turns[turn[1]].members
         return sum(its.get(member, self.network.durations[member]) for member in members)
 
     def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
-        """Return a schedule after exchanges of turns on the critical path."""
+        """Return the best schedule after exchanges of turns on the critical path."""
         now, barren = best, 0
         left = MOST_ARCS // (1 + len(self.network.edges) + len(self.network.durations))
         tabu: dict[tuple[TurnId, TurnId], int] = {}
@@ -180,7 +189,10 @@ class _Search:
         return best
 
     def neighbours(self, now: CandidateSchedule) -> Iterator[tuple[tuple[TurnId, TurnId], list[list[TurnId]]]]:
-        """Yield exchanges of neighbouring turns, and moves of turns to other actors, on the critical path."""
+        """Yield the orders of turns after an exchange on the critical path, each with an identifier of the exchange.
+
+        An exchange swaps two neighbouring turns, or moves a turn to another actor.
+        """
         critical = set(self.critical(now))
         for resource, line in enumerate(now.turns):
             for i, (one, other) in enumerate(pairwise(line)):
@@ -195,7 +207,10 @@ class _Search:
                                 yield (turn, (resource, -1 - target)), turns
 
     def moved(self, now: CandidateSchedule, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
-        """Yield the turns with one of them moved to another actor: inserted by begin time, or one position earlier or later."""
+        """Yield the orders of turns in which a turn is moved to another actor.
+
+        The turn is inserted at the position that its begin determines, or one position earlier or later.
+        """
 
         def begin(one: TurnId) -> int:
             its = self.order.resources[one[0]].turns[one[1]]
@@ -215,7 +230,10 @@ class _Search:
         return not critical.isdisjoint(self.order.resources[turn[0]].turns[turn[1]].members)
 
     def critical(self, now: CandidateSchedule) -> list[int]:
-        """Return the activities on the critical path, or on the path to the activity that is latest; the last first."""
+        """Return the activities on the critical path, or on the path to the activity with the greatest lateness.
+
+        The last activity comes first.
+        """
         durations = durations_with(self.network, self.choices, now.turns)
         ends = [b + d for b, d in zip(now.begins.begins, durations, strict=True)]
         found, current = list[int](), now.begins.latest
@@ -228,9 +246,10 @@ class _Search:
 
 
 def least(order: Order, network: Network, choices: Choices) -> int:
-    """Return a lower bound of the makespan of any schedule of these activities by any of their possible actors.
+    """Return a lower bound on the makespan of any schedule of the activities with any possible actors.
 
-    It is the longest chain of every schedule, or the work of exchangeable actors divided by their number, if larger.
+    The bound is the greater of two numbers: the longest chain of precedences, and the work of exchangeable actors divided by the
+    number of these actors.
     """
     lasts = list(network.durations)
     for its in choices.lasts.values():
@@ -255,7 +274,11 @@ def least(order: Order, network: Network, choices: Choices) -> int:
 
 
 def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
-    """Return the minimum duration of a turn: for an actor the time that it is busy, for a symbol its longest activity."""
+    """Return the minimum duration of a turn.
+
+    For an actor, the result is the sum of the durations of the actor's activities. For a symbol, the result is the longest duration
+    of an activity that occupies the symbol throughout.
+    """
     resource = order.resources[turn[0]]
     its = resource.turns[turn[1]]
     if resource.actor is not None:

@@ -1,8 +1,8 @@
-"""The checker of plans in time. It shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
+"""The checker of timed plans; it shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
 
-The primitives are simulated on symbols at their times; at each instant, ends come first. Every condition is evaluated at the
-times that its span requires; a condition `throughout` is evaluated again after every event. A pending value belongs to its
-step: it is a fault if another step reads or changes it.
+The checker simulates the primitives on symbols at their times. At each instant, ends come before begins. Every condition is
+evaluated at the times that its span requires. A condition with the span `throughout` is evaluated again after every event. A value
+is pending while a running step is changing it. If another step reads or changes a pending value, the plan has a fault.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from confab.reasoner.timing import only_during
 
 
 def validate_timed(problem: Problem, timed: TimedPlan, separation: Fraction = Fraction(0)) -> list[Fault]:
-    """Return the faults of a plan in time; none if it is valid.
+    """Return the faults of a timed plan; the list is empty for a valid plan.
 
     Parameters
     ----------
     problem : Problem
     timed : TimedPlan
     separation : Fraction
-        The minimum time between conflicting events, in seconds: PDDL's epsilon.
+        The minimum time between conflicting events, in seconds (epsilon in PDDL).
     """
     faults: list[Fault] = []
     if only_during(problem):
@@ -44,7 +44,7 @@ def validate_timed(problem: Problem, timed: TimedPlan, separation: Fraction = Fr
 
 @dataclass
 class _Running:
-    """A step that has begun: its slot, its pieces and their terms, and the pending cells with their values."""
+    """A running step: its slot, its pieces, the terms of the pieces, and the pending values."""
 
     slot: Slot
     pieces: Pieces
@@ -54,7 +54,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """Facts that record which cells, and which holders of a value, a condition reads."""
+    """Facts that record the cells that a condition reads, and the values whose holders a condition reads."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -79,7 +79,7 @@ Effects = tuple[tuple[Cell, str], ...]
 
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
-    """Return the changes of each step in sequence, and the step that changes each cell last."""
+    """Return the changes of each step of a sequence, and the last step that changes each cell."""
     rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     found, last = list[Effects](), dict[Cell, int]()
     for number, step in enumerate(steps):
@@ -93,7 +93,7 @@ def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects]
 
 
 class _Clock:
-    """A timed plan simulated on symbols."""
+    """The simulation of a timed plan on symbols."""
 
     def __init__(
         self,
@@ -111,18 +111,16 @@ class _Clock:
         self.pieces: dict[str, Pieces] = {}
         self.made: dict[int, dict[Cell, str]] = {}
         self.last: dict[Cell, int] = {}
-        self.since: dict[Cell, Fraction] = {}  # time at which a cell was set last
-        self.changed: dict[Cell, Fraction] = {}  # time at which a cell got another value last
-        self.asked: dict[
-            Cell, Fraction
-        ] = {}  # time of the last read of a cell by another step than the one that changes it
+        self.since: dict[Cell, Fraction] = {}  # time at which a step last set a cell
+        self.changed: dict[Cell, Fraction] = {}  # time at which the value of a cell last changed
+        self.asked: dict[Cell, Fraction] = {}  # time at which a step last read a cell
         self.read_by: dict[Cell, int] = {}
 
     def run(self) -> Iterator[Fault]:
         """Yield the faults, until a step is inapplicable."""
         yield from self.actors()
         slots = self.timed.slots
-        # Among events of one instant, ends come first; a step without duration begins and ends at once, in the plan's order.
+        # At the same instant, ends come before begins. Steps without duration begin and end at once, in the plan's order.
         events = sorted(
             [(s.begin, 1, n, 0) for n, s in enumerate(slots)]
             + [(s.end, 1 if s.begin == s.end else 0, n, 1) for n, s in enumerate(slots)]
@@ -144,7 +142,7 @@ class _Clock:
         return self.pieces[name]
 
     def actors(self) -> Iterator[Fault]:
-        """Yield a fault if an actor is in two steps at once, or an individual that a step names isn't available."""
+        """Yield a fault if an actor is in two steps at the same time, or if an individual of a step isn't available."""
         lanes: dict[str, list[Slot]] = {}
         for slot in self.timed.slots:
             behavior = self.problem.domain.behaviors[slot.step.behavior]
@@ -167,7 +165,7 @@ class _Clock:
                 busy = slot if busy is None or slot.end >= busy.end else busy
 
     def begun(self, number: int, slot: Slot, time: Fraction) -> Iterator[Fault]:
-        """Begin a step."""
+        """Begin a step; yield its faults."""
         step, pieces, facts = slot.step, self.piece(slot.step.behavior), self.facts
         fixed = self.times.events.get(step.behavior)
         if fixed is not None and fixed != time:
@@ -191,7 +189,7 @@ class _Clock:
         self.running[number] = one
 
     def ended(self, number: int, time: Fraction) -> Iterator[Fault]:
-        """End a step."""
+        """End a step; yield its faults."""
         one = self.running.pop(number)
         self.facts.clear()
         for name, key, value in one.making:
@@ -204,7 +202,7 @@ class _Clock:
                 yield Fault(one.slot.step.path, f"{one.slot.step}: it changes {cells[0][0]} otherwise than in sequence")
 
     def done(self, one: _Running, piece: Behavior, time: Fraction) -> Iterator[Fault]:
-        """Execute the begin or the end of a step."""
+        """Execute the begin or the end of a step; yield its faults."""
         if not piece.preconditions and not piece.effects and not piece.amounts:
             return
         self.facts.clear()
@@ -218,7 +216,7 @@ class _Clock:
             self.put(one, (name, key), value, time)
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
-        """Set the value of a cell."""
+        """Set the value of a cell, and record the step and the time."""
         if Facts.value(self.facts, *cell) != value:
             self.changed[cell] = time
         self.facts.put(*cell, value)
@@ -227,7 +225,11 @@ class _Clock:
         self.since[cell] = time
 
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
-        """Yield a fault if a step reads or changes a pending value of another step, or a value that was touched a moment ago."""
+        """Yield a fault if a step conflicts with another step.
+
+        A step conflicts with another step if it reads or changes a pending value of the other step. A step also conflicts if the
+        other step accessed the same cell less than the separation time before.
+        """
         read, values = set(self.facts.cells), set(self.facts.values)
         for other in self.running.values():
             if other.number == one.number:
@@ -259,7 +261,10 @@ class _Clock:
                 yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks throughout ceases to hold")
 
     def in_the_end(self) -> Iterator[Fault]:
-        """Yield the goals that aren't reached in time, and the cells whose last change isn't by the same step as in sequence."""
+        """Yield a fault for each goal that isn't reached in time.
+
+        Also yield a fault for each cell whose last change is by another step than in the sequence of the plan.
+        """
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
             if not meets(got, wanted):
