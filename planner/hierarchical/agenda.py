@@ -1,12 +1,12 @@
-"""The agenda: achieves the goals one after another on one state table and keeps the goals achieved before.
+"""The agenda: the planner achieves the goals one after another on one table and keeps the achieved goals.
 
-open:    goals to be tried in one step of the most abstract level
+open:    goals that the planner tries to achieve in one step of the most abstract level
 asleep:  blocked goals; a goal wakes when a symbol that it waits for changes
-kept:    achieved goals; later steps may violate them temporarily, but must restore them
-before:  ordering constraints; a goal waits for the goals that it would make unreachable (a cup is moved before it is filled)
+kept:    achieved goals; later steps may violate achieved goals temporarily, but must restore them
+before:  ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is filled)
 
-If no goal can be achieved in one step, the search budget is raised gradually, on each level from the top. A failed attempt is
-repeated only after a symbol that it depends on has changed. Steps are refined and applied as soon as they are found.
+If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed attempt is
+repeated only after a symbol that the goal depends on has changed. Steps are refined and applied as soon as they are found.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""The lowest level is tested for unsolvability once the searches have cost as much as examining this number of its states."""
+"""The effort of the searches before the lowest level is tested for unsolvability, in examined states of this level."""
 
 
 @dataclass
@@ -49,13 +49,13 @@ class Agenda:
     ----------
     call : Call
     levels : tuple of int, optional
-        Levels whose steps may be used, by default all. Steps of any level may achieve goals that the first level doesn't see.
+        Levels whose steps may be used, by default all levels. Goals that the first level doesn't see allow steps of any level.
     quickly : bool
-        Whether only relevant steps and small scopes are tried.
+        Whether the agenda tries only relevant steps and small scopes.
     solvable : bool
-        Whether the problem is known to be solvable; no proof of unsolvability is then attempted.
+        Whether the problem is known to be solvable; the agenda then attempts no proof of unsolvability.
     forward : bool
-        Whether applied steps are final: planning never restarts from the initial state.
+        Whether applied steps are final; the agenda then never restarts from the initial state.
     """
 
     call: Call
@@ -74,7 +74,7 @@ class Agenda:
 
     @property
     def too_large(self) -> Reason | None:
-        """Return the reason why the lowest level can't be grounded, if grounding was tried and failed."""
+        """The reason why the lowest level can't be grounded; None unless grounding was tried and failed."""
         return self._lowest if isinstance(self._lowest, Reason) else None
 
     # ------------------------------------------------------------------------------------------------- one goal after another
@@ -99,7 +99,7 @@ class Agenda:
             if self._asleep and not self.harder():
                 return False
             self.wake(mark if call.redone == redone else 0)
-            # If no step was applied, a pass must leave fewer goals asleep; so the loop ends.
+            # If no step was applied, the number of sleeping goals must decrease. Therefore the loop ends.
             if self._asleep and not self._open and len(call.steps) == steps:
                 there = [cell for cell in self._asleep if call.met(cell)]
                 if not there:
@@ -111,7 +111,7 @@ class Agenda:
         return True
 
     def begin(self) -> None:
-        """Put all goals that don't hold into the queue of open goals."""
+        """Put all goals that don't hold into the queue of open goals, and determine the order of goals."""
         call = self.call
         self._before, self._asleep, self._waiting = order(call), {}, {}
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
@@ -119,7 +119,10 @@ class Agenda:
         self._open = deque(cell for cell in call.goal if cell not in call.kept)
 
     def at_once(self, cell: Cell) -> bool:
-        """Achieve a goal by advice or by one step of the most abstract level; otherwise put it to sleep and return False."""
+        """Achieve a goal by advice or by one step of the most abstract level; return whether that succeeded.
+
+        If that fails, put the goal to sleep.
+        """
         call, first = self.call, self.call.program.levels[0]
         unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
         promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
@@ -133,7 +136,7 @@ class Agenda:
         return False
 
     def wake(self, mark: int) -> None:
-        """Reopen goals after the changes since a mark: goals that waited for a changed symbol, and goals that were undone."""
+        """Reopen the goals that waited for a symbol which has changed since a mark, and the goals that were undone."""
         call, asleep = self.call, self._asleep
 
         def opened(cell: Cell) -> None:
@@ -163,7 +166,7 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------------- larger budgets
 
     def harder(self) -> bool:
-        """Achieve one of the sleeping goals with a larger budget, or on a lower level; return whether that succeeded."""
+        """Achieve a sleeping goal with a larger budget, or on a lower level; return whether that succeeded."""
         call = self.call
         if not self.solvable:
             self._certify()
@@ -180,7 +183,7 @@ class Agenda:
                 return True
             if not self.solvable and self.allowed(level):
                 self._prove()
-        if call.progressed:  # the state has changed since some of these attempts failed
+        if call.progressed:  # the state has changed since some attempts failed
             call.failed.clear()
             call.progressed = False
             return self.harder()
@@ -191,7 +194,7 @@ class Agenda:
         return self.levels is None or level in self.levels or cell in self.call.unseen
 
     def singly(self, level: int, *budgets: SearchBudget) -> bool:
-        """Achieve one of the sleeping goals with the given budgets on a level; return whether that succeeded."""
+        """Achieve a sleeping goal with the given budgets on a level; return whether that succeeded."""
         call = self.call
         last = call.unseen.issuperset(self._asleep)
         for cell in self._ready():
@@ -209,13 +212,13 @@ class Agenda:
         return False
 
     def _ready(self) -> Iterator[Cell]:
-        """Yield the sleeping goals whose predecessors are all achieved; if there are none, yield all sleeping goals."""
+        """Yield the sleeping goals that wait for no unachieved goal; if there are none, yield all sleeping goals."""
         call = self.call
         ready = [c for c in self._asleep if all(other in call.kept for other in self._before.get(c, ()))]
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
 
     def advised(self, cell: Cell) -> bool:
-        """Achieve a goal by advice that hasn't been tried yet; return whether that succeeded."""
+        """Achieve a goal by untried advice; return whether that succeeded."""
         call, attempt = self.call, (self.call.program.levels[0], BY_RULES)
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
@@ -223,7 +226,7 @@ class Agenda:
         return call.achieve(attempt[0], cell, BY_RULES)
 
     def settles(self) -> bool:
-        """Return whether a symbol isn't at rest and steps of lower levels haven't been tried to bring it to rest."""
+        """Return whether some symbol isn't at rest, and steps of lower levels may still be tried to bring it to rest."""
         call = self.call
         return (
             not (call.settled or call.at_rest())
@@ -232,7 +235,10 @@ class Agenda:
         )
 
     def settle(self) -> bool:
-        """Bring all symbols to rest, so that steps of the first level become applicable; return whether that succeeded."""
+        """Bring all symbols to rest by steps of lower levels; return whether steps were applied.
+
+        Steps of the first level may become applicable when all symbols are at rest.
+        """
         call = self.call
         if not self.settles():
             return False
@@ -244,10 +250,10 @@ class Agenda:
         return False
 
     def restart(self, level: int) -> bool:
-        """Achieve all goals together from the initial state, after a dead end; if that fails, restore the previous steps.
+        """Achieve all goals together from the initial state, after a dead end; return whether that succeeded.
 
-        Refinements then leave symbols that no upper level sees unchanged, where possible. Otherwise a goal could become unreachable
-        without a change that an upper level sees.
+        On failure, restore the previous steps. During the restart, refinements preferably leave symbols unchanged that no upper
+        level sees. Otherwise a goal could become unreachable without a visible change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
         if not call.steps or self.forward or level != call.program.levels[0]:
@@ -267,7 +273,10 @@ class Agenda:
         return False
 
     def all_goals(self, level: int) -> bool:
-        """Achieve all goals together on a level from the present state, at most once per state; return whether that succeeded."""
+        """Achieve all goals together on a level from the current state; return whether that succeeded.
+
+        The agenda tries this at most once for each number of applied steps.
+        """
         call = self.call
         if (
             not self.allowed(level)
@@ -284,7 +293,7 @@ class Agenda:
     # ------------------------------------------------------------------------------------------------------------ proofs
 
     def check_unsolvable(self) -> None:
-        """Test for unsolvability with about as much work as the searches so far; raise `UnsolvableError` if there is no plan."""
+        """Raise `UnsolvableError` if a test proves that there is no plan; the test costs about as much as the searches so far."""
         call = self.call
         if not self.solvable:
             if call.space.effort >= TEST * FIRST_TESTS:
@@ -298,9 +307,9 @@ class Agenda:
         self._examine()
 
     def _certify(self, ahead: int = 0) -> None:
-        """Raise `UnsolvableError` if a certificate is found; search again each time the effort has doubled, up to a limit.
+        """Search for a certificate of unsolvability, and raise `UnsolvableError` if a certificate is found.
 
-        `ahead` is the work of a search that is about to begin.
+        The search is repeated each time that the effort has doubled, up to a limit. `ahead` is the work of the next search.
         """
         call = self.call
         tests = max(FIRST_TESTS, min(max(call.space.effort, ahead) // TEST, PAIRS))
@@ -320,7 +329,7 @@ class Agenda:
             self._looked = looked_at(self._lowest, call.space, self._looked)
 
     def _expects_a_plan(self) -> bool:
-        """Return whether advice promises a plan and the searches have taken less work than one scope."""
+        """Return whether advice promises a plan, and the searches have cost less work than one scope."""
         advice = self.call.advice
         return advice is not None and advice.expects and self.call.space.worked < WIDER.work
 
@@ -329,7 +338,7 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Map each goal to the goals that become unreachable once it holds and so must be achieved before it."""
+    """Return, for each goal, the goals that must be achieved before, because the goal makes them unreachable."""
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None
@@ -352,7 +361,7 @@ def order(call: Call) -> dict[Cell, list[Cell]]:
 
 
 def rules_out(call: Call, first: Cell, then: Cell) -> bool:
-    """Return True if no first-level behaviour can achieve goal `then` once goal `first` holds."""
+    """Return whether no behaviour of the first level can achieve the goal `then` after the goal `first` holds."""
     level = call.program.levels[0]
     mark = len(call.table.trail)
     call.table.put(*first, call.goal[first])
@@ -370,7 +379,7 @@ def rules_out(call: Call, first: Cell, then: Cell) -> bool:
 
 
 def attainable(call: Call, level: int, condition: Condition, achiever: Achiever, env: Mapping[str, str | None]) -> bool:
-    """Return whether an effect of a behaviour of the level could make an unmet condition hold."""
+    """Return whether some effect of a behaviour of the level could help to satisfy an unmet condition."""
     for situation, key, values in call.space.subgoals.of(achiever, condition, env, level):
         for other in call.program.achievers.get((level, situation), ()):
             for value in values:

@@ -1,15 +1,13 @@
 """Plans with a proved bound on their distance from the optimum.
 
-upper:  cost of the best plan so far, which is the default planner's plan after shortening
-lower:  a lower bound on the cost of every plan: the least f of A* on the lowest level, first with the cost of each goal
-        alone as heuristic, then with LM-cut
+The upper bound is the cost of the best plan so far, initially the shortened plan of the default planner. The lower bound is the
+least f of A* on the lowest level. The first heuristic of A* is the sum of the costs of achieving each goal alone; the second
+heuristic is LM-cut. If both bounds are equal, the plan is optimal. If a limit is reached before, the plan costs at most
+upper / lower times the optimum.
 
-If both are equal, the plan is optimal. If a limit is reached first, both are returned; the plan costs at most upper / lower times
-the optimum.
-
-LM-cut: Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. Here the
-relaxed operators that come from one quantified behaviour share its cost. So the heuristic stays admissible with conditional
-effects.
+LM-cut is due to Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. In
+this implementation, all relaxed operators of one quantified behaviour share the behaviour's cost. Therefore the heuristic is
+admissible even with conditional effects.
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ from confab.reasoner.limits import LimitError, OutOfTimeError
 from confab.reasoner.symbols import Problem
 
 WORK = 1_000_000
-"""Maximum number of operators examined to shorten the best plan on the lowest level."""
+"""Maximum number of operators that are examined to shorten the best plan on the lowest level."""
 
 
 def plan(
@@ -51,7 +49,7 @@ def plan(
     ----------
     problem : Problem
     limits : Limits
-        Maximum number of expansions of each A* search; the time limit is used up unless optimality is proved earlier.
+        Maximum number of expansions of each A* search, and the time limit. The whole time is used unless optimality is proved.
     using : Compiled, optional
 
     Returns
@@ -81,7 +79,10 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Shorten a plan by other orders of the goals, with more and more work, then by windows; use at most half of the time."""
+    """Return the outcome with a shortened plan: first by other orders of the goals with increasing work, then by windows.
+
+    Shortening uses at most half of the time.
+    """
     begin = perf_counter()
     improve = 2 * ORDERS
     while best.plan is not None and improve <= 64 * ORDERS:
@@ -102,10 +103,10 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
 
 
 def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:
-    """Return a lower bound, and a cheaper plan if the search found one.
+    """Return a lower bound on the cost of a plan, and a cheaper plan if the search finds one.
 
-    Symbols that are at rest initially must be at rest in the end. Other symbols may stay unchanged, but once a step changes them
-    they must end at rest, too. The search ignores this second condition, so the bound is valid, but the plan may be invalid.
+    Symbols that are initially at rest must be at rest in the end. Other symbols must end at rest if a step changes them. The search
+    ignores the second condition. Therefore the bound is valid, but the plan may be invalid.
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))
@@ -134,10 +135,11 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
 
 
 def lm_cut(task: Task, deadline: float | None = None) -> Bound:
-    """Return the LM-cut heuristic of a task; after the deadline, the heuristic is the cost of the cuts so far, also a lower bound.
+    """Return the LM-cut heuristic of a task as a function of a state.
 
-    Bits are numbered as in the task. Two bits are added: `always`, the precondition of operators without preconditions, and `end`,
-    which the goal's bits achieve at no cost.
+    After the deadline, the heuristic is the cost of the cuts found so far, which is also a lower bound. The computation adds two
+    bits to the bits of the task. The bit `always` is the precondition of operators without preconditions. The bit `end` is reached
+    from the bits of the goal at no cost.
     """
     always, end = task.size, task.size + 1
     needs = [bits or [always] for bits in task.needs.lists()]
@@ -157,7 +159,7 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
             added_by[bit].append(o)
 
     def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
-        """Return the h_max value of each bit, and the most expensive precondition of each operator (-1 if unreachable)."""
+        """Return the h_max value of each bit, and the most expensive precondition of each operator, or -1 if unreachable."""
         value = [math.inf] * (task.size + 2)
         missing = [len(bits) for bits in needs]
         support = [-1] * len(needs)
@@ -195,7 +197,7 @@ def lm_cut(task: Task, deadline: float | None = None) -> Bound:
                 return math.inf
             if value[end] == 0.0:
                 return total
-            zone, waiting = {end}, [end]  # bits from which the goal is reached at no cost
+            zone, waiting = {end}, [end]  # bits from which operators without cost lead to the goal
             while waiting:
                 for o in added_by[waiting.pop()]:
                     bit = support[o]

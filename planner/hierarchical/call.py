@@ -1,6 +1,6 @@
-"""One planning call: the workspace, the goals, and the steps applied so far.
+"""One planning call: the workspace, the goals, and the applied steps.
 
-A goal is achieved by steps of a level, which are refined and applied to the table at once (`Call.achieve`).
+`Call.achieve` searches for steps of a level towards a goal, and immediately refines and applies them to the table.
 """
 
 from __future__ import annotations
@@ -23,37 +23,37 @@ from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 @dataclass
 class Compiled:
-    """The parts of a planning call that are reusable for problems with the same domain, individuals and static facts."""
+    """The parts of a planning call that other problems with the same domain, individuals and static facts can reuse."""
 
     program: Program
     methods: dict[str, list[Method]] = field(default_factory=dict)
 
 
 def compiled(problem: Problem) -> Compiled:
-    """Compile the behaviours of a problem, for any number of calls with other initial states and goals."""
+    """Return the compiled behaviours of a problem; calls with other initial states and goals can reuse them."""
     return Compiled(Program(problem))
 
 
 class GoalAdvice(Advice, Protocol):
-    """Steps that learned rules propose, for goals and for refinements."""
+    """Interface of learned rules that propose steps for goals and for refinements."""
 
     ranked: Ranked
-    """Function that sorts possible assignments of individuals to the roles of a method, best first."""
+    """Function that sorts possible assignments of individuals to the roles of a method, the best assignment first."""
     expects: bool
-    """Whether all goals are of kinds that were achieved before."""
+    """Whether there are rules for all open goals."""
 
     def ready(self) -> bool:
-        """Return whether the planner should follow advice now."""
+        """Return whether the effort wasted by rules is within its limit."""
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if a rule achieves the goal in one step, 2 if a rule needs more steps, 0 if no rule achieves the goal."""
+        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if no rule is for the goal."""
 
     def waits(self, cell: Cell) -> bool:
         """Return whether another open goal should be achieved first."""
 
 
 class Call:
-    """One planning call: the workspace, the goals, and the steps applied so far."""
+    """One planning call with its workspace, its goals and the applied steps."""
 
     def __init__(self, problem: Problem, using: Compiled, deadline: float | None, most: int) -> None:
         self.problem = problem
@@ -70,23 +70,23 @@ class Call:
             for cell, value in self.goal.items()
             if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals that the most abstract level doesn't see; steps added to the refinement of the last step achieve them."""
+        """Goals that the most abstract level doesn't see; additional steps in the refinement of the last step achieve them."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.aim: dict[Cell, str] = {}
-        """Goals of the latest attempt."""
+        """The goals of the latest attempt."""
         self.failed: dict[Cell, set[tuple[int | SearchBudget, ...]]] = {}
         self.progressed = False
         self.redone = 0
-        """Number of times that all steps were replaced, from the initial state on."""
+        """Number of times that all steps were undone and replaced by other steps."""
         self.saving: float | None = None
-        """Cost that the last round of shortening saved, per second."""
+        """The cost per second that the last round of shortening saved; None before shortening."""
         self.settled = False
-        """Whether steps of lower levels have been tried to bring symbols to rest that aren't at rest initially."""
+        """Whether the planner has tried to bring the symbols to rest that aren't at rest in the initial state."""
 
     def advise(self, advice: GoalAdvice) -> None:
-        """Set the advice that is followed before any search, for goals and for refinements."""
+        """Set the advice that the planner follows before any search for goals and refinements."""
         self.advice = self.refiner.advice = advice
         self.refiner.methods.ranked = advice.ranked
 
@@ -98,11 +98,11 @@ class Call:
             self.refiner.replay_checked(step)
 
     def achieve(self, level: int, cell: Cell, *budgets: SearchBudget) -> bool:
-        """Achieve one goal by refined steps of a level and keep the other goals; return whether that succeeded."""
+        """Achieve one goal by refined steps of a level and keep the achieved goals; return whether that succeeded."""
         return self.reach(level, {cell: self.goal[cell]}, *budgets)
 
     def reach(self, level: int, targets: dict[Cell, str], *budgets: SearchBudget) -> bool:
-        """Apply refined steps of a level after which the targets and all achieved goals hold; return whether steps were found."""
+        """Apply refined steps of a level so that the targets and all achieved goals hold; return whether that succeeded."""
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
         kept: Mapping[Cell, str] = self.kept
@@ -115,7 +115,7 @@ class Call:
             above, visible = self.space.refining(first), self.space.visible
 
             def keep(cell: Cell, value: str) -> str | None:
-                # An amount that a goal bounds must stay as the step left it, not just within the bound.
+                # An amount must keep the value of the step, even if a goal only bounds the amount.
                 return above(cell, value) if visible(first, cell) else kept.get(cell) or above(cell, value)
 
         steps = self.refiner.achieve(level, targets, keep, budgets)
@@ -136,15 +136,15 @@ class Call:
         return True
 
     def met(self, cell: Cell) -> bool:
-        """Return whether a goal holds now."""
+        """Return whether a goal holds in the current state."""
         return meets(self.table.now[cell[0]].get(cell[1], FALSE), self.goal[cell])
 
     def at_rest(self) -> bool:
-        """Return whether every symbol that the uppermost level doesn't see is at rest."""
+        """Return whether every symbol that the most abstract level doesn't see is at rest."""
         return not any(self.restless(level) for level in self.program.levels[1:])
 
     def restless(self, level: int) -> dict[Cell, str]:
-        """Return the symbols of a level that aren't at rest, with their rest values."""
+        """Return the symbols of a level that aren't at rest, each with its rest value."""
         return {
             (name, key): situation.rest
             for name, situation in self.problem.domain.situations.items()
@@ -159,7 +159,7 @@ class Call:
             self.space.counts[level].add(counts)
 
     def outcome(self, status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
-        """Return the outcome of the call, with its counts."""
+        """Return the outcome of the call with the counts of its searches."""
         cache, given_up = self.refiner, tuple(self.given_up)
         return Outcome(
             status,
@@ -187,7 +187,7 @@ class Call:
 
 
 def fresh_call(call: Call, problem: Problem) -> Call:
-    """Return a new call from the initial state that shares the known refinements and nogoods of `call`."""
+    """Return a new call from the initial state of a problem; the new call shares the refinements and nogoods of `call`."""
     other = Call(problem, call.using, call.space.deadline, call.space.most)
     other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
     return other
@@ -196,7 +196,7 @@ def fresh_call(call: Call, problem: Problem) -> Call:
 def settle(call: Call) -> bool:
     """Bring all symbols that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
 
-    A held object is put where a goal requires it if a few steps suffice for that, otherwise at any place.
+    A held object is put at its goal if a few steps suffice for this, otherwise at any place.
     """
     for level in reversed(call.program.levels[1:]):
         targets = call.restless(level)

@@ -1,11 +1,11 @@
-"""Search for a few relevant steps towards some targets, by iterative deepening on a table that is changed and undone.
+"""Search for a few relevant steps that achieve targets, by iterative deepening on a table.
 
-targets:  the symbols to be changed, with their wanted values
-off:      symbols that don't yet have their required final value; the search ends when there are none
-changed:  the symbols that differ from the start, with their values, which identify a state
+targets:  the symbols to be changed, each with its required value
+off:      symbols without their required final value; the search succeeds when there are none
+changed:  the symbols that differ from the start, each with its value; these values identify a state
 
-Only relevant behaviours are tried (`confab.planner.hierarchical.relevance`), so a shortest sequence of relevant steps is found.
-Longer sequences, and other steps, are left to the search of a scope (`confab.planner.hierarchical.scope`).
+The search tries only relevant behaviours (`confab.planner.hierarchical.relevance`). Therefore it finds a shortest sequence of
+relevant steps. Longer sequences and other steps require the search of a scope (`confab.planner.hierarchical.scope`).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE
 
 Barred: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
-"""A quantified behaviour, and the state in which it is barred (the changes since the start)."""
+"""A quantified behaviour, and the state in which the behaviour is barred, as the changes since the start."""
 MOST_EXPANSIONS = 150
 """Maximum number of expansions of one search for a few steps."""
 
 
 class Chain:
-    """A search for a few relevant steps; the search is repeated as long as one of the steps can't be refined."""
+    """A search for a few relevant steps; the caller repeats the search if a step has no refinement."""
 
     def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, longest: int) -> None:
         self.space, self.level, self.targets, self.keep, self.longest = space, level, targets, keep, longest
@@ -36,13 +36,13 @@ class Chain:
         self.barred: set[Barred] = set()
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` excludes one of the steps from the next search."""
+        """Return steps that achieve the targets, or None if no steps are found."""
         found = find(self.space, self.level, self.targets, self.keep, self.longest, self.barred)
         self.found = found or []
         return found
 
     def bar(self, position: int) -> None:
-        """Bar the step at `position` of the last result in the state in which the step couldn't be refined."""
+        """Exclude the step at `position` of the last result from the next search, in the current state of the table."""
         self.barred.add((self.found[position], frozenset(self.space.table.since(self.mark).items())))
 
 
@@ -54,9 +54,9 @@ def find(
     longest: int,
     barred: AbstractSet[Barred] = frozenset(),
 ) -> list[Ground] | None:
-    """Return the shortest sequence of at most `longest` relevant steps that achieves all targets and respects `keep`, or None.
+    """Return the shortest sequence of relevant steps that achieves all targets and respects `keep`; the table stays unchanged.
 
-    The table is unchanged afterwards.
+    Return None if no sequence of at most `longest` steps is found.
     """
     table, now = space.table, space.table.now
     counts, widest = space.counts[level], space.widest[level]
@@ -112,7 +112,7 @@ def _step(
     targets: Mapping[Cell, str],
     keep: Keep,
 ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
-    """Apply a behaviour to the table; return `off` and `changed` after the behaviour, or None if it isn't applicable."""
+    """Apply a behaviour to the table; return `off` and `changed` afterwards, or None if the behaviour isn't applicable."""
     now = space.table.now
     done = space.forward[ground[0]](*ground[1])
     if done is None:

@@ -1,7 +1,8 @@
-"""Removal of detours from a plan: steps of a level whose changes cancel out and that no step between requires.
+"""Removal of detours from a plan.
 
-Examples: a lid that is shut at the end of a step and opened at the start of the next; an object put down and picked up again.
-A step of an upper level is kept if its remaining sub-steps still have its effect; otherwise the sub-steps replace it.
+A detour consists of steps of a level whose changes cancel out and that no step between them requires. For example, one step shuts a
+lid, and the next step opens the lid again. A step of an upper level is kept if its remaining sub-steps still have its effect;
+otherwise the sub-steps replace the step.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from confab.planner.hierarchical.refinement import RefinedStep, Refiner
 from confab.planner.transitions import Cell, Changes
 
 AGAIN = 30
-"""Maximum average number of replays per step, to test whether steps are applicable without the detours."""
+"""Maximum average number of replays per step; replays test whether steps are applicable without a detour."""
 
 
 @dataclass(eq=False)
 class _Done:
-    """An applied step: its position, the step, its changes, and the mark of the table's trail before the step."""
+    """An applied step with its position, its changes, and the mark of the table's trail before the step."""
 
     number: int
     step: RefinedStep
@@ -32,11 +33,12 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
     Parameters
     ----------
     refiner : Refiner
-        The refiner's table is in the initial state before and after the call.
+        A refiner whose table is in the initial state; the function restores this state.
     steps : sequence of RefinedStep
         Steps that are applicable from the initial state.
     level : int
-        Steps of this level are removed with their refinements; where the plan has left this level, steps of a lower level are.
+        The level of the steps that are removed with their refinements. Where lower-level steps replace the level, these
+        lower-level steps are removed.
     """
     table = refiner.table
     owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
@@ -56,7 +58,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
 
 
 def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
-    """Yield the sub-steps of a step on a level, in order; where there are none, sub-steps of a lower level."""
+    """Yield the sub-steps of a step on a level in order, and lower-level sub-steps that replace steps of the level."""
     if step.level >= level or not step.steps:
         yield step
         return
@@ -69,8 +71,8 @@ def _without_cycles(
 ) -> tuple[list[_Done], int]:
     """Apply the steps that can't be removed; return these steps and the remaining number of replays.
 
-    Detours within one step of the plan (by `owners`) stay, since a search has chosen that refinement. At most `left` steps are
-    replayed.
+    A detour within a single step of the plan stays; `owners` contains the step of the plan for each position. At most `left` steps
+    are replayed.
     """
     table = refiner.table
     done: list[_Done] = []
@@ -93,7 +95,10 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return successive steps, up to `last`, that changed exactly the same symbols and restored their values; [] if none."""
+    """Return the steps, up to `last`, that changed exactly the same symbols and restored their values.
+
+    Return an empty list if there are no such steps.
+    """
     cells = last.changes[0].keys()
     its = [latest[cell] for cell in cells]
     for back in range(2, 1 + min(map(len, its), default=0)):
@@ -106,7 +111,7 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
 
 
 def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
-    """Remove the steps of `circle` if the steps between lead to the same state without them; return whether they were removed."""
+    """Remove the steps of `circle` if the steps between them still lead to the same state; return whether that succeeded."""
     table, mark = refiner.table, circle[0].mark
     first = next(i for i in reversed(range(len(done))) if done[i] is circle[0])
     ended, gone = table.since(mark), set(map(id, circle))
@@ -131,10 +136,10 @@ def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bo
 
 
 class _Assembly:
-    """Assembles steps from their remaining parts, by number, and replays each part on the table.
+    """Assembly of steps from their remaining parts; each part is replayed on the table.
 
-    A step is kept whole if all of its parts remain, the step still has its effect, and before the step all symbols are at rest that
-    its level doesn't see. Otherwise its remaining parts replace the step.
+    A step is kept if three conditions hold: all of its parts remain, the step still has its effect, and all symbols that the step's
+    level doesn't see are at rest before the step. Otherwise the remaining parts replace the step.
     """
 
     def __init__(self, refiner: Refiner, level: int, kept: Mapping[int, RefinedStep]) -> None:
@@ -143,11 +148,11 @@ class _Assembly:
         self.restless: set[Cell] = set()
 
     def of(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Return the remaining parts of steps."""
+        """Return the given steps, or their remaining parts."""
         return [left for step in steps for left in self.one(step)]
 
     def one(self, step: RefinedStep) -> list[RefinedStep]:
-        """Return a step, or its remaining sub-steps."""
+        """Return a list with the step, or with the remaining parts of the step."""
         table, space = self.refiner.table, self.refiner.space
         begin, end = self.number, self.number + len(list(parts(step, self.level)))
         mark = len(table.trail)

@@ -1,14 +1,14 @@
-"""Preconditions that the lower level inherits from the behaviours of the upper levels.
+"""Preconditions that a lower level inherits from the behaviours of the upper levels.
 
-A search of a lower level alone finds steps that refine no step of an upper level. This shortens plans, but would ignore conditions
-that only an upper level has ("a filled cup isn't moved"). So when a level is planned without the levels above, its behaviours may
-change a symbol that an upper level sees only where some behaviour of the upper level could make the same change. The conditions
-of that behaviour on the changed individuals must hold.
+A search of a lower level alone finds steps that refine no step of an upper level. Such steps may violate conditions of an upper
+level, such as "a filled cup isn't moved". Therefore the behaviours of a level that is planned alone inherit preconditions. A
+behaviour may change a symbol that an upper level sees only if some behaviour of the upper level could make the same change. The
+conditions of the upper behaviour on the changed individuals become preconditions.
 
 Two kinds of conditions aren't inherited:
 
-- conditions on other individuals of the upper behaviour (the other vessel);
-- conditions on the old value of the changed symbol, if the upper level doesn't see all of its values (the place of a held object).
+- conditions on other individuals of the upper behaviour, such as the second vessel of pouring;
+- conditions on the old value of the changed symbol, if the upper level doesn't see all values of the symbol.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from confab.reasoner.symbols import (
 
 
 def binding(problem: Problem, level: int) -> Domain:
-    """Return the domain with the preconditions of the levels above `level` added to the behaviours of that level.
+    """Return the domain in which the behaviours of a level inherit preconditions from the levels above.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def binding(problem: Problem, level: int) -> Domain:
     Returns
     -------
     Domain
-        Its plans on that level are also plans of the original domain.
+        A domain whose plans on the level are also plans of the original domain.
     """
     domain = problem.domain
     above = [behavior for behavior in domain.behaviors.values() if behavior.level < level]
@@ -60,14 +60,14 @@ def binding(problem: Problem, level: int) -> Domain:
 def _inherited(
     problem: Problem, behavior: Behavior, effect: ValueEffect, above: Sequence[Behavior]
 ) -> Iterator[Condition]:
-    """Yield the conditions that the levels above impose on an effect: at most one for each level."""
+    """Yield the conditions that the levels above impose on an effect, at most one condition for each level."""
     for level in sorted({upper.level for upper in above}):
         if problem.domain.situations[effect.situation].level > level:
             continue
         makers = [(upper, e) for upper in above if upper.level == level for e in upper.effects]
         makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]
         if not makers:
-            continue  # no behaviour of the level changes the symbol, so the level imposes nothing
+            continue  # no behaviour of the level changes the symbol; the level imposes no condition
         alternatives = [*_unseen_values(problem, behavior, effect, level)]
         alternatives += [
             group for maker in makers for group in _conditions_for(problem, behavior, effect, *maker, level)
@@ -80,7 +80,7 @@ def _inherited(
 def _unseen_values(
     problem: Problem, behavior: Behavior, effect: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield one alternative for each value of the effect that the level doesn't see; the level doesn't restrict such values."""
+    """Yield an alternative for each value of an effect that the level doesn't see; the level doesn't restrict such values."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
@@ -93,7 +93,7 @@ def _unseen_values(
 def _conditions_for(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield the conditions under which an upper behaviour could have the given effect; nothing if it never could."""
+    """Yield the conditions under which an upper behaviour could have the given effect; yield nothing if it never could."""
     terms = upper.kinds
     here = lower.kinds
     names: dict[str, str] = {}
@@ -128,7 +128,10 @@ def _conditions_for(
 
 
 def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
-    """Yield the conditions on known terms, with witnesses in place of the variables that known terms determine; drop the rest."""
+    """Yield the conditions that mention only known terms.
+
+    Also yield a witness for each variable that known terms determine, with the conditions on this variable.
+    """
     yield from (condition for condition in conditions if mentions(condition) <= known)
     for condition in conditions:
         if isinstance(condition, ValueCondition) and mentions(condition) - known == {condition.value}:

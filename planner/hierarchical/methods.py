@@ -1,8 +1,9 @@
-"""Methods: refinements with roles in place of individuals, so that a PICK refined for one hand is refined for all hands.
+"""Methods: refinements in which roles replace individuals, so that the refinement for one hand is applicable to all hands.
 
-The individuals of the refined step fill the first roles of a method. Any other role is read off the table where a condition
-determines it (the place of the van); otherwise one individual of each symmetry class is tried. Every replayed step is checked
-(`confab.planner.hierarchical.refinement`), so an inapplicable method costs time, but never gives a wrong plan.
+The individuals of the refined step fill the first roles of a method. Some other roles are determined by a condition; the individual
+is then the current value of a symbol, such as the place of a van. For each remaining role, the planner tries one individual of each
+symmetry class. Every step of a method is checked (`confab.planner.hierarchical.refinement`). Therefore an inapplicable method costs
+time, but never leads to a wrong plan.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from confab.reasoner.memory.experience import Method, OpenRole
 from confab.reasoner.symbols import Behavior, ValueCondition
 
 METHODS, CHOICES = 6, 24
-"""Maximum number of methods kept per behaviour, and of assignments of individuals to the open roles of one method."""
+"""Maximum number of methods per behaviour, and maximum number of assignments of individuals to the open roles of a method."""
 
 Roles: TypeAlias = "tuple[str | None, ...]"
-"""The individuals in the roles of a method; None where the table determines the individual."""
+"""The individuals in the roles of a method; the individual is None for a role that the table determines."""
 Ranked: TypeAlias = "Callable[[Method, list[Roles]], list[Roles]]"
 
 
@@ -42,16 +43,19 @@ class Methods:
     def __init__(self, space: Workspace, known: dict[str, list[Method]]) -> None:
         self.space, self.known = space, known
         self.ranked: Ranked = unranked
-        """Function that sorts the role assignments of a method, best first."""
+        """Function that sorts the role assignments of a method, the best assignment first."""
 
     def of(self, behavior: str, individuals: tuple[str, ...]) -> Iterator[tuple[Method, Roles]]:
-        """Yield the methods of a step, shortest first, each once for every role assignment."""
+        """Yield the methods for a step with each role assignment, the shortest method first."""
         for method in tuple(self.known.get(behavior, ())):
             for roles in self.ways(method, individuals):
                 yield method, roles
 
     def ways(self, method: Method, individuals: tuple[str, ...]) -> Iterable[Roles]:
-        """Return role assignments of a method: the step's individuals, then None for determined roles and candidates for others."""
+        """Return the role assignments of a method for the individuals of a step.
+
+        An assignment contains the individuals of the step, None for each determined role, and a candidate for each other role.
+        """
         subgoals = self.space.subgoals
         choices: list[Sequence[str | None]] = []
         for role in method.open:
@@ -65,7 +69,10 @@ class Methods:
         return self.ranked(method, ways) if len(ways) > 1 else ways
 
     def filled(self, method: Method, roles: Roles) -> Iterator[Ground]:
-        """Yield the steps of a method, reading determined roles off the table after each step; stop if the table has no value."""
+        """Yield the steps of a method; the individuals of determined roles are read from the table before each step.
+
+        Stop if the table has no value for a determined role.
+        """
         filled = list(roles)
         first = len(roles) - len(method.open)
         for name, places in method.steps:
@@ -80,7 +87,7 @@ class Methods:
             yield name, individuals
 
     def prefer(self, method: Method) -> None:
-        """Move a replayed method to the front of its behaviour's methods, unless the first of these is shorter."""
+        """Move a successful method to the front of its behaviour's methods, unless the first method is shorter."""
         known = self.known[method.behavior]
         if known[0] is not method and len(known[0].steps) >= len(method.steps):
             known.remove(method)
@@ -94,7 +101,10 @@ class Methods:
         del known[METHODS:]
 
     def lifted(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Method:
-        """Return steps that refined a behaviour as a method: `individuals` become the first roles, all others become open roles."""
+        """Return steps that refined a behaviour as a method.
+
+        `individuals` become the first roles of the method. All other individuals become open roles.
+        """
         behaviors = self.space.program.domain.behaviors
         places: dict[str, int] = {}
         for place, individual in enumerate(individuals):
@@ -115,7 +125,7 @@ class Methods:
 def open_role(
     behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
 ) -> OpenRole:
-    """Return an open role for a parameter, with the condition that determines its individual, if there is one."""
+    """Return an open role for a parameter, with the symbol whose value determines the individual, if there is one."""
     for condition in behavior.preconditions:
         if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
             known = [places.get(terms.get(a, a)) for a in condition.arguments]

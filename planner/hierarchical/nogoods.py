@@ -1,8 +1,8 @@
-"""Nogoods: targets for which the search of a scope failed, with the state of the scope, generalised over symmetric individuals.
+"""Nogoods: targets for which the search of a scope failed, with the state of the scope.
 
-Individuals named by the targets are replaced by roles, as in a method: a search that failed for one parcel fails for every parcel
-with the same static facts, if the rest of the scope is in the same state. A nogood saves a search; it never proves that there is
-no plan.
+Roles replace the individuals that the targets name. For example, a search that failed for one parcel also fails for every parcel
+with the same static facts, if the rest of the scope has the same state. A nogood saves a search, but never proves that there is no
+plan.
 """
 
 from __future__ import annotations
@@ -18,18 +18,21 @@ from confab.reasoner.symbols import State
 Term: TypeAlias = "str | int"
 """An individual, or the number of a role."""
 Held: TypeAlias = "tuple[str, tuple[Term, ...], Term, Term | None]"
-"""A situation type and its arguments, their value when the search failed, and the value to be kept (None: any value)."""
+"""A situation type, its arguments, the value at the time of the failed search, and the required final value.
+
+The required final value is None if any value is allowed.
+"""
 
 
 class Nogoods:
-    """The nogoods of one program, valid for all initial states and goals."""
+    """The nogoods of one program; they are valid for all initial states and goals."""
 
     def __init__(self, space: Workspace) -> None:
         self.space = space
         self.known: dict[object, list[list[Held]]] = {}
 
     def apply(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> bool:
-        """Return whether a search for symmetric targets has failed with this budget, in a scope in the same state."""
+        """Return whether a search for symmetric targets with the same budget has failed in a scope with the same state."""
         roles = individuals(targets)
         known = self.known.get(self.key(level, targets, roles, budget))
         if not known:
@@ -48,7 +51,7 @@ class Nogoods:
         return any(all(map(holds, nogood)) for nogood in known)
 
     def learn(self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget, around: State) -> None:
-        """Record that the search for targets failed with a budget, in a scope in the state `around`."""
+        """Record that the search for targets with a budget failed in a scope with the state `around`."""
         roles = individuals(targets)
 
         def lifted(term: str) -> Term:

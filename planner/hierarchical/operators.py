@@ -1,11 +1,12 @@
-"""Behaviours compiled to Python source: functions for their changes, and for the bindings with which an effect achieves a value.
+"""Behaviours compiled to Python functions.
 
-Each behaviour has a function ``forward`` (`confab.planner.transitions`); each effect has a function ``achieve(key …, value)``.
-``achieve`` yields every binding with which the effect would set that symbol to that value, with the unmet preconditions.
+Each behaviour has a function ``forward`` that returns its changes (`confab.planner.transitions`). Each effect has a function
+``achieve(key …, value)``. This function yields every binding with which the effect would give the value to the symbol. The unmet
+preconditions of each binding are also yielded.
 
-An unbound parameter is enumerated by the cheapest of these sources: a static relation to a bound term; the inverse of a situation
-type that no behaviour can change for these individuals; the members of its class. Terms that only the state determines are bound
-last. Conditions on them are *soft*: if one fails, another value of the term is a subgoal.
+The candidates for an unbound parameter come from the cheapest source. The sources are a static relation to a bound term, the
+holders of a value that no behaviour can change, and the members of the parameter's class. Terms that only the state determines are
+bound last. Conditions that depend on the state are *soft*: a soft condition may be unmet, and subgoals then help to satisfy it.
 """
 
 from __future__ import annotations
@@ -41,16 +42,19 @@ from confab.reasoner.symbols import (
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
-"""Function that yields the arguments and the positions of unmet conditions; also the binding if a condition is unmet."""
+"""Function that yields the arguments of a behaviour, the positions of unmet conditions, and a binding.
+
+The binding is None if all conditions are met.
+"""
 
 
 @dataclass(frozen=True)
 class Achiever:
-    """One effect of one behaviour, as an achiever of its value.
+    """An effect of a behaviour, as an achiever of the effect's value.
 
-    `soft` lists the conditions that depend on the state. `determined` maps a variable to the symbol that has the variable as its
-    value: a situation type and argument terms. For a rule, `determining` lists the conditions that determine variables. If `deep`,
-    the facts inside a nested witness are subgoals of a negated condition, too.
+    `soft` contains the conditions that depend on the state. `determined` maps a variable to the symbol whose value is the variable;
+    the symbol is a situation type with argument terms. For a rule, `determining` contains the conditions that determine variables.
+    If `deep`, the subgoals of a negated condition include the facts inside nested witnesses.
     """
 
     behavior: str
@@ -72,7 +76,7 @@ class BoundProgram:
 
 
 FEW = 8
-"""Maximum number of candidates that are all tried; if there are more, one of each symmetry class is tried."""
+"""Maximum number of candidates that are all tried; of more candidates, one of each symmetry class is tried."""
 
 
 class Program:
@@ -81,7 +85,7 @@ class Program:
     Parameters
     ----------
     problem : Problem
-        Its initial state and goal aren't used.
+        The problem; its initial state and goal aren't used.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -102,7 +106,10 @@ class Program:
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
     def bind(self, table: Table, few: int = FEW) -> BoundProgram:
-        """Return the functions bound to a table; if a term has more than `few` candidates, they try one of each symmetry class."""
+        """Return the functions bound to a table.
+
+        If a term has more than `few` candidates, the functions try one candidate of each symmetry class.
+        """
         if self._rules is not None:
             self._rules.define(table)
         return BoundProgram(*self._bind(table.now, table.holders, few))
@@ -118,7 +125,7 @@ class Program:
             return candidates
         groups = self.symmetry.groups(candidates)
         if len(groups) == len(candidates):
-            return candidates  # no two are interchangeable
+            return candidates  # no two candidates are symmetric
         return self.symmetry.unlike(candidates, representatives(groups, holders, {}), now)
 
     def size(self, level: int) -> int:
@@ -130,14 +137,14 @@ class Program:
         )
 
     def changing(self, level: int) -> list[SituationType]:
-        """Return the situation types that a level changes, except boolean ones."""
+        """Return the situation types that effects of a level change, except boolean situation types."""
         situations = self.domain.situations
         names = dict.fromkeys(e.situation for behavior in self.domain.at_level(level) for e in behavior.effects)
         return [situations[name] for name in names if not situations[name].boolean]
 
     @cached_property
     def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
-        """Map each static relation to a dictionary from each individual to the tuples that contain the individual."""
+        """The tuples of each static relation, indexed by the individuals in the tuple."""
         found: dict[str, dict[str, list[tuple[str, ...]]]] = {}
         for relation, rows in self.problem.relations.items():
             index = found.setdefault(relation, {})
@@ -207,7 +214,7 @@ class Program:
                 and condition.value.startswith("?")
                 and condition.value not in bound
             ):
-                # The variable is bound even if the value isn't of its class, since later tests use it.
+                # The variable is bound even if the value isn't a member of its class, because later tests use the variable.
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
                 emit(f"{written(condition.value)} = {self.writer.look(condition)}")
@@ -230,7 +237,10 @@ class Program:
 
     @staticmethod
     def _rule(rule: Behavior) -> tuple[tuple[str, ...], Achiever]:
-        """Return a rule's parameters, and the rule as an achiever of its situation type, with conditions in binding order."""
+        """Return the parameters of a rule, and the rule as an achiever of its situation type.
+
+        The conditions of the achiever are in binding order.
+        """
         soft = list[Condition]()
         parameters = tuple(p.name for p in rule.parameters)
         bound = set(parameters)
@@ -256,7 +266,10 @@ class Program:
         behavior: Behavior,
         free: Sequence[str],
     ) -> tuple[str, str] | None:
-        """Return the cheapest way to enumerate one more unbound term, as the term's name and an iterable expression."""
+        """Return the unbound term with the cheapest source of candidates, and an expression for the candidates.
+
+        Return None if no parameter is unbound.
+        """
         found: list[tuple[float, str, str]] = []
         for condition in waiting:
             match condition:
@@ -280,12 +293,12 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an iterable expression for the candidates; of many, only free candidates of each symmetry class and state."""
+        """Return an expression for the candidates of a term; of many candidates, a free candidate of each symmetry class."""
         taken = next((identifier("holders", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
-        """Return True if no behaviour of this level can change the truth of a condition."""
+        """Return whether no behaviour on the level of `behavior` can change the truth of a condition."""
         match condition:
             case ValueCondition(situation, arguments, _, _):
                 return not self.changeable(situation, arguments, kinds, behavior)
@@ -304,7 +317,7 @@ class Program:
     ) -> bool:
         """Return whether an effect on the level of `behavior` can change a symbol with these terms."""
         if situation in self.domain.rules:
-            return True  # assumed: the rules may depend on a symbol that changes
+            return True  # the rules may depend on a symbol that changes
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
             others = other.kinds
@@ -328,7 +341,7 @@ class Program:
 
 
 def named(problem: Problem, rests: bool = True) -> list[str]:
-    """Return the individuals that behaviours and rules name, and (if `rests`) the default values and rest values."""
+    """Return the individuals that behaviours and rules name; if `rests`, also the default values and rest values."""
     every: set[str] = set()
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
     for behavior in (*problem.domain.behaviors.values(), *rules):

@@ -1,13 +1,12 @@
-"""The recursion: steps of one level achieve targets; each step is refined by achieving its effects on the level below.
+"""Refinement: steps of one level achieve targets, and the effects of each step are targets of the level below.
 
-achieve:  apply steps of a level after which the targets hold. Sources of steps, in this order: methods, learned rules, a search
-          for a few relevant steps, searches of scopes.
-do:       apply a step. On the lowest level, make its changes. On another level, achieve its effects as targets of the level below;
-          all other symbols that the step's level sees must stay unchanged, and symbols that it doesn't see must end at rest
-          (docs/levels.md).
+`Refiner.achieve` applies steps of a level so that the targets hold. The steps come from methods, learned rules, a search for a few
+relevant steps, or searches of scopes, in this order. `Refiner.do` applies a single step. On the lowest level, `do` makes the
+changes of the step. On any other level, `do` achieves the effects of the step on the level below. Other symbols that the step's
+level sees must end unchanged, and symbols that the level doesn't see must end at rest (docs/levels.md).
 
-A step that can't be refined is barred in the state where it was tried, and the search continues without it. A successful
-refinement is kept as a method, a failed search of a scope as a nogood.
+If a step has no refinement in a state, the step is barred in this state, and the search continues. A successful refinement is
+stored as a method. A failed search of a scope is stored as a nogood.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE
 
 LONG = 4
-"""Minimum number of steps of a replayed method from which needless steps are removed."""
+"""Minimum number of steps of a replayed method for which superfluous steps are removed."""
 ATTEMPTS, FEW_ATTEMPTS = 40, 4
-"""Maximum number of searches for refinable steps: in general, and while symbols that aren't at rest may block steps."""
+"""Maximum number of searches for steps with refinements: in general, and before all symbols have been brought to rest."""
 
 
 class RefinedStep(NamedTuple):
-    """An applied step: `bindings` are the individuals of its variables, `steps` its refinement."""
+    """An applied step; `bindings` are the individuals of its variables, and `steps` are its refinement."""
 
     level: int
     behavior: str
@@ -43,9 +42,9 @@ class RefinedStep(NamedTuple):
 
 
 class RefinementTask(NamedTuple):
-    """A step to be refined: its behaviour, and the individuals of its parameters and variables.
+    """A step to be refined, as its behaviour and the individuals of its parameters and variables.
 
-    If `careful`, symbols that the level above doesn't see keep their values.
+    If `careful`, symbols that the level of the step doesn't see keep their values.
     """
 
     behavior: str
@@ -54,14 +53,17 @@ class RefinementTask(NamedTuple):
 
 
 class Advice(Protocol):
-    """Learned rules, which are followed before any search."""
+    """Interface of learned rules that the planner follows before any search."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
-        """Apply steps that achieve the targets and respect `keep`; on failure return None and leave the table unchanged."""
+        """Apply steps of a level that achieve the targets and respect `keep`.
+
+        On failure, return None and leave the table unchanged.
+        """
 
 
 class Refiner:
-    """Achieves targets and applies steps on the table of a workspace.
+    """Methods that achieve targets and apply steps on the table of a workspace.
 
     Parameters
     ----------
@@ -81,17 +83,20 @@ class Refiner:
         situations = space.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
-        """Refinements by task and state; a refinement is replayed when the agenda reaches the same state again."""
+        """The known refinements, by task and state; a refinement is replayed if the same task occurs in the same state."""
         self.careful = False
-        """Whether refinements leave symbols that the level above doesn't see unchanged, where possible."""
+        """Whether refinements preferably leave symbols unchanged that the level above doesn't see."""
         self.hasty = False
-        """Whether refinements are searched in small scopes only."""
+        """Whether refinements are searched only in small scopes."""
         self.advice: Advice | None = None
         self.at: Ground | None = None
-        """The step of the most abstract level that is being refined, or whose refinement failed."""
+        """The step of the most abstract level that is being refined, or the last step whose refinement failed."""
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
-        """Apply a step, refined to primitives, and return it; on failure return None and leave the table unchanged."""
+        """Apply a step with its refinement to primitives, and return the refined step.
+
+        On failure, return None and leave the table unchanged.
+        """
         done = self.space.forward[name](*arguments)
         if done is None:
             return None
@@ -122,15 +127,18 @@ class Refiner:
         budgets: Sequence[SearchBudget],
         task: RefinementTask | None = None,
     ) -> Sequence[RefinedStep] | None:
-        """Apply steps of a level that achieve the targets and respect `keep`; on failure return None and leave the table unchanged.
+        """Apply refined steps of a level that achieve the targets and respect `keep`, and return these steps.
+
+        On failure, return None and leave the table unchanged.
 
         Parameters
         ----------
         level : int
         targets : mapping of cell to value
         keep : function of a cell and its first value
+            Returns the required final value of the cell; None if any value is allowed.
         budgets : sequence of SearchBudget
-            Budgets that are tried one after the other.
+            Budgets that are tried one after another.
         task : RefinementTask, optional
             The step to be refined; None if the targets are goals.
         """
@@ -162,9 +170,10 @@ class Refiner:
     def searched(
         self, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
     ) -> list[RefinedStep] | None:
-        """Search for steps of a level with one budget and apply them; on failure return None and leave the table unchanged.
+        """Search for steps of a level with one budget, and apply the steps.
 
-        If the steps leave a changed symbol with a wrong value, the search is repeated with that symbol as an additional target.
+        If the steps leave a changed symbol with a wrong value, the search is repeated with this symbol as an additional target. On
+        failure, return None and leave the table unchanged.
         """
         if budget.rules:
             return self.advice.follow(level, targets, keep) if self.advice is not None else None
@@ -203,7 +212,7 @@ class Refiner:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def targets(self, level: int, changes: Sequence[Change]) -> dict[Cell, str]:
-        """Return the symbols that a step changes, with their new values, except totals that the level doesn't see."""
+        """Return the symbols that a step changes, each with its new value, except totals that the level doesn't see."""
         now, totals = self.table.now, self.space.program.domain.aggregates
         found: dict[Cell, str] = {}
         for situation, key, value in changes:
@@ -214,7 +223,10 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a target, or a symbol changed since a mark, that doesn't have its required value; None if there is none."""
+        """Return a target or a changed symbol without its required value; None if there is none.
+
+        Changed symbols are those that were set since a mark.
+        """
         now = self.table.now
         for cell, first in self.table.before(mark).items():
             wanted = targets.get(cell) or keep(cell, first)
@@ -229,7 +241,10 @@ class Refiner:
     def replay_method(
         self, level: int, method: Method, roles: Roles, targets: Mapping[Cell, str], keep: Keep
     ) -> list[RefinedStep] | None:
-        """Apply the steps of a method; if a step fails or a value is wrong, return None and leave the table unchanged."""
+        """Apply the steps of a method.
+
+        If a step fails or a value is wrong, return None and leave the table unchanged.
+        """
         mark, steps = len(self.table.trail), list[RefinedStep]()
         for name, arguments in self.methods.filled(method, roles):
             step = self.do(level, name, arguments)
@@ -244,7 +259,10 @@ class Refiner:
         return steps
 
     def pruned(self, steps: list[RefinedStep], mark: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep]:
-        """Return the steps applied since a mark without needless steps: single steps, or pairs that undo each other."""
+        """Return the steps applied since a mark without superfluous steps.
+
+        Superfluous steps are single steps, or pairs of steps that undo each other.
+        """
         for dropped in self._idle(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
             if self._replayed(rest, mark) and self.wrong_value(mark, targets, keep) is None:
@@ -253,12 +271,15 @@ class Refiner:
         return steps
 
     def _replayed(self, steps: Sequence[RefinedStep], mark: int) -> bool:
-        """Replace the steps applied since a mark by other steps; return whether all are applicable."""
+        """Replace the steps applied since a mark by other steps; return whether all of these steps are applicable."""
         self.table.undo(mark)
         return all(self.replay_checked(step) is not None for step in steps)
 
     def _idle(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
-        """Return positions of single steps that change only symbols with arbitrary final values, and of pairs that cancel out."""
+        """Return sets of positions of possibly superfluous steps.
+
+        A set contains a single step that changes only symbols with arbitrary final values, or two steps that cancel out.
+        """
         self.table.undo(mark)
         changes: list[Changes] = []
         for step in steps:
@@ -271,7 +292,11 @@ class Refiner:
         return alone + [{i, j} for j, (old, new) in enumerate(changes) for i in range(j) if changes[i] == (new, old)]
 
     def replay_checked(self, step: RefinedStep) -> RefinedStep | None:
-        """Replay a step with the same sub-steps and return it with its present bindings; None if it isn't applicable."""
+        """Apply a step with the same sub-steps, and return the step with its current bindings.
+
+        Return None and leave the table unchanged if the step or a sub-step isn't applicable, or if the refinement doesn't have the
+        effect of the step.
+        """
         level, name, arguments, _, below = step
         done = self.space.forward[name](*arguments)
         if done is None:
@@ -294,7 +319,7 @@ class Refiner:
         return RefinedStep(level, name, arguments, done[0], tuple(inner))
 
     def replay(self, step: RefinedStep) -> bool:
-        """Apply the primitives of a step that was applied in this same state before; return whether all were applicable."""
+        """Apply the primitives of a step without checks of its effect; return whether all primitives were applicable."""
         if step.steps:
             return all(self.replay(child) for child in step.steps)
         done = self.space.forward[step.behavior](*step.arguments)

@@ -1,4 +1,4 @@
-"""Regrouping: groups steps of one level under behaviours of the upper levels that have the same effect."""
+"""Regrouping: runs of steps of one level become refinements of upper-level steps with the same effect."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ LONGEST = 60
 
 
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan of one level with runs of its steps grouped under steps of the upper levels that have the same effect.
+    """Return a plan of one level in which runs of steps are grouped under upper-level steps with the same effect.
 
-    As few steps as possible stay ungrouped. The result may violate the rules of levels; `validate` then rejects it.
+    As few steps as possible stay ungrouped. The result may be invalid; `validate` then rejects the plan.
     """
     steps = list(plan.steps)
     for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
         try:
             grouped = _grouped(problem, steps, level)
-        except OutOfTimeError:  # the plan stays ungrouped
+        except OutOfTimeError:  # the remaining levels stay ungrouped
             break
         if grouped == steps:
             break
@@ -35,9 +35,10 @@ def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
 
 
 def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
-    """Return the steps grouped under steps of a level with the same effects: as many steps as possible, in the fewest groups.
+    """Return the steps grouped under steps of a level with the same effects.
 
-    At the beginning and end of a group, all changed symbols that the level doesn't see are at rest.
+    As many steps as possible are grouped, in as few groups as possible. At the begin and at the end of a group, all changed symbols
+    that the level doesn't see are at rest.
     """
     try:
         task = ground(problem, level, goal={})  # the level may see none of the goals
@@ -84,7 +85,7 @@ def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
 
 
 def _at_rest(problem: Problem, course: Sequence[State], level: int) -> Iterator[bool]:
-    """Yield for each state whether all changed symbols that a level doesn't see are at rest."""
+    """Yield, for each state, whether all changed symbols that a level doesn't see are at rest."""
     rests = {
         name: kind.rest
         for name, kind in problem.domain.situations.items()
@@ -99,7 +100,7 @@ def _at_rest(problem: Problem, course: Sequence[State], level: int) -> Iterator[
 
 
 def _state(task: Task, values: State) -> int:
-    """Return the state of a level's task in which the symbols have the given values."""
+    """Return the state of a grounded task in which the symbols have the given values."""
     facts = sum(1 << bit for bit, fact in enumerate(task.facts) if values.get(fact.symbol, FALSE) == fact.value)
     absent = sum(1 << bit for bit, fact in task.complements.items() if values.get(fact.symbol, FALSE) != fact.value)
     state = facts | absent

@@ -1,7 +1,7 @@
-"""Relevant behaviours: achievers of a wanted value, achievers of their unmet conditions, and so on backwards.
+"""Relevant behaviours: achievers of a required value, achievers of their unmet conditions, and so on backwards.
 
-A chain is a sequence of achievers from an applicable behaviour to a wanted value. Its length is a lower bound on the number of
-steps, because each unmet condition is considered alone.
+A chain is a sequence of achievers from an applicable behaviour to the required value. The length of a chain is a lower bound on the
+number of steps, because each unmet condition is considered separately.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from confab.planner.transitions import Cell, Key, arguments_of
 from confab.reasoner.symbols import TRUE
 
 Asked: TypeAlias = "set[tuple[str, Key, str]]"
-"""Subgoals examined so far: situation type, key and value."""
+"""The examined subgoals, each as a situation type, a key and a value."""
 QUESTIONS = 1000
-"""Maximum number of values that are examined on the chains towards one value."""
+"""Maximum number of values that are examined on the chains towards one required value."""
 
 
 def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
-    """Yield each applicable behaviour of a level that starts a chain of at most `depth` steps towards a value in `off`, once."""
+    """Yield the distinct applicable behaviours of a level that start a chain of at most `depth` steps to a value in `off`."""
     given: set[Ground] = set()
     for cell, value in off.items():
         for length, ground in chains(space, level, cell, value):
@@ -42,10 +42,11 @@ def chains(
     met: dict[str, None] | None = None,
     asked: Asked | None = None,
 ) -> Iterator[tuple[int, Ground | None]]:
-    """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
+    """Yield the applicable behaviours that start chains towards a value, each with the length of the chain, shortest first.
 
-    The search is layer by layer: achievers of the value, then achievers of their unmet conditions. A pair with None marks the start
-    of a layer. The individuals in chains are added to `met`, the examined values to `asked`.
+    The first layer contains the achievers of the value. Each further layer contains the achievers of the unmet conditions of the
+    layer before. A pair with None marks the start of a layer. The function adds the individuals in chains to `met`, and the
+    examined values to `asked`.
     """
     asked = set() if asked is None else asked
     space.subgoals.concern(frozenset((*arguments_of(cell[1]), value)))
@@ -57,7 +58,7 @@ def chains(
     while (blocked or not length) and len(asked) < questions:
         length += 1
         yield length, None
-        if blocked:  # calculated only for callers that need longer chains
+        if blocked:  # only callers that need longer chains reach this point
             subgoals = _unmet_subgoals(space, level, blocked)
         blocked = []
         for situation, key, values in subgoals:
@@ -81,7 +82,7 @@ def chains(
 def _unmet_subgoals(
     space: Workspace, level: int, blocked: list[tuple[Achiever, tuple[int, ...], Env]]
 ) -> list[Subgoal]:
-    """Return the subgoals of achievers that aren't applicable."""
+    """Return the subgoals for the unmet conditions of achievers that aren't applicable."""
     found: list[Subgoal] = []
     for achiever, unmet, env in blocked:
         space.check_time()

@@ -1,14 +1,12 @@
-"""A scope: a part of the world that is grounded and searched on one level when no short chain of relevant steps suffices.
+"""A scope: a part of the world that is grounded and searched on one level if no short chain of relevant steps suffices.
 
-focus:    the individuals that steps may involve: individuals in the targets, and individuals in chains towards the targets
-frozen:   other individuals, with a fixed state: values of individuals in focus, and individuals that a condition quantifies over;
-          with these, conditions such as "there is an individual such that …" have the same truth as in the whole world
-targets:  the symbols to be changed, with their wanted values; a function returns the values that other symbols must keep, as in
-          `confab.planner.hierarchical.chains`
+The individuals in *focus* are those in the targets, and those in chains towards the targets. Steps involve only individuals in
+focus. *Frozen* individuals have a fixed state. They are the values of individuals in focus, and the individuals that conditions
+quantify over. Because of the frozen individuals, quantified conditions have the same truth value as in the whole world.
 
-The state of the individuals in focus is exact, so steps found here are applicable in the whole world. A failed search proves
-nothing. The caller refines the steps and bars steps that can't be refined. The package that grounds and searches is imported only
-when a scope is searched, since importing numpy takes longer than planning a small task.
+The state of the individuals in focus is exact. Therefore the steps of a successful search are applicable in the whole world. A
+failed search proves nothing. The caller refines the steps, and bars steps that have no refinement. The grounding package is
+imported only when a scope is searched, because importing numpy takes longer than planning a small task.
 """
 
 from __future__ import annotations
@@ -43,18 +41,19 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 4
-"""Maximum size of a class that is part of every scope (the hands). Objects with a value in the scope are added if there are at most
-this many."""
+"""Maximum size of a class, such as the hands, that is part of every scope.
+
+The objects with a certain value in the scope are added to the scope if their number is at most `FEW`.
+"""
 
 BITS = 20
-"""Number of bits that a search processes per relaxed operator and state, including overhead."""
+"""Number of bits that a search processes for each relaxed operator and state, including overhead."""
 LEAST, MAKING = 300, 100
-"""Minimum number of relaxed operators assumed for the cost of a task; cost of grounding a task, in examined states. A scope isn't
-grounded if the budget allows fewer than a fifth of this number of states."""
+"""Minimum number of relaxed operators that is assumed for a task, and cost of grounding a task, in examined states."""
 
 
 class Scope:
-    """A scope on one level in the present state: a grounded task that is searched again whenever a step can't be refined."""
+    """A scope on one level in the current state, as a grounded task; the caller repeats the search if a step has no refinement."""
 
     def __init__(
         self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
@@ -77,7 +76,7 @@ class Scope:
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
-            # A symbol that isn't at rest may stay unchanged; the caller detects steps that change the symbol.
+            # A symbol that isn't at rest may stay unchanged. The caller detects steps that change such a symbol.
             if wanted is not None and meets(value, wanted):
                 goal.setdefault(symbol, wanted)
         for cell in space.defined:
@@ -87,7 +86,7 @@ class Scope:
         return ground(small, level, goal=goal, most=5 * budget.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
-        """Return steps, or None if none were found; `bar` excludes one of the steps from the next search."""
+        """Return steps that achieve the targets, or None if no steps are found."""
         from confab.planner.grounded.best_first import search
 
         if self.task is None:
@@ -104,7 +103,7 @@ class Scope:
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
     def bar(self, position: int) -> None:
-        """Bar the step at `position` of the last plan in its state, because the step can't be refined there."""
+        """Exclude the step at `position` of the last plan from the next search, in the state before this step."""
         assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:
@@ -114,7 +113,7 @@ class Scope:
 
 
 def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: SearchBudget) -> set[str] | None:
-    """Return the individuals relevant to reaching the targets; None stands for all individuals."""
+    """Return the individuals in focus for the given targets; None means all individuals."""
     if budget.questions is None:
         return None
     program, table = space.program, space.table
@@ -128,7 +127,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
     met.update(dict.fromkeys(space.subgoals.spare(met, level, budget.spares)))
-    for individual in tuple(met):  # add values of the individual, and objects with it as value if there are few
+    for individual in tuple(met):  # add the values of the individual, and the few objects whose value is the individual
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:
                 continue
@@ -144,7 +143,10 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
 def problem_of(
     space: Workspace, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
 ) -> Problem:
-    """Return one level of the problem in the present state, without a goal; parameters range over `inside` (None: all)."""
+    """Return one level of the problem in the current state, without a goal.
+
+    The arguments of behaviours are restricted to the individuals in `inside`; None means no restriction.
+    """
     program, table = space.program, space.table
     problem = program.problem
     situations = problem.domain.situations
@@ -178,10 +180,11 @@ def problem_of(
 
 
 def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
-    """Return the individuals of `inside` and the frozen individuals that conditions on them depend on.
+    """Return the individuals in focus together with the frozen individuals.
 
-    Frozen individuals are the values of the individuals, the values of these values, and so on. If a behaviour quantifies over
-    individuals, individuals that have one of them as a value, or are in a static relation to one of them, are frozen, too.
+    The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies over
+    individuals, further individuals are frozen. These individuals have an individual of the scope as a value, or a static relation
+    relates them to an individual of the scope.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)
@@ -212,5 +215,5 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
 
 
 def depth(witness: Witness) -> int:
-    """Return the depth of nesting of the witnesses inside a witness, at least 1."""
+    """Return the number of nested witnesses, including the given witness."""
     return 1 + max([depth(inner) for inner in witness.conditions if isinstance(inner, Witness)], default=0)

@@ -1,4 +1,4 @@
-"""Search budgets: learned rules, a few relevant steps, then scopes, each about as expensive as all searches before it."""
+"""Search budgets: following learned rules, searching for a few relevant steps, and searching scopes of increasing size."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import dataclass
 MUCH = 1_500_000
 """Maximum work of one search in a large scope, in states times operators."""
 MOST_OPERATORS = 3_000
-"""Maximum number of quantified behaviours of a level that is searched as a whole."""
+"""Maximum number of quantified behaviours of a level for which the whole level is searched."""
 
 
 @dataclass(frozen=True)
 class SearchBudget:
-    """The limits of one search for steps towards some targets.
+    """The limits of one search for steps that achieve targets.
 
     Attributes
     ----------
     steps : int
-        Maximum number of relevant steps; 0 if a scope is searched instead.
+        Maximum number of relevant steps; 0 for the search of a scope.
     questions : int, optional
-        Maximum number of values on the chains towards one target; None searches the whole level.
+        Maximum number of values on the chains towards one target, which determine the scope; None for the whole level.
     spares : int
         Number of additional individuals of each symmetry class in the scope.
     work : int
         Maximum work of one search, in states times operators.
     rules : bool
-        Whether learned rules are followed instead of a search.
+        Whether the planner follows learned rules instead of searching.
     """
 
     steps: int = 0
@@ -36,13 +36,13 @@ class SearchBudget:
 
 
 BY_RULES = SearchBudget(rules=True)
-"""Budget for following learned rules, which limit their own work."""
+"""Budget for following learned rules; the rules have a separate limit of work."""
 ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), SearchBudget(steps=4)
-"""Budgets for one relevant step towards a goal, for a few steps towards a goal, and for a few steps in a refinement."""
+"""Budgets for one relevant step towards a goal, for a few relevant steps towards a goal, and for a refinement."""
 SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)
 WIDE, WHOLE = SearchBudget(questions=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
 
 
 def scopes(size: int) -> tuple[SearchBudget, ...]:
-    """Return the budgets for searching scopes of a level with `size` quantified behaviours, cheapest first."""
+    """Return the budgets for searching scopes of a level with `size` quantified behaviours, the cheapest budget first."""
     return (SMALL, WIDER, WHOLE if size <= MOST_OPERATORS else WIDE)

@@ -1,4 +1,4 @@
-"""The point at which planning gave up: the goal, the step that wasn't refined, and amounts that were insufficient."""
+"""The explanation of a failed planning call: the current goal, the step without a refinement, and insufficient amounts."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
-"""Maximum number of values and of achievers that are examined to find the obstacle of a goal, and of amounts reported."""
+"""Maximum number of examined values, of examined achievers, and of reported amounts."""
 
 
 def gave_up(call: Call, why: str) -> Reason:
-    """Return the reason why planning gave up and the point it had reached, in the ontology's terms."""
+    """Return the reason `why` planning gave up, with the number of reached goals, the current goal and the current step."""
     parts, terms = [why], dict[str, None]()
     if call.aim:
         goals = [str(Fact(Symbol(cell[0], arguments_of(cell[1])), value)) for cell, value in call.aim.items()]
@@ -36,7 +36,10 @@ def gave_up(call: Call, why: str) -> Reason:
 
 
 def missing_amounts(call: Call) -> Iterator[str]:
-    """Yield the requirements on amounts that the final state doesn't meet, for behaviours towards the first goal in `aim`."""
+    """Yield the requirements on amounts that the final state doesn't meet.
+
+    The requirements are those of the behaviours that could achieve the first goal of the latest attempt.
+    """
     space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):
         return

@@ -1,7 +1,7 @@
 """Subgoals: symbols with alternative values that could satisfy an unmet condition of an achiever.
 
-If a symbol has many possible values, one value of each symmetry class is proposed, so a thousand free places count as one. Values
-in goals are proposed, too.
+If a symbol has many possible values, the subgoal contains one value of each symmetry class, and the values of goals. Therefore a
+thousand free places count as one place.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ from confab.reasoner.symbols import (
 )
 
 Subgoal: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
-"""Situation type, key, and alternative values."""
+"""A subgoal: a situation type, a key, and alternative values."""
 DEEPEST = 8
-"""Maximum depth of nested rules examined for missing facts."""
+"""Maximum depth of nested rules that are examined for missing facts."""
 Env: TypeAlias = "Mapping[str, str | None]"
 
 
 class Subgoals:
-    """Turns unmet conditions into subgoals, for one table and goal.
+    """Methods that return subgoals for unmet conditions, for one table and goal.
 
     Parameters
     ----------
     program : Program
     table : Table
     goal : mapping of cell to value
-        Each value is proposed for its own symbol, and isn't offered to other symbols as a free value.
+        The goals of the call. A goal's value is a candidate for the goal's symbol, and doesn't count as free for other symbols.
     """
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
@@ -78,7 +78,10 @@ class Subgoals:
             self.wanted.setdefault(situation, {})[value] = None
 
     def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Subgoal]:
-        """Return the alternative subgoals for condition `number` of `achiever.soft`, cached until the table changes."""
+        """Return the alternative subgoals for the condition at position `number` of `achiever.soft`.
+
+        The result is cached until the table changes.
+        """
         self._forget()
         scope = self._scopes.get((id(achiever), number))
         if scope is None:
@@ -90,7 +93,7 @@ class Subgoals:
         return found
 
     def _forget(self) -> None:
-        """Clear the caches if the table has changed since they were filled."""
+        """Clear the caches if the table has changed."""
         if self._age != self.table.age:
             self._age = self.table.age
             self._fresh.clear()
@@ -141,12 +144,12 @@ class Subgoals:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
             case (
                 RelationCondition() | ClassCondition() | EqualityCondition()
-            ):  # only a choice of other individuals could satisfy the condition
+            ):  # only other individuals could satisfy the condition
                 pass
         yield from self._redetermined(achiever, condition, env, level)
 
     def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Subgoal]:
-        """Yield subgoals: facts that would make some individual satisfy a witness."""
+        """Yield the subgoals for a witness: facts that would make some individual satisfy the witness."""
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
         for individual in self.one_of_each(witness.kind, env.values()):
@@ -159,7 +162,7 @@ class Subgoals:
                 yield from self.of(achiever, c, {**env, witness.variable: individual}, level)
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Subgoal]:
-        """Return alternative subgoals that may make a defined situation true, or false."""
+        """Return alternative subgoals that may make a defined situation true if `wanted`, otherwise false."""
         if self._entered is not None and situation in self._circular:  # the result depends on the rules entered before
             return list(self._defining(situation, key, wanted, level))
         self._forget()
@@ -195,12 +198,15 @@ class Subgoals:
         self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
-        """Return the candidates that `concern` has set; if there are none, a few candidates with the fewest unmet conditions."""
+        """Return the candidates that are individuals of the current search (`concern`).
+
+        If there are none, return a few candidates with the fewest unmet conditions.
+        """
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 
     def concern(self, individuals: frozenset[str]) -> None:
-        """Set the individuals that are tried first in the witnesses of rules."""
+        """Set the individuals of the current search, which are preferred in the witnesses of rules."""
         if self.program.rules and individuals != self._concern:
             self._concern = individuals
             self._fresh.clear()
@@ -215,7 +221,10 @@ class Subgoals:
         return self.holds(rule, condition, env)
 
     def _amounts(self, condition: Comparison, env: Env) -> Iterator[Subgoal]:
-        """Yield for each amount in a comparison the bound that satisfies the comparison while the other amounts stay the same."""
+        """Yield a subgoal for each amount in a comparison: a bound that satisfies the comparison.
+
+        The bound of one amount assumes that all other amounts stay unchanged.
+        """
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
         for part in dict.fromkeys((*inside(condition.left), *inside(condition.right))):
@@ -235,7 +244,7 @@ class Subgoals:
                 yield part.situation, key, (f"{flipped}{amount_written(limit)}".lstrip("="),)
 
     def worth(self, condition: Comparison, env: Env) -> Number:
-        """Return the present value of a comparison's left side minus its right side."""
+        """Return the current difference between the left and the right side of a comparison."""
         names = self._about(condition)[2]
         function = self._worths.get(id(condition))
         if function is None:
@@ -248,10 +257,10 @@ class Subgoals:
         return found
 
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Subgoal]:
-        """Yield subgoals for other values of the symbols that determine a condition's variables.
+        """Yield subgoals for other values of the symbols that determine the variables of a condition.
 
-        Only the static part of a witness must hold for such a value (the room has a door, which is shut); the unmet rest of the
-        witness becomes further subgoals.
+        The condition must hold with the other value. If the condition is a witness, only its static conditions must hold; the unmet
+        conditions of the witness become further subgoals.
         """
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
@@ -274,7 +283,10 @@ class Subgoals:
                         yield from self._lacking(achiever, condition, {**env, term: value}, level)
 
     def _possible(self, condition: Condition) -> Condition:
-        """Return a witness reduced to its static conditions, always the same object; return other conditions unchanged."""
+        """Return a positive witness reduced to its static conditions, or any other condition unchanged.
+
+        Repeated calls return the same object.
+        """
         if not isinstance(condition, Witness) or condition.negated:
             return condition
         if id(condition) not in self._possibles:
@@ -284,9 +296,9 @@ class Subgoals:
         return self._possibles[id(condition)][0]
 
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
-        """Return whether a condition is static, whether it compares individuals, its variables, and the condition itself.
+        """Return whether a condition is static, whether the condition compares individuals, its variables, and the condition.
 
-        The cache keeps the condition so that its `id` isn't reused.
+        The cache stores the condition, because Python could otherwise reuse the `id` of the condition.
         """
         found = self._conditions.get(id(condition))
         if found is None:
@@ -298,7 +310,7 @@ class Subgoals:
         return found
 
     def _negation(self, condition: Condition) -> Condition:
-        """Return the negation of a condition, the same object each time."""
+        """Return the negation of a condition; repeated calls return the same object."""
         found = self._negations.get(id(condition))
         if found is None:
             opposite = replace(condition, negated=not condition.negated)
@@ -322,7 +334,11 @@ class Subgoals:
         return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
-        """Return values of a class for a symbol: its goal value, and one value of each symmetry class, preferably a free value."""
+        """Return candidates of a class for the value of a symbol.
+
+        The candidates are the goal's value, and one value of each symmetry class, preferably a free value. All members of a small
+        class are candidates.
+        """
         members = self.program.problem.classes.get(kind, ())
         if len(members) <= FEW:
             return members
@@ -343,12 +359,15 @@ class Subgoals:
         return tuple(found)
 
     def burden(self, situation: str, value: str) -> int:
-        """Return 0 for a value that no object has, 2 if an object has the value as its goal requires, otherwise 1."""
+        """Return 0 for a value that no object has, 2 if an object with the value is at its goal, and 1 otherwise."""
         keys = self.table.holders[situation].get(value, ())
         return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
 
     def spare(self, excluded: Collection[str], level: int, number: int) -> Iterator[str]:
-        """Yield up to `number` more values of each symmetry class that `excluded` contains, least used values first."""
+        """Yield up to `number` additional values of each symmetry class with a member in `excluded`.
+
+        Values with the least burden come first.
+        """
         for situation in self.program.changing(level):
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
@@ -368,7 +387,8 @@ class Subgoals:
     def one_of_each(self, kind: str, excluded: Collection[str | None] = ()) -> list[str]:
         """Return the individuals of a class; if the class is large, one individual of each symmetry class and state.
 
-        For each result in `excluded`, one more individual of its symmetry class is added, since a different one may be needed.
+        If `excluded` contains one of these individuals, another individual of the same symmetry class is added, because a different
+        individual may be required.
         """
         members, symmetry = self.program.problem.classes.get(kind, ()), self.program.symmetry
         if len(members) <= FEW:
@@ -386,12 +406,12 @@ class Subgoals:
         return None if None in found else key_of(found)  # type: ignore[arg-type]
 
     def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
-        """Return whether a condition of an achiever holds now; terms that `env` doesn't bind have no value."""
+        """Return whether a condition of an achiever holds in the current state; terms without a binding have no value."""
         test, names = self._evaluator(achiever, condition, env, False)
         return bool(test(*[env.get(name) for name in names]))
 
     def _satisfying(self, achiever: Achiever, witness: Witness, env: Env) -> list[str]:
-        """Return the individuals that satisfy all conditions of a witness now."""
+        """Return the individuals that satisfy all conditions of a witness in the current state."""
         test, names = self._evaluator(achiever, witness, env, True)
         found: list[str] = test(*[env.get(name) for name in names])
         return found
@@ -399,7 +419,10 @@ class Subgoals:
     def _evaluator(
         self, achiever: Achiever, condition: Condition, env: Env, individuals: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
-        """Return a function that tests a condition, or lists the individuals of a witness, and the names of its arguments."""
+        """Return a function that tests a condition, and the names of the function's arguments.
+
+        If `individuals`, the function returns the individuals that satisfy a witness.
+        """
         key = id(condition), individuals, *[name in env for name in self._about(condition)[2]]
         known = self._tests.get(key)
         if known is None:

@@ -1,4 +1,4 @@
-"""Symmetry classes: individuals with the same static facts, of which one can represent all."""
+"""Symmetry classes: sets of individuals with the same static facts; one individual can represent its class."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from confab.planner.transitions import Key
 from confab.reasoner.symbols import Problem
 
 ENDS = 8
-"""Number of individuals at each end of a large class that are examined for a different state."""
+"""Number of individuals at each end of a large class whose states are examined."""
 
 
 class SymmetryClasses:
     """The symmetry classes of a problem's individuals.
 
-    Two individuals are symmetric if they belong to the same classes, exist from the same level on, and exchanging them leaves
-    every static relation unchanged. An individual that a behaviour names is symmetric to no other.
+    Two individuals are symmetric if they belong to the same classes, exist on the same levels, and have the same tuples in every
+    static relation. An individual that a behaviour names is symmetric to no other individual.
 
     Parameters
     ----------
     problem : Problem
     named : iterable of str
-        Individuals that behaviours mention.
+        Individuals that behaviours name.
     """
 
     def __init__(self, problem: Problem, named: Iterable[str]) -> None:
@@ -51,10 +51,10 @@ class SymmetryClasses:
         self._named = frozenset(named)
         of = {s.name: s.arguments for s in problem.domain.situations.values()}
         self._whose = {name: problem.members(kinds[0]) for name, kinds in of.items() if len(kinds) == 1}
-        """Maps each situation type with one argument to the individuals that can have it."""
+        """The individuals that can be the argument of each situation type with one argument."""
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:
-        """Return `members` grouped by symmetry class, in their order."""
+        """Return `members` grouped by symmetry class, in the given order."""
         found = self._groups.get(members)
         if found is None:
             by_class: dict[int, list[str]] = {}
@@ -64,9 +64,9 @@ class SymmetryClasses:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return the known members, and one more member for each other state that members of a symmetry class have.
+        """Return the known members, and an additional member for each other state of a member in the same symmetry class.
 
-        In a large class only the first and last few members are examined, since values are used up from one end.
+        In a large class, only a few members at both ends are examined, because the planner assigns values from one end.
         """
         found = list(known)
         classes = {self.class_of.get(one) for one in known}
@@ -87,7 +87,7 @@ class SymmetryClasses:
         return found
 
     def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
-        """Return the values of an individual, one for each mapping in `cells`; None for a value that no behaviour names."""
+        """Return the values of an individual in the mappings `cells`; None replaces values that no behaviour names."""
         values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 
@@ -99,12 +99,11 @@ def representatives(
     cursors: dict[int, int] | None = None,
     burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
-    """Return one value per group: the first value that no object has and no goal requires.
+    """Return one value for each group: the first value that no object has and no goal requires.
 
-    If a group has no such value, a few values that no object has are returned; if there are none, the value of least `burden`.
-    With `cursors` (by the group's `id`), a search starts where the previous search ended, so a long group isn't scanned again.
-
-
+    For a group without such a value, return a few values that no object has, or otherwise the value with the least `burden`.
+    `cursors` contains the position of the last result in each group, by the group's `id`. The next search in the group starts at
+    this position.
 
     >>> representatives([["a", "b", "c"], ["d"]], {"a": {"x": None}}, {"b": True})
     ['c', 'd']

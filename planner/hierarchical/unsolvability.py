@@ -1,7 +1,7 @@
-"""Tests for unsolvability, run when a search gets stuck, cheapest first.
+"""Tests for unsolvability, which run after failed searches, the cheapest test first.
 
-All tests examine the lowest level only: a failure of an upper level proves nothing, since the level below may find other steps.
-A positive test stops the search. Its proof is a certificate, which `confab.planner.solve` requires and checks.
+All tests examine only the lowest level. A failed search of an upper level proves nothing, because the level below may have other
+steps. A successful test stops planning. `confab.planner.solve` requires a certificate for each proof, and checks the certificate.
 """
 
 from __future__ import annotations
@@ -21,17 +21,24 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 LOOKING = 1_800_000
-"""Work that is always allowed for examining all states, in states times relaxed operators."""
+"""Work that is always allowed for the examination of all states, in states times relaxed operators."""
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
-"""Maximum number of conditions tested for a certificate: before a search, in the paper's mode, and after failed searches."""
+"""Maximum number of conditions that the search for a certificate tests.
+
+The numbers apply before a search, in the paper's mode, and after failed searches.
+"""
 TEST = 8
-"""Work of a test, in the unit of `Workspace.effort`."""
+"""Work of testing one condition, in the unit of `Workspace.effort`."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
-"""Maximum size of a join of relaxed reachability (some 200 MB), and of the changes of a level that is grounded (600 MB)."""
+"""Maximum number of rows of a join of relaxed reachability (about 200 MB), and maximum number of changes of a grounded level
+(about 600 MB)."""
 
 
 def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
-    """Return an `UnsolvableError` with a certificate if at most `most` tests before a deadline prove that there is no plan."""
+    """Return an `UnsolvableError` with a certificate if at most `most` tests prove that there is no plan.
+
+    Return None if the tests or the time until the deadline don't suffice.
+    """
     if deadline is not None and perf_counter() >= deadline:
         return None
     from confab.planner.certificate_reasons import told
@@ -46,7 +53,10 @@ def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = N
 
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
-    """Return the facts reachable on a level under delete relaxation, from `initial` or the problem's initial state."""
+    """Return the facts of a level that are reachable under delete relaxation from `initial`.
+
+    By default, `initial` is the initial state of the problem.
+    """
     from confab.planner.grounded import reachability
 
     reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
@@ -55,7 +65,10 @@ def closed(problem: Problem, level: int, deadline: float | None, initial: State 
 
 
 def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
-    """Return the reason if grounding a level would take too much memory, since an effect makes a change per value of its symbol."""
+    """Return the reason why grounding a level would need too much memory; None if the memory suffices.
+
+    An effect leads to a separate change for each value of its symbol.
+    """
     values = {}
     for name, situation in reached.situations.items():
         rows = len(reached.tables["situation", name])
@@ -95,9 +108,10 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 
 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
-    """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of states examined.
+    """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of examined states.
 
-    The work is limited to that of the searches so far. No states are examined unless this work suffices for twice `before` states.
+    The work is limited to the work of the searches so far. If this work doesn't suffice for twice `before` states, no states are
+    examined, and the function returns `before`.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state
@@ -109,7 +123,7 @@ def looked_at(task: Task, space: Workspace, before: int) -> int:
 
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
-    """Return the reason that no reachable state satisfies the goal, if examining at most `most` states proves this."""
+    """Return the reason why no reachable state satisfies the goal; None if `most` states don't suffice for a proof."""
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)

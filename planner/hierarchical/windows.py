@@ -1,7 +1,7 @@
-"""Windows: consecutive steps of a level are replaced by cheaper steps, which are searched on the grounded level.
+"""Windows: cheaper steps replace consecutive steps of a level; a search of the grounded level finds the cheaper steps.
 
-The preconditions of upper levels apply to the new steps, too (`confab.planner.hierarchical.inherited_preconditions`). The new
-steps are refined on the table and grouped under steps of the upper levels wherever a run has the effect of such a step.
+The new steps also satisfy preconditions of upper levels (`confab.planner.hierarchical.inherited_preconditions`). The new steps are
+refined on the table. A run of new steps with the effect of an upper-level step is grouped under this step.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""A shortened plan must lose fewer than this number of level-1 steps for each primitive of mean cost that it saves."""
+"""Number of level-1 steps that a shortened plan may lose for each saved primitive of mean cost; it must lose fewer steps."""
 KEPT = 1.5
-"""Factor by which the cost must decrease before primitives replace steps of the most abstract level."""
+"""Factor by which the cost must decrease if primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
-"""Maximum number of rows of a join when a level is grounded to shorten a plan: in total, and per step of the plan."""
+"""Maximum number of rows of a join when a level is grounded for shortening: in total, and for each step of the plan."""
 
 
 def windowed(call: Call, level: int, work: int) -> None:
@@ -54,7 +54,10 @@ def windowed(call: Call, level: int, work: int) -> None:
 
 
 def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
-    """Return a cheaper sequence of unrefined steps of a level for a call's plan; None if none is found or the level is large."""
+    """Return a cheaper sequence of steps of a level for a call's plan, without refinements.
+
+    Return None if no cheaper sequence is found, or if the level is too large.
+    """
     steps = [part for step in call.steps for part in parts(step, level)]
     if any(step.level != level for step in steps):
         return None
@@ -75,7 +78,7 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
 
 
 def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
-    """Return the task of a level, with the goals and rest values that it sees; None if the level is large."""
+    """Return the grounded task of a level with the goals and rest values that the level sees; None if the level is too large."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
 
@@ -88,7 +91,10 @@ def small(problem: Problem, level: int, deadline: float | None, most: int) -> Ta
 
 
 def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
-    """Return a plan of a level in two versions: grouped under steps of the upper levels, and ungrouped."""
+    """Return two versions of a plan of one level: grouped under steps of the upper levels, and ungrouped.
+
+    For a plan of the most abstract level, return only this plan.
+    """
     if level == problem.domain.levels[0]:
         return (plan,)
     from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -97,7 +103,7 @@ def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
 
 
 def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
-    """Convert steps of a plan to the `RefinedStep` of a call."""
+    """Return the steps of a plan as instances of `RefinedStep`."""
     names = call.program.variables
     return [
         RefinedStep(
@@ -122,10 +128,10 @@ def abstract(problem: Problem, plan: Plan) -> int:
 
 
 def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
-    """Return whether a plan is cheaper than the old one, and violates no more conditions of upper levels.
+    """Return whether a new plan is cheaper than the old plan and violates no more conditions of upper levels.
 
-    The plan may lose `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If it loses such steps
-    to primitives, that is if `level` is the lowest of several, it must be cheaper by the factor `KEPT`.
+    The new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If
+    primitives replace such steps, the new plan must be cheaper by the factor `KEPT`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     lost = abstract(problem, old) - abstract(problem, new)

@@ -1,10 +1,11 @@
-"""The state shared by all searches of one call: the table of current values, the behaviours bound to it, and the budget.
+"""The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
 
-table:    the present values of all symbols; changes are made in place and can be undone
+table:    the current values of all symbols; changes are made in place and can be undone
 forward:  for each behaviour, a function of its arguments that returns its changes, or None if the behaviour isn't applicable
 achieve:  for each effect, a function of a symbol and a value that yields the arguments with which the effect achieves the value
 keep:     a function of a symbol and its first value that returns the required final value, or None if any value is allowed
-budget:   one unit (about a microsecond) for all searches; a search of a scope costs states times operators, an expansion 100
+budget:   the work of all searches, in units of about a microsecond; a search of a scope costs states times operators, and an
+          expansion costs 100
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from confab.reasoner.symbols import FALSE
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
-"""Function that returns the required final value of a changed symbol, given its first value; None if any value is allowed."""
+"""Function of a changed symbol and its first value that returns the required final value, or None if any value is allowed."""
 EXPANSION = 100
 """The cost of an expansion in the unit of the budget."""
 
 
 def no_check() -> None:
-    """Run no test for dead ends."""
+    """Do nothing; this is the default test for dead ends."""
 
 
 @dataclass
@@ -43,15 +44,15 @@ class Workspace:
     program : Program
     table : Table
     goal : mapping of cell to value
-        The task's goal; its values are proposed for subgoals.
+        The goal of the task; its values are candidates for subgoals.
     deadline : float, optional
         Time at which `LimitError` is raised, on the clock of `perf_counter`; by default the deadline of `confab.reasoner.limits`.
     most : int
-        Maximum number of expansions of all searches together; more raise `LimitError`.
+        Maximum number of expansions of all searches together; `LimitError` is raised above this number.
     most_work : float
-        Maximum work in scopes, in states times operators; more raises `LimitError`.
+        Maximum work in scopes, in states times operators; `LimitError` is raised above this work.
     dead_end_check : function
-        Called each time that the effort has doubled, to test whether the problem is unsolvable.
+        Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
     """
 
     program: Program
@@ -66,7 +67,7 @@ class Workspace:
     def __post_init__(self) -> None:
         self.expanded = self.worked = self.checked_at = self.looked = 0
         self.most_looked = EXPANSION * self.most
-        """Maximum number of achievers that are examined, including inapplicable achievers."""
+        """Maximum number of examined achievers, including inapplicable achievers."""
         if self.deadline is None:
             self.deadline = Limits().end()
         bound = self.program.bind(self.table)
@@ -93,7 +94,10 @@ class Workspace:
                 put(situation, key, value)
 
     def exists(self, situation: str, key: object) -> bool:
-        """Return True if a symbol without a value exists: its type is boolean and its arguments belong to the type's classes."""
+        """Return whether a symbol without a value exists.
+
+        Such a symbol exists if its situation type is boolean and its arguments belong to the right classes.
+        """
         kind = self.program.domain.situations[situation]
         return kind.boolean and all(
             argument in self.program.members.get(of, ())
@@ -101,7 +105,7 @@ class Workspace:
         )
 
     def visible(self, level: int, cell: Cell) -> bool:
-        """Return whether a level sees a symbol: its situation type and its individuals exist on that level."""
+        """Return whether a level sees a symbol, that is, whether the situation type and the individuals exist on the level."""
         levels = self.program.problem.value_levels
         return self.program.domain.situations[cell[0]].level <= level and (
             not levels or all(levels.get(argument, 1) <= level for argument in arguments_of(cell[1]))
@@ -110,22 +114,26 @@ class Workspace:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def refining(self, level: int, careful: bool = False) -> Keep:
-        """Return the required final values in a refinement: symbols that the level sees are unchanged, all others are at rest.
+        """Return the function of required final values in the refinement of a step of a level.
 
-        Other symbols without a rest value may have any final value; if `careful`, they are unchanged, too.
+        Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value may have any
+        final value; if `careful`, it must be unchanged.
         """
         rest = self.rest
         return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
-        """Return the required final values for steps towards a goal: achieved goals hold, all other symbols are at rest."""
+        """Return the function of required final values for steps towards a goal.
+
+        Achieved goals must hold, and all other symbols must be at rest.
+        """
         return lambda cell, first: kept.get(cell) or self.rest.get(cell[0])
 
     # ----------------------------------------------------------------------------------------------------------- the budget
 
     @property
     def effort(self) -> int:
-        """Search effort so far, in units of about a microsecond."""
+        """The effort of the searches so far, in units of about a microsecond."""
         return self.worked + EXPANSION * self.expanded
 
     def expand(self, level: int) -> None:
@@ -135,7 +143,7 @@ class Workspace:
         self._limited()
 
     def spend(self, level: int, counts: Counts, work: int) -> None:
-        """Charge the search of a scope, with its work in states times operators; raise `LimitError` if a limit is reached."""
+        """Count the search of a scope with its work in states times operators; raise `LimitError` if a limit is reached."""
         self.counts[level].add(counts)
         self.expanded += counts.expanded
         self.worked += work
