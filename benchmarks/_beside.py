@@ -119,7 +119,7 @@ def whole_process(path: Path) -> Row:
 
 
 def optimal_costs(python: str, seed: int) -> None:
-    """Compare the costs that `confab plan --optimal` proves with those of Fast Downward's optimal plans; exit if they differ."""
+    """Compare the costs that `confab plan --optimal` proves with Fast Downward's optimal costs; exit if costs differ."""
     commands = planners(python)
     downward = [w for w in commands["lama-first"] if w not in ("--alias", "lama-first")]
     command = [*downward, "--search", "astar(lmcut())"]

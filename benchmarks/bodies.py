@@ -143,7 +143,7 @@ def kept() -> list[dict[str, Any]]:
 
 
 def carry(names: Sequence[str]) -> None:
-    """Assign rollouts of older code to the present code if the first rollouts of the task and noise give equal results."""
+    """Count rollouts of older code for the present code if the first rollouts of the same task and noise are reproduced."""
     rows, now = read(), code()
     for name, noise in product(names, NOISE):
         older = [one for one in rows if (one["task"], one["noise"]) == (name, noise) and one["code"] != now]
@@ -173,7 +173,7 @@ def run(names: Sequence[str], noises: Sequence[int]) -> None:
 
 
 def tried(name: str, noise: int, seeds: Sequence[int]) -> None:
-    """Run and print rollouts of a task with development seeds, with each failure."""
+    """Run a task with development seeds, and print each rollout and failure."""
     good = 0
     for seed in seeds:
         found = row(name, noise, trial(name, noise).run(seed))

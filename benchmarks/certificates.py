@@ -163,8 +163,9 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
 def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, values: Iterable[str]) -> bool:
     """Return whether a state that a certificate allows leads to a state that the certificate excludes.
 
-    The first state is a reachable state with another value of the symbol whose claim was removed. All other claims hold in this
-    state. The plain interpreter, which shares no code with the checker, searches for the goal or the opposite of a claim.
+    A tested state is a reachable state with another value of the symbol whose claim was removed. All other claims of the
+    certificate hold in a tested state. The plain interpreter, which shares no code with the checker, searches for the goal or
+    the opposite of a claim.
     """
     at, level = meant.slots.get(symbol), meant.problem.domain.levels[-1]
     if at is None or at >= meant.stated or meant.kinds[symbol.situation].quantity is not None:

@@ -53,7 +53,7 @@ class Constant:
     said: str
 
     def __str__(self) -> str:
-        """Return the name, with the index of the number if the name has several numbers."""
+        """Return the name of the constant, with an index if the name stands for several numbers."""
         return self.name + (f" [{self.number}]" if self.number else "")
 
     def times(self, factor: float) -> float:

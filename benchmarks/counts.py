@@ -43,7 +43,7 @@ def families() -> None:
 
 
 def worlds() -> None:
-    """Plan for the shipped worlds of `docs/worlds.md`."""
+    """Print a table of plans for the shipped worlds of `docs/worlds.md`."""
     print("| scene | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
     print("|---|---|---|---|---|---|")
     for small in sorted(name for name in scenes() if name.endswith("-small")):

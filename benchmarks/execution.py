@@ -95,7 +95,7 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
 
 
 def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
-    """Return the value for empty, which belongs to no subclass of the type's range, and the other values."""
+    """Return the value that means empty, which belongs to no subclass of the range, and the other values."""
     below = {v for k, m in problem.classes.items() if content.range in problem.parents.get(k, ()) for v in m}
     values = problem.classes[content.range]
     return next(v for v in values if v not in below), [v for v in values if v in below]
@@ -388,7 +388,7 @@ def _is_source(problem: Problem, step: Step) -> bool:
 
 
 def both_hands() -> None:
-    """Print the makespan with both hands and of serial execution, and draw a Gantt chart."""
+    """Print the makespans of execution with both hands and of serial execution, and draw a Gantt chart."""
     from confab.sim.together import perform_together
     from confab.sim.verify import expectations, verify
     from confab.sim.world import PhysicsWorld

@@ -5,7 +5,8 @@ CONFAB_SIZES=66,333 …   numbers of cups; each scene has two places for each cu
 
 Cups stand at places of rooms. Three situations are derived: the room of a cup, whether a place is taken, and whether a cup is
 servable (clean and in the hall). Either a property chain and two classes define these situations, or the effects of each
-behaviour update them. A tenth of the cups must become servable. Calls of both forms alternate.
+behaviour update them. A tenth of the cups must become servable. Calls with derived situations and calls with handwritten
+effects alternate.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class Load:
         await self.request(kind, content, leave, pause)
 
     async def run(self, part: float, beside: bool) -> Load:
-        """Send a share of the honest requests, alone or, with `beside`, together with the other kinds."""
+        """Send a share of the honest requests, alone or, with `beside`, together with other kinds of requests."""
         draw, seconds = random.Random(0), SECONDS * part
         others = [(SLOW, "slow"), (ABANDONED, "abandoned"), (MALFORMED, "malformed")] if beside else []
         tasks = [
@@ -128,7 +128,7 @@ def get(query: str) -> bytes:
 
 
 def measured(part: float) -> tuple[Load, Load, str]:
-    """Return the results of honest requests alone and together with the other kinds, and the server's log."""
+    """Return the results of honest requests alone and together with other kinds of requests, and the server's log."""
     start = "from confab.start import main; main()"
     command = [sys.executable, "-c", start, "serve", "beverage-serving", "--port", "0", "--time-limit", "20"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:

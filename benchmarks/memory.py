@@ -8,7 +8,7 @@
 
 For tables, the memory learns from one problem with 4 and one with 6 objects of each of six families, with seed 100. The
 reported problems have seeds from 5000. Expansions are counted on the most abstract level. Seconds are CPU seconds of a whole
-call. A lesson plans for the goals in several orders.
+call. In a lesson, the planner plans for the goals in several orders.
 """
 
 from __future__ import annotations
@@ -226,7 +226,7 @@ def bad_memories() -> dict[str, Memory]:
 
 
 def harm(seeds: int = 1) -> None:
-    """Print, for good and bad memories, the worst ratio of expansions to planning without memory, and the worst excess."""
+    """Print for good and bad memories the worst ratio and the worst excess of expansions, compared with no memory."""
     print("| memory | strict | default | leading |\n|---|---|---|---|")
     cases = [
         problem(f, n, s)

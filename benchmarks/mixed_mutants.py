@@ -33,7 +33,7 @@ PARTS: dict[str, tuple[tuple[str, ...], str]] = {
 }
 """The modules of each part, and the mode in which worlds are judged.
 
-Proofs are judged in worlds without a plan. A planner that gives up in such a world counts as a fault of a proof.
+Proofs are judged in worlds without a plan. A planner that gives up in a world without a plan counts as a fault of a proof.
 """
 FIRST, WORLDS, SECONDS, WAITING = 8_000_000, 150, 60, 600.0
 """First seed and number of worlds, CPU seconds for all worlds, and seconds by the clock for a call on a busy machine."""

@@ -2,7 +2,7 @@
 
 The functions of kinematics compute many postures at once.
 
-``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes.
+``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes
 """
 
 from __future__ import annotations

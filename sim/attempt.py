@@ -34,7 +34,7 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres on short lines. The margin is less than `MARGIN`, since the load may have slipped after the ends were chosen."""
+"""Margin in metres on short lines, less than `MARGIN`, since the load may have slipped after the ends were chosen."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
@@ -45,7 +45,7 @@ NOWHERE = 100.0
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
 
-All margins are above `CLOSE`, since the load may slip on the way.
+The margins in `TIGHT` are above `CLOSE`, since the load may slip on the way.
 """
 
 ROUNDED = 3
@@ -61,7 +61,7 @@ SAMPLES = 1500
 """Maximum number of samples in the search for a path to one of the goals."""
 
 FINER = 4
-"""Factor by which a line that a sensor condition ends is sampled more finely than other lines."""
+"""Factor by which a line that ends on contact is sampled more finely than other lines."""
 
 BATCH, ENOUGH = 24, 6
 """Number of candidates that are checked for collisions at a time, and number of collision-free candidates that end the check."""

@@ -95,8 +95,8 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
 def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
     """Load a URDF given as text, with an optional OBJ mesh that the URDF refers to by `file_name`; return the body.
 
-    The files are temporary. Equal texts get equal file names, since PyBullet never frees its cache of files: a new name costs
-    50 KB.
+    The temporary files are deleted after loading. Equal texts get equal file names, since PyBullet never frees its cache of
+    files: a new name costs 50 KB.
     """
     with _LOADING:
         folder = Path(tempfile.gettempdir()) / _folder(os.getpid())

@@ -34,7 +34,7 @@ STOPPED_LAG = 0.03
 """Minimum lag, in metres or radians, of a base behind its command at which the base counts as blocked."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
-"""Distances in metres that are tried in turn.
+"""Distances in metres by which a robot backs off, tried in turn.
 
 The robot backs off by the distance before it turns, and approaches its goal from the same distance.
 """

@@ -9,7 +9,7 @@ form. `confab.sim.numeric` solves all other arms. For these arms, the swivel is 
 its limits if the arm has seven joints, and always 0 if the arm has six joints.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
-shoulder, elbow, wrist.
+shoulder, elbow, wrist
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return angles (n, 3) of the spherical joint that begins at joint `first`; with parallel axes, those far from the limits."""
+    """Return angles (n, 3) of the spherical joint from joint `first` on; with parallel axes, those farther from the limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:

@@ -79,7 +79,7 @@ class LiveWorld:
         self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
 
     def observe(self) -> State:
-        """Return the facts perceived now, after hands at no perceivable position and tilted empty hands were brought up."""
+        """Bring up tilted empty hands and hands at no perceivable position, and return the facts perceived afterwards."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
@@ -121,7 +121,7 @@ class LiveWorld:
         self.stopping = bool(self.concerned)
 
     def take_stock(self) -> None:
-        """Adopt the present state after a failure.
+        """Take the present postures and grasps as the reference after a failure.
 
         The present posture of a blocked arm becomes its command, so that the arm stops pressing. The present grasp of a held
         object becomes the reference from which slip is measured.

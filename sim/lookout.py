@@ -42,7 +42,7 @@ SPOTS, TRIED = 3, 12
 """Maximum number of free spots that are offered, and of points whose reach is computed."""
 
 HEIGHTS = (0.06, 0.12, 0.18)
-"""Heights in metres above a free spot at which no obstacle may be."""
+"""Heights in metres above a free spot that must be free of obstacles."""
 
 
 @dataclass
@@ -125,7 +125,7 @@ class Lookout:
     # ------------------------------------------------------------------------------------------------- spots
 
     def _astray(self, symbol: Symbol, use: PerceiverUse) -> bool:
-        """Return whether an object stands at rest in no hand and at no place."""
+        """Return whether an object stands at rest, held by no hand and away from all places."""
         world, name = self.world, symbol.arguments[0]
         if not world.knows(name) or name not in world.bodies:
             return False

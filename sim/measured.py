@@ -85,10 +85,10 @@ MEASURES: Mapping[str, Measure] = {
 
 
 def observe_measured(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether the bounds hold for the arguments; for a type with values, the first value for which the bounds hold.
+    """Return whether the bounds hold; for a situation type with values, return the first value for which the bounds hold.
 
-    If no value fits, return the special value `nothing` of the situation type. Return None if there is no such value, or if a
-    quantity can't be measured.
+    If no value fits, return the special value `nothing` of the situation type. Return None if the situation type has no value
+    `nothing`, or if a quantity can't be measured.
     """
     if use.asked:
         holds = _hold(world, use, arguments[0], arguments[-1])

@@ -150,7 +150,7 @@ def overlap_of(client: int, one: tuple[int, int], other: tuple[int, int]) -> flo
 
 
 def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:
-    """Set a joint's friction, or the spring that pushes the joint to 0 or, if `held`, to the value at which the latch holds it.
+    """Set a joint's friction, or its spring, which pushes the joint to 0 or, with `held`, to the value held by the latch.
 
     A motor with target velocity 0 models Coulomb friction, since PyBullet does not read friction from the URDF.
     """

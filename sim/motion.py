@@ -5,7 +5,7 @@ hand's horizontal pointing direction, roll is the rotation about this direction,
 `confab.sim.kinematics` maps a pose to a posture. A path with roll 0 keeps a cup upright. The path is a straight line if the
 line is free of collisions, otherwise the result of a short RRT-Connect in the same six coordinates.
 
-``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
+``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Traveller(Protocol):
 
     @property
     def spread(self) -> Array:
-        """Size of the search region beyond start and goal (6,)."""
+        """Size (6,) of the search region beyond start and goal, in metres and radians."""
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
         """Return the joint values at poses, and for each pose whether it is within reach."""
@@ -97,7 +97,7 @@ class Reacher:
 
     @property
     def spread(self) -> Array:
-        """Size of the search region beyond start and goal (6,)."""
+        """Size (6,) of the search region beyond start and goal, in metres and radians."""
         return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
@@ -272,7 +272,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree along the free part of the line to `target`, unless `greedy` only a short way; return the new pose or None."""
+    """Extend a tree along the free part of the line to `target`, with `greedy` without a limit; return the new pose or None."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:

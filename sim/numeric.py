@@ -1,8 +1,9 @@
 """Inverse kinematics of arms without a closed form: damped least squares within the joints' limits.
 
-The search starts from the rest posture, turned about the arm's first axis until the arm points to the goal. The hand is then
-led straight to the goal in several stretches. So equal poses have equal postures, and neighbouring poses have neighbouring
-postures unless the arm has to reconfigure. If this search fails, further searches start from random postures with a fixed seed.
+The search starts from the rest posture, turned about the arm's first axis until the arm points to the goal. From this posture,
+the hand is led straight to the goal in several stretches. So equal poses have equal postures, and neighbouring poses have
+neighbouring postures unless the arm has to reconfigure. If the first search fails, further searches start from random postures
+with a fixed seed.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ EXACT, CLOSE = 1e-10, 1e-7
 """Error in metres and radians at which a search ends early, and maximum error of a valid result."""
 
 DAMPING = 1e-6
-"""Damping of the normal equations in addition to the error. More damping is slower, and less damping is unstable."""
+"""Damping of the normal equations in addition to the error. More damping slows the search down. Less damping is unstable."""
 
 SINGULAR = 0.45
 """Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between the limbs."""

@@ -184,7 +184,7 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
 def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
     """Return, for each joint value, the poses (n, 6) of hands that hold a feature while its joint moves from the first value.
 
-    The hand keeps its pose in the feature's frame except for a turn about z, towards `way.last` or to stay level.
+    The hand keeps its pose in the feature's frame, except that the hand may turn about the feature's z axis.
     """
     mechanic, link = run.joint(phase.to)
     frames = [run.at(phase.to, {**mechanic.values(), link: value}) for value in values]

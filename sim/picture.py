@@ -238,7 +238,7 @@ def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> 
 
 @lru_cache(maxsize=8)
 def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
-    """Return for each pixel the distance to the horizontal plane at `height` along its ray, and x and y of the point there."""
+    """Return where the ray of each pixel meets the horizontal plane at `height`: the distance along the ray, x and y."""
     with np.errstate(divide="ignore"):
         distance = (height - camera.eye[2]) / camera.rays[..., 2]
     distance = np.where(np.isfinite(distance) & (distance > 0), distance, 1e6)

@@ -99,7 +99,7 @@ class Run:
         return named(*(name for role, name in ordered if role != "hand"), *([] if held is None else [held]))
 
     def arrived(self, goal: Array) -> None:
-        """If the skill states a tolerance, raise `SkillError` if the hand is not at its goal."""
+        """Raise `SkillError` if the skill states a tolerance and the hand is farther away from its goal."""
         if "tolerance" in self.numbers:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 

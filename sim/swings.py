@@ -58,7 +58,7 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
 
 
 def refuted(world: Engine, symbols: Iterable[Symbol], link: str) -> tuple[Refutation, ...]:
-    """Return the refutations of all motions of a link, each while a body stands at a place where the body blocks the link."""
+    """Return refutations of the motions of a link; each refutation holds while a body is at a place where it blocks the link."""
     found = [fact for symbol in symbols for fact in _in_the_way(world, symbol, link)]
     return tuple(
         Refutation(

@@ -19,7 +19,7 @@ from worlds.writing import quantified
 
 State = Mapping[Symbol, str]
 Successors = Callable[[Problem], Callable[[State], Iterable[tuple[float, State]]]]
-"""Function of a problem that returns the function from a state to its successors with their costs."""
+"""Function that maps a problem to a function from states to their successors with costs."""
 
 
 def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
@@ -40,7 +40,7 @@ def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, 
 
 
 def cheapest(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> float | None:
-    """Return the least cost of steps of the lowest level that reach the goal with all changed symbols at rest.
+    """Return the least cost of steps of the lowest level that reach the goal, with rest values for all changed symbols.
 
     The result is infinity if no steps reach the goal, and None if there are more than `most` states. The plan checker derives
     defined situations and compares amounts.
@@ -79,7 +79,7 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
 
 
 def solvable(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> bool | None:
-    """Return whether steps of the lowest level reach the goal with all changed symbols at rest.
+    """Return whether steps of the lowest level reach the goal, with rest values for all changed symbols.
 
     The result is None if there are more than `most` states.
     """

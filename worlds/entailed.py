@@ -3,7 +3,7 @@
 The command `python -m worlds.entailed` reads a JSON object from stdin, with ``logic`` and ``states`` in Turtle, and with the
 requested ``classes`` and ``properties``. For each state the command prints the entailments ``[class, individual]`` and
 ``[property, one, other]``. The command runs in a separate process, since a JVM can't be stopped. `random_state` returns random
-states of `LOGIC`. In OWL an unstated fact may be true, in planning it is false, so `asserted` adds axioms that exclude further
+states of `LOGIC`. An unstated fact may be true in OWL but is false in planning, so `asserted` adds axioms that exclude further
 facts.
 """
 

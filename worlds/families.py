@@ -71,7 +71,7 @@ def table(
 
 
 def strips(places: int, columns: int, hands: int) -> list[set[int]]:
-    """Return the places in reach of each hand: overlapping strips of columns, of three quarters of the columns for two hands."""
+    """Return the places in reach of each hand, which are overlapping strips of columns."""
     width = (3 * columns + 3) // 4 if hands == 2 else max(2, -(-2 * columns // hands))
     found = []
     for hand in range(hands):

@@ -185,7 +185,7 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
     "equal arguments": _different,
     "individuals that nothing names": _named_only,
 }
-"""The function that removes each feature from a world, by the feature's name."""
+"""The functions that remove a feature from a world, by the name of the feature."""
 
 
 def features(world: RandomWorld, least: float | None) -> Iterator[tuple[str, bool]]:

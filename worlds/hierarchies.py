@@ -55,7 +55,7 @@ def states(problem: Problem) -> int:
 
 
 class _Draft:
-    """A random draw of the features of a world."""
+    """The randomly drawn features of a world."""
 
     def __init__(self, rng: Random) -> None:
         self.rng = rng

@@ -253,7 +253,7 @@ class Interpreter:
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
     def closed(self, values: list[Any]) -> State:
-        """Return a state with all derived values: first amounts, and then rules group by group, from the empty set upwards."""
+        """Return a state with all derived values: first amounts, and then rules group by group, each up to a fixed point."""
         for _ in range(self.rounds):
             for slot, total in self.totals:
                 values[slot] = total(values)

@@ -127,7 +127,7 @@ class BehaviorWriter:
         return [self.condition(bound, depth) for _ in range(most)]
 
     def condition(self, bound: list[str], depth: int) -> Condition:
-        """Return a random condition of at most a nesting depth; the variables that it determines are added to `bound`."""
+        """Return a random condition with limited nesting; the variables that the condition determines are added to `bound`."""
         rng = self.rng
         negated = rng.random() < 0.4
         match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any", "amount")):

@@ -114,7 +114,7 @@ def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -
 
 
 def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWorld, Interpreter]:
-    """Return a world; for a share of the worlds, with a disjunctive or existentially quantified goal."""
+    """Return a world; for a share of the worlds, replace the goal by a disjunctive or existentially quantified goal."""
     rng, problem = Random(f"alternatives {world.seed}"), world.problem
     domain = problem.domain
     if rng.random() > ALTERNATIVES:
@@ -235,7 +235,7 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 
 
 class _Draft(Vocabulary):
-    """A random draw of a world without its goal."""
+    """A randomly drawn world without its goal."""
 
     def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float) -> None:
         super().__init__(rng)
@@ -465,7 +465,7 @@ class _Draft(Vocabulary):
         return replace(problem, domain=replace(problem.domain, situations=situations))
 
     def constrained(self, problem: Problem) -> Problem:
-        """Return the problem; for a share of the worlds, with a constraint that holds initially."""
+        """Return the problem; for a share of the worlds, add a constraint that holds initially."""
         own = Random(f"constraints {self.seed}")
         if own.random() >= self.prevented:
             return problem

@@ -79,7 +79,7 @@ class Phrases:
         return term
 
     def seen(self, quantity: bool = False, changeable: bool = False) -> list[SituationType]:
-        """Return the situation types, with numbers if `quantity`, that conditions or effects of this level may use."""
+        """Return the situation types that conditions or effects of this level may use; with `quantity`, those with numbers."""
         return [
             one
             for one in self.draft.situations.values()

@@ -116,7 +116,7 @@ def timed_world(seed: int, constrained: bool = False, limited: bool = False) -> 
 
 
 def _violated(world: TimedWorld, facts: frozenset[int]) -> bool:
-    """Return whether the literals that may never hold together hold."""
+    """Return whether all literals that may never hold together hold at once."""
     return bool(world.never) and _hold(facts, list(world.never))
 
 

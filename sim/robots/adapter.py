@@ -200,7 +200,7 @@ class InterfaceWorld:
         return Report(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
 
     def _begin_cancelling(self) -> Thread:
-        """Request the robot to end its action in a separate thread that ignores errors; return the thread."""
+        """Start a thread that requests the robot to end its action and ignores errors; return the thread."""
 
         def run() -> None:
             with suppress(Exception):
