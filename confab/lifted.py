@@ -108,7 +108,7 @@ class Sayings:
         raise TypeError(one)
 
     def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:
-        """Return a fact that cogency counts as a sentence, with its roles replaced by individuals."""
+        """Return a sentence about a fact that cogency counts, with individuals in place of roles."""
         asks, answer = fact
 
         def put(word: str) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 KINDS = (".png", ".svg", ".pdf")
 MOST_ROWS, DEEPEST = 500, 100
-"""Maximum number of rows and of nested classes of a diagram."""
+"""Maximum number of rows, and maximum depth of nested classes, in a diagram."""
 REACHED, UNREACHED = (30, 140, 60), (200, 40, 40)
 VIEWPOINT = "seen from across the table: the robot's left is on the right"
 GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"

@@ -260,7 +260,7 @@ def _plan(
 
 
 def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether half of the remaining time suffices to prove that a task has no plan, even without steps of some levels."""
+    """Return whether a proof that the task has no plan is found within half of the remaining time."""
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
     return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
 

@@ -71,7 +71,7 @@ def progress_bar() -> Progress:
 
 
 def tell(what: str) -> None:
-    """Print the present activity as a line on stderr if stderr is no terminal, where no bar is shown."""
+    """If stderr is no terminal, print the present activity as a line on stderr."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
 

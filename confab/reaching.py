@@ -66,8 +66,8 @@ def with_reach(scene: S) -> S:
     """Return a scene with reach facts that agree with its geometry.
 
     Reach facts are computed if they are missing or were computed for another geometry. Computed facts are written into
-    ``SCENE.reach.ttl`` beside the scene's file, so that later calls needn't compute them. If the file can't be written, the
-    facts are only in the returned scene.
+    ``SCENE.reach.ttl`` beside the scene's file, so that later calls needn't compute them. If the file can't be written, only
+    the returned scene has the reach facts.
 
     Raises
     ------

@@ -143,7 +143,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON data in a file; raise `KnowledgeError` if the block finds a part missing or of another form."""
+    """Yield the JSON data in a file; errors of the block about missing or malformed data become `KnowledgeError`."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -157,7 +157,7 @@ def show_result(what: Any) -> None:
 
 
 def _open_streams() -> None:
-    """Open the null device for each closed standard stream, so that no other file gets the number of the stream."""
+    """Open the null device for each closed standard stream, so that no other file gets its descriptor."""
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
         os.open(os.devnull, os.O_RDWR)  # gets the lowest free file descriptor

@@ -22,7 +22,7 @@ from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact, Problem
 
 RETRIES = 5
-"""Number of failures after which an exported tree fails. After fewer failures, the tree is ticked from the beginning."""
+"""Number of failures after which an exported tree fails; after each earlier failure, the tree starts again."""
 
 RESERVED = {
     "ID",
@@ -157,7 +157,7 @@ class _Lowering:
         return _identifier(step.behavior), dict(zip(names, step.arguments, strict=True))
 
     def words(self, one: Fact | Condition) -> tuple[str, dict[str, str]]:
-        """Return the name and the ports of a condition. Conditions that are no facts have one port with their text."""
+        """Return the name and the ports of a condition. A condition other than a fact has one port with its text."""
         if not isinstance(one, Fact):
             return "Holds", {"condition": said(one)}
         arguments = {f"argument{number}": each for number, each in enumerate(one.symbol.arguments, 1)}

@@ -1,4 +1,4 @@
-"""The commands report, runs and scenes: pages of saved results, kept runs, and the shipped scenes."""
+"""The commands report, runs and scenes, which show saved results, stored runs and the shipped scenes."""
 
 from __future__ import annotations
 

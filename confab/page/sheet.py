@@ -43,7 +43,7 @@ class TurnedIntervention(TypedDict):
 
 
 class Turned(TypedDict, total=False):
-    """Changed controls: new values of facts and goals, by the words of the symbol. The value None removes a goal."""
+    """Values of facts and goals that a user has changed on the page, by the words of the symbol. The value None removes a goal."""
 
     facts: dict[str, str]
     goals: dict[str, str | None]

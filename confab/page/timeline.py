@@ -78,7 +78,7 @@ class Timeline:
 
     @property
     def by_path(self) -> dict[tuple[int, ...], Bar]:
-        """The bars of all begun steps, by path. The bar of a step with sub-steps spans the bars of its primitives."""
+        """The bars of all steps that have begun, by path. The bar of a step with sub-steps spans the bars of its primitives."""
         found: dict[tuple[int, ...], Bar] = {}
         for bar in self.bars:  # several attempts at a step make one bar with the last result
             first = found.get(bar.step.path, bar)
