@@ -57,15 +57,16 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     """
     from confab.planner.timed.sharing import evenly_shared, shared
 
-    until = perf_counter() + (3 * SECONDS if seconds is None else seconds)
+    until = None if seconds is None else perf_counter() + seconds
 
-    def left(parts: int) -> float:
-        return max(until - perf_counter(), 0.0) / parts
+    def left(parts: int) -> float | None:
+        return None if until is None else max(until - perf_counter(), 0.0) / parts
 
     first = in_time(problem, plan, left(3))
     if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.serial, first.plan.makespan)):
         return first
-    other = shared(problem, plan, perf_counter() + left(2), shorten)
+    half = left(2)
+    other = shared(problem, plan, None if half is None else perf_counter() + half, shorten)
     if other is None:
         return first
     found = in_time(problem, other, left(1))

@@ -6,8 +6,8 @@ task      a goal with its crew
 stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
 
 The first sequence of tasks is that of the plan, or a greedy one: each goal is given to the crew that achieves it first. Then the
-crew or position of one task is changed at a time, preferably of a task on the critical path. The work is bounded by numbers of
-stretches and changes, so the result is the same on every machine unless the time is over.
+crew or position of one task is changed at a time, preferably of a task on the critical path. The work is bounded, so the result is
+the same on every machine unless a time limit comes first.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64
 """Maximum number of crews."""
-MOST_STRETCHES = 2_000
-"""Maximum number of stretches that are planned."""
-MOST_CHANGES = 1_000
-"""Maximum number of changes of the sequence that are tried."""
+MOST_WORK = 20_000_000
+"""Maximum work, in states times operators (about a microsecond each)."""
+PLANNING, SCHEDULING = 2_500, 60
+"""Work of planning a stretch, in addition to its searches, and of scheduling a primitive."""
 BARREN = 150
 """Maximum number of changes that are tried without a better schedule."""
 BUSY = Fraction(103, 100)
@@ -95,7 +95,7 @@ class _Sequence:
     """The steps on the critical path, or on the path to the activity that is latest, each with its task's number and its actors."""
 
 
-def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> Plan | None:
+def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = True) -> Plan | None:
     """Return a plan for the same goals whose steps are shared among actors for a short schedule; None if none is found.
 
     Parameters
@@ -103,7 +103,7 @@ def shared(problem: Problem, plan: Plan, until: float, shorten: bool = True) -> 
     problem : Problem
     plan : Plan
         A plan of it, which determines the first order of the goals.
-    until : float
+    until : float, optional
         The end of the search, on the clock of `perf_counter`.
     shorten : bool
         Whether the search continues after a schedule has been found that keeps all windows and deadlines.
@@ -175,11 +175,12 @@ def with_crew(problem: Problem, crew: Crew) -> Problem:
 class _Search:
     problem: Problem
     plan: Plan
-    until: float
+    until: float | None
     shorten: bool
     best: _Sequence | None = None
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
-    tried: int = 0
+    work: int = 0
+    most: int = MOST_WORK
     known: dict[Task, list[tuple[Step, ...]]] = field(default_factory=dict)
     """The steps found for each task, which are tried again before other steps are searched."""
     failed: Counter[Task] = field(default_factory=Counter)
@@ -221,16 +222,19 @@ class _Search:
 
     def run(self) -> None:
         """Change the better one of the plan's sequence and a greedy one."""
-        self.best = self.own()
-        greedy = self.greedy()
+        self.best, until, greedy = self.own(), self.until, None
+        self.most, self.until = MOST_WORK // 2, None if until is None else (perf_counter() + until) / 2
+        with suppress(LimitError):
+            greedy = self.greedy()
+        self.most, self.until = MOST_WORK, until
         if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
             self.best = greedy
         now = self.best
         if now is None:
             return
         random, barren = Random(0), 0
-        for _ in range(MOST_CHANGES):
-            if barren >= BARREN or not now.critical or not (self.shorten or now.cost[0]):
+        while barren < BARREN and now.critical:
+            if not (self.shorten or now.cost[0]):
                 break
             if not now.cost[0] and evenly_shared(self.problem, now.serial, now.cost[1]):
                 break
@@ -323,11 +327,6 @@ class _Search:
         """Return the steps by which a crew achieves the last of some goals and keeps the others; None if they aren't found."""
         key = frozenset(state.items()), frozenset(goals), crew
         if key not in self.stretches:
-            self.tried += 1
-            if self.tried > MOST_STRETCHES:
-                raise LimitError(f"{MOST_STRETCHES} stretches")
-            if perf_counter() > self.until:
-                raise LimitError("the time limit")
             problem = replace(self.problem, initial=state, goal=self.wanted(goals))
             known = self.known.setdefault((goals[-1], crew), [])
             again = (steps for steps in reversed(known[-MOST_KNOWN:]) if not validate(problem, Plan(steps)))
@@ -361,13 +360,24 @@ class _Search:
         allowed, using = self.compiled[crew]
         call = Call(replace(allowed, initial=problem.initial, goal=problem.goal), using, self.until, EXPANSIONS)
         call.space.most_work = WORK
+        self.spend(PLANNING)
         levels = problem.domain.levels
         leaves = any(step.level != levels[0] for step in self.plan.steps)
         agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, solvable=True, forward=True)
         with suppress(LimitError, UnsolvableError):
             if agenda.achieve_all():
+                self.spend(call.space.effort)
                 return call.tree().steps
+        self.spend(call.space.effort)
         return None
+
+    def spend(self, work: int) -> None:
+        """Count work; raise `LimitError` if too much is done, or the time is over."""
+        self.work += work
+        if self.work > self.most:
+            raise LimitError(f"{self.most} states times operators")
+        if self.until is not None and perf_counter() > self.until:
+            raise LimitError("the time limit")
 
     @cached_property
     def _open(self) -> frozenset[Symbol]:
@@ -377,6 +387,7 @@ class _Search:
         """Return tasks with the earliest schedule of their steps in this order."""
         plan = Plan(renumbered(step for one in stretches for step in one.steps))
         steps = plan.primitives
+        self.spend(SCHEDULING * len(steps))
         try:
             order = order_of(self.problem, activities(self.problem, steps, in_sequence(steps)), in_sequence(steps))
         except InapplicableError:
