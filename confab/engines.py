@@ -182,7 +182,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
         return first, *_directly(factory.engine(first)(), domain, problem, deadline)
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
-        raise KnowledgeError(f"{said} derived predicates, which definitions become; plan without --engine")
+        raise KnowledgeError(f"{said} derived predicates, which definitions become; plan without engine=")
     late = first or "unified-planning", "TIMEOUT", list[str]()
     _tell(late[0], deadline)
     try:
@@ -223,7 +223,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
         if engine and not {"INT_FLUENTS", "REAL_FLUENTS"}.isdisjoint(
             task.kind.features - factory.engine(engine).supported_kind().features
         ):
-            raise KnowledgeError(f"{engine} takes no numbers; name an engine that does, or plan without --engine")
+            raise KnowledgeError(f"{engine} takes no numbers; name an engine that does, or plan without engine=")
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:

@@ -60,15 +60,15 @@ class PlanOptions:
         """Raise `KnowledgeError` if an option is invalid or options exclude each other."""
         checked_minimise(self.minimise)
         if self.level is not None and not self.by_engine:
-            raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
+            raise KnowledgeError("a level is chosen for an engine; name one, e.g. engine='fast-downward'")
         if self.by_engine and (self.mode == "paper" or self.asks_for_least):
-            raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
+            raise KnowledgeError("an engine plans by itself; leave out optimal=True and mode='paper'")
         if self.by_engine and not self.leave_levels:
             raise KnowledgeError(
-                "an engine plans one level alone, so it may leave the others; leave out --levels strict"
+                "an engine plans one level alone, so it may leave the others; leave out leave_levels=False"
             )
         if self.asks_for_least and self.mode not in (DEFAULT_MODE, "optimal"):
-            raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {self.mode}; leave one out")
+            raise KnowledgeError(f"optimal=True means mode='optimal', and not mode='{self.mode}'; leave one out")
         if self.strategy == "optimal" and self.memory is not None:
             raise KnowledgeError("the optimal search uses no memory; leave one option out")
         if self.strategy == "optimal" and not self.leave_levels:
@@ -76,6 +76,8 @@ class PlanOptions:
             raise KnowledgeError(f"the optimal search {what}; leave one option out")
         if not isinstance(self.time_limit, Deadline):
             number("time_limit", self.time_limit, "seconds as a number, e.g. 5")
+            if self.time_limit is not None and self.time_limit < 0:
+                raise KnowledgeError(f"time_limit={self.time_limit}; wanted 0 or more seconds")
         if self.mode not in MODES:
             raise KnowledgeError(f"unknown mode '{self.mode}'; wanted one of {', '.join(MODES)}")
 

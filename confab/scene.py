@@ -277,7 +277,7 @@ class Scene(Known):
 
 
 @right_arguments
-def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], scene: str | None = None) -> Scene:
+def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None) -> Scene:
     """Load a scene from a shipped name, one or several RDF files, an rdflib graph, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters

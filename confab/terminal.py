@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -52,9 +53,9 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
     except (KnowledgeError, DomainError) as error:
-        _end(MISUSE, str(error))
+        _end(MISUSE, by_options(str(error)))
     except LimitError as error:
-        _end(GAVE_UP, str(error))
+        _end(GAVE_UP, by_options(str(error)))
     except MemoryError:
         _end(GAVE_UP, "gave up: there isn't enough memory for this")
     except RecursionError as error:
@@ -190,6 +191,13 @@ def _log(error: BaseException) -> str:
     return file.name
 
 
+PARAMETER = re.compile(
+    r"(?<![\w'])(?P<name>engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
+    r"(?=[\s),;.]|$)"
+)
+"""A parameter in Python, perhaps with a value, that the command line has as an option of the same name."""
+
+
 def _usage(error: Any) -> str:
     """Return the error of a wrong call in one line; for a call without arguments, print the help and exit."""
     if type(error).__name__ == "NoArgsIsHelpError":
@@ -206,6 +214,25 @@ def _usage(error: Any) -> str:
             return f"no such option '{error.option_name}'. Did you mean '{right}'? See {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
+
+
+def by_options(text: str) -> str:
+    """Return an error's text with options of the command line in place of parameters in Python.
+
+    >>> by_options("give more time"), by_options("name one, e.g. engine='fast-downward'")
+    ('give more time (--time-limit)', 'name one, e.g. --engine fast-downward')
+    """
+
+    def option(found: re.Match[str]) -> str:
+        name, value = found["name"].replace("_", "-"), found["value"].strip("'")
+        if value == "None":
+            return f"--no-{name}"
+        return f"--{name} {value}".rstrip() if value != "True" else f"--{name}"
+
+    text = text.replace("leave_levels=False", "--levels strict").replace(
+        "give more time", "give more time (--time-limit)"
+    )
+    return PARAMETER.sub(option, text)
 
 
 def remark(text: str) -> None:

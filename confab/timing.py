@@ -29,7 +29,7 @@ MOST_CRITICAL = 12
 def checked_minimise(minimise: str | None) -> str | None:
     """Return the quantity to be minimised; raise `KnowledgeError` if the quantity is unknown."""
     if minimise is not None and minimise not in MINIMISE:
-        raise KnowledgeError(f"--minimise is '{minimise}'; wanted one of {', '.join(MINIMISE)}")
+        raise KnowledgeError(f"minimise='{minimise}'; wanted one of {', '.join(MINIMISE)}")
     return minimise
 
 

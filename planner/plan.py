@@ -103,6 +103,9 @@ class Plan(Sequence[Step], metaclass=RightNames):
 
     def __getitem__(self, index: int | slice) -> Step | tuple[Step, ...]:
         """Return one step of the first level, or a slice of these steps."""
+        if isinstance(index, str):
+            why = f"result.why({index!r}) explains a step with these words"
+            raise TypeError(f"steps are numbered from 0, e.g. plan[0]; plan.walk() yields all steps, and {why}")
         return self.steps[index]
 
     def __repr__(self) -> str:

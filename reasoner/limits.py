@@ -50,7 +50,7 @@ class Deadline:
         The message names the work in progress by `doing`.
         """
         if perf_counter() + ahead > self.at:
-            raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
+            raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time")
 
 
 _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # noqa: B039 - frozen

@@ -30,16 +30,16 @@ def require_screen() -> None:
         return
     display = os.environ.get("DISPLAY", "")
     if not display:
-        raise RuntimeError("no screen to show the world on: DISPLAY isn't set; leave out --gui, or film with --video")
+        raise RuntimeError("no screen to show the world on: DISPLAY isn't set; leave out gui=True, or film with video=")
     library = ctypes.util.find_library("X11")
     if library is None:
-        raise RuntimeError("no screen to show the world on: libX11 is missing; leave out --gui, or film with --video")
+        raise RuntimeError("no screen to show the world on: libX11 is missing; leave out gui=True, or film with video=")
     x11 = ctypes.CDLL(library)
     x11.XOpenDisplay.restype = ctypes.c_void_p
     opened = x11.XOpenDisplay(display.encode())
     if not opened:
         raise RuntimeError(
-            f"no screen to show the world on: display '{display}' doesn't answer; leave out --gui, or film with --video"
+            f"no screen to show the world on: display '{display}' doesn't answer; leave out gui=True, or film with video="
         )
     x11.XCloseDisplay(ctypes.c_void_p(opened))
 

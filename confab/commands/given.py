@@ -26,7 +26,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
     from confab.scene import load, load_text
 
     with progress(f"reading {'stdin' if source == '-' else source}"):
-        scene = load_text(sys.stdin.buffer.read()) if source == "-" else load(source, iri)
+        scene = load_text(sys.stdin.buffer.read()) if source == "-" else load(source, scene=iri)
     return with_current_reach(scene, remark)
 
 

@@ -232,6 +232,8 @@ def turned_from(data: object) -> Turned:
     wanted = "wanted an object with facts, goals and interventions"
     if not isinstance(data, Mapping):
         raise KnowledgeError(f"got {type(data).__name__}; {wanted}")
+    if unknown := sorted(data.keys() - {"facts", "goals", "interventions"}):
+        raise KnowledgeError(f"got {', '.join(map(str, unknown))[:80]!r}; {wanted}")
     facts, goals, people = data.get("facts", {}), data.get("goals", {}), data.get("interventions", [])
     if not isinstance(facts, Mapping) or not isinstance(goals, Mapping) or not isinstance(people, list):
         raise KnowledgeError(f"facts or goals are no object, or interventions no list; {wanted}")

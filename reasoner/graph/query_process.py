@@ -220,9 +220,7 @@ class QueryWorker:
     def _why(self, status: int, said: str, late: bool) -> Exception:
         """Return the error for a query that ended without a result."""
         if late or status == -signal.SIGXCPU:
-            return LimitError(
-                f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
-            )
+            return LimitError(f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time")
         if status == -signal.SIGKILL:
             return LimitError("the query was interrupted")
         if "memory" in said.lower():

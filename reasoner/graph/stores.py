@@ -266,7 +266,7 @@ def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
     imported = {iri for group in own.values() for iri in group}
     found = sorted(iri for iri in own if own[iri] and iri not in imported)
     if len(found) != 1:
-        what = f"there are several scenes ({', '.join(found)}); choose one by --scene" if found else "there is no scene"
+        what = f"there are several scenes ({', '.join(found)}); choose one (scene=)" if found else "there is no scene"
         raise KnowledgeError(f"{url}: {what}")
     return found[0]
 

@@ -210,7 +210,7 @@ def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
     try:
         triples = found.triples
     except SyntaxError as error:
-        raise KnowledgeError(f"{source}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+        raise KnowledgeError(f"{source}: broken memory: {error}; plan with memory=None, or restore a copy") from error
     return _experience(triples, found, source, names)
 
 

@@ -131,7 +131,7 @@ def memory_lines(path: Path) -> Lines:
             raise KnowledgeError(f"{path}: no memory: its brackets are nested more than {MOST_NESTED:,} deep")
         return lines(text)
     except UnicodeDecodeError as error:
-        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with memory=None, or restore a copy") from error
     except OSError as error:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror or error}") from error
 
@@ -145,7 +145,7 @@ def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
         triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
         graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
     except SyntaxError as error:
-        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with memory=None, or restore a copy") from error
     return graph
 
 

@@ -191,3 +191,18 @@ def test_the_command_line_understands_commands_and_options_by_their_words(line: 
     done = subprocess.run([sys.executable, "-m", "confab", *line], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert f"did you mean '{right}'" in done.stderr.lower()
+
+
+def test_an_error_names_a_parameter_in_python_and_an_option_on_the_command_line(scene: confab.Scene) -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"leave out optimal=True"):
+        scene.plan(engine="fast-downward", optimal=True)
+    line = ["plan", "beverage-serving", "--engine", "fast-downward", "--optimal"]
+    done = subprocess.run([sys.executable, "-m", "confab", *line], capture_output=True, text=True, check=False)
+    assert "leave out --optimal" in done.stderr
+
+
+def test_a_negative_time_limit_and_a_word_as_an_index_are_refused(scene: confab.Scene, result: confab.Result) -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"time_limit=-1; wanted 0 or more seconds"):
+        scene.plan(time_limit=-1)
+    with pytest.raises(TypeError, match=r"plan\[0\]"):
+        result.plan["B1_MOVE"]  # type: ignore[call-overload]

@@ -42,7 +42,7 @@ def test_the_bound_is_no_more_than_the_plan_costs(scene: confab.Scene) -> None:
 
 
 def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> None:
-    with pytest.raises(confab.KnowledgeError, match="and not --mode paper"):
+    with pytest.raises(confab.KnowledgeError, match="and not mode='paper'"):
         scene.plan(optimal=True, mode="paper")
     with pytest.raises(confab.KnowledgeError, match="may leave the others"):
         scene.plan(mode="optimal", leave_levels=False)

@@ -118,7 +118,7 @@ SELECT ?subject ?object
 
 
 def test_our_own_client_plans_at_it(server: Server) -> None:
-    there = confab.load(server.url + "sparql", "https://w3id.org/confab/beverage-serving")
+    there = confab.load(server.url + "sparql", scene="https://w3id.org/confab/beverage-serving")
     assert there.plan().plan.length == {1: 4, 2: 10, 3: 32}
 
 

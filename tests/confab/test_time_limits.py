@@ -22,7 +22,7 @@ from confab.terminal import GAVE_UP
 
 SOON, SLACK = 0.1, 1.5
 """The limit, and CPU seconds within which a call ends, imports included: without a limit each takes longer, or doesn't end."""
-WITHOUT = {"runs", "new", "fetch", "picture", "generate", "convert", "memory", "mcp"}
+WITHOUT = {"scenes", "runs", "new", "fetch", "picture", "generate", "convert", "memory", "mcp"}
 """Commands that neither search nor simulate."""
 
 
