@@ -44,7 +44,7 @@ class Base:
         return [cos * dx + sin * dy, cos * dy - sin * dx, pose[2] - yaw]
 
     def set(self, pose: Array) -> None:
-        """Place the base at a pose (x, y, yaw) before the first simulation step. Later, only the motors move the base."""
+        """Place the base at a pose (x, y, yaw) before the first simulation step; afterwards only the motors move the base."""
         for joint, value in zip(self.joints, self._values(pose), strict=True):
             pybullet.resetJointState(self.body, joint, value, physicsClientId=self.client)
         self.command(pose)

@@ -133,7 +133,7 @@ class Mover:
 def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
     """Return for each of n postures whether spheres of `radii` (m,) at `centers` (n, m, 3) keep the margin.
 
-    This function is faster than `clearances`.
+    The function `free` is faster than `clearances`.
     """
     some = max(POINTS // max(len(radii), 1), 1)
     return np.concatenate(

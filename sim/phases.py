@@ -1,7 +1,7 @@
 """The interpreter of skills, which executes the phases that the ontology describes one after another.
 
-A phase first moves the fingers, and then the hand relative to a feature of a thing. Afterwards the checks of the phase must
-hold. A `free` motion chooses a pose at its feature from which all phases before the next free motion are possible. For
+A phase first moves the fingers, and then the hand relative to a feature of a thing. After the motion, the checks of the phase
+must hold. A `free` motion chooses a pose at its feature from which all phases before the next free motion are possible. For
 example, the grasp of a door handle is chosen so that the hand can hold the handle until the door is open.
 
 ============ ======================================================================================================

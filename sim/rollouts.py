@@ -234,7 +234,7 @@ class _Pool:
 
 
 def _on_ray(trial: Trial, seeds: Sequence[int], address: str) -> Iterator[Rollout]:
-    """Yield rollouts of a Ray cluster, which repeats a rollout after the death of its worker, in the order of completion."""
+    """Yield rollouts of a Ray cluster in the order of completion. Ray repeats the rollouts of workers that died."""
     try:
         import ray
     except ImportError as error:

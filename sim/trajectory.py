@@ -213,7 +213,7 @@ def replay(
     perturb: Perturbation | None = None,
     beads: bool = True,
 ) -> Replay:
-    """Execute exported trajectories in a new world by joint servos; the other parameters are those of `PhysicsWorld`."""
+    """Execute exported trajectories in a new world by joint servos; other parameters have the same meaning as in `PhysicsWorld`."""
     with PhysicsWorld(embodiment, initial, seed, perturb, beads) as world:
         paths = {name: _path(primitives, name) for name in world.hands}
         fingers = {name: sorted(_gripper(primitives, name)) for name in world.hands}

@@ -41,7 +41,7 @@ def problem(
 
 @lru_cache(maxsize=64)
 def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Problem:
-    """Return the problem of a generated scene without the parts that are irrelevant to its task, like ``confab plan``."""
+    """Return the problem of a generated scene without the parts that are irrelevant to its task, as ``confab plan`` reads it."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(generate(family, objects, clutter=clutter, seed=seed))
