@@ -85,12 +85,11 @@ def __getattr__(name: str) -> object:
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
         from dis import opmap
 
-        from confab.hints import MODULE
         from confab.reasoner.names import GUESSING, WrongNameError
 
         if "confab.guessing" not in GUESSING:
             GUESSING.append("confab.guessing")
-        error = WrongNameError("the module confab", name, _sys.modules[__name__], lambda: MODULE)
+        error = WrongNameError("the module confab", name, _sys.modules[__name__])
         caller = _sys._getframe(1)
         if caller.f_lasti >= 0 and caller.f_code.co_code[caller.f_lasti] == opmap["IMPORT_FROM"]:
             raise ImportError(str(error), name="confab")  # Python replaces the message of an AttributeError here

@@ -73,13 +73,11 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command with a name; for an unknown name, the error suggests the most similar name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from confab.hints import COMMANDS as WORDS
-            from confab.hints import meant
+            from confab.guessing import command
             from confab.reasoner.names import nearest
 
-            helps = {name: getattr(self.get_command(ctx, name), "help", "") or "" for name in COMMANDS}
-            right = meant(args[0], helps, WORDS)
-            hint = f"; did you mean '{right}'?" if right else nearest(args[0], COMMANDS)
+            meant = command(args[0], COMMANDS)
+            hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], COMMANDS)
             raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
         return super().resolve_command(ctx, args)
 

@@ -295,7 +295,7 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
 # ------------------------------------------------------------------------------------------------------------- at the front desk
 
 
-@right_names("an execution", "confab.hints", "EXECUTION", "scene.execute() or scene.read_episode(FILE)")
+@right_names("an execution", "scene.execute() or scene.read_episode(FILE)")
 @dataclass(frozen=True)
 class Execution(metaclass=RightNames):
     """The result of executing a task: an episode, and the scene in which it happened."""

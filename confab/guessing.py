@@ -1,18 +1,22 @@
-"""Suggestions for a wrong name, found by a comparison of its words with public names and their descriptions.
+"""The right name for a wrong name.
 
-A wrong name is split into words, and words of similar meanings match each other. Names of the same object are preferred to
-names of objects that are reachable from it, such as ``result.outcome.search``. All other public names, such as
-``scene.with_fact``, are the last candidates.
+A wrong name is looked up in the table of its kind of object (`confab.hints`): first the whole name, then its words. If the table
+doesn't have the words, they are compared with the public names and their descriptions; words of one meaning are equal. The
+candidates are the names of the object itself, then those of the objects that it leads to (``result.outcome.search``), then all
+others (``scene.with_fact``).
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from difflib import SequenceMatcher
+from difflib import SequenceMatcher, get_close_matches
 from functools import cache
 from importlib import import_module
+
+from confab.hints import COMMANDS, HINTS, OPTIONS
 
 CLASSES = {
     "scene": "confab.scene.Scene",
@@ -230,12 +234,63 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
     return 0.5 * max(told) + 0.5 * sum(told) / len(told) - 0.08 * extra
 
 
-def guessed(kind: str, name: str) -> str:
+TYPED = 0.85
+"""Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
+KNOWN_WORDS = 0.55
+"""Minimum share of the words of a wrong name that an entry of a table must have, weighted by `weights`."""
+
+
+def whole(table: Mapping[str, str], name: str) -> str:
+    """Return the key of a table whose value contains a name, also in the plural or in the singular."""
+    for same in (str, lambda word: word.rstrip("s")):
+        for right, others in table.items():
+            if same(name) in map(same, others.split()):
+                return right
+    return ""
+
+
+def by_words(table: Mapping[str, str], wanted: tuple[str, ...]) -> str:
+    """Return the key of a table whose own words and values have the most of some words.
+
+    The weight of a word is greater if fewer entries have it. The result is empty if no entry has enough of the words.
+
+    >>> by_words({"with_fact": "add set", "with_goal": "add", "facts": "state"}, ("add", "goal"))
+    'with_goal'
+    """
+    bags = {
+        right: {
+            stem(word)
+            for name in (re.split(r"[( ]", right)[0].rpartition(".")[2], *others.split())
+            for word in words_of(name)
+        }
+        for right, others in table.items()
+    }
+    many = Counter(word for bag in bags.values() for word in bag)
+    weights = {word: 1.0 / max(many[word], 1) for word in map(stem, wanted)}
+    worth = {right: sum(weights[word] for word in weights.keys() & bag) for right, bag in bags.items()}
+    best = max(worth, key=lambda right: worth[right], default="")
+    return best if best and worth[best] >= KNOWN_WORDS * sum(weights.values()) else ""
+
+
+def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
     """Return the names that a wrong name of a kind of object may mean, the most likely name first, as text.
 
-    >>> guessed("result", "planning_time"), guessed("plan", "xyzzy")
-    ('seconds, timed, or outcome.seconds', '')
+    The result is empty if the wrong name is a typing error of a known name.
+
+    >>> guessed("result", "planning_time"), guessed("result", "slove"), guessed("plan", "xyzzy")
+    ('seconds', '', '')
     """
+    table = HINTS.get(kind, {})
+    if meant := whole(table, name) or whole(table, name.lower()):
+        return meant
+    if get_close_matches(name, [*known], n=1, cutoff=TYPED):
+        return ""
+    wanted = tuple(word for word in words_of(name) if stem(word) != stem(kind)) or words_of(name)
+    return by_words(table, wanted) or _described_as(kind, name)
+
+
+def _described_as(kind: str, name: str) -> str:
+    """Return the names whose words and descriptions have the meaning of a wrong name, as text."""
     wanted = words_of(name)
     aside = OF_MODULE if kind == "confab" else OF_ANY
     wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in aside) or wanted
@@ -250,11 +305,35 @@ def guessed(kind: str, name: str) -> str:
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
-    """Return the known name that a wrong name most likely means, or an empty text. The argument may map names to descriptions.
+    """Return the known parameter or option that a wrong name most likely means, or an empty text.
 
-    >>> chosen("timeout", ["goals", "time_limit"]), chosen("seed", ["goals", "time_limit"])
-    ('time_limit', '')
+    The values of a mapping are descriptions.
+
+    >>> chosen("timeout", ["goals", "time_limit"]), chosen("--timeout", {"--goal": "", "--time-limit": ""})
+    ('time_limit', '--time-limit')
+    >>> chosen("seed", ["goals", "time_limit"])
+    ''
     """
+    plain = {each.lstrip("-").replace("-", "_"): each for each in known}
+    asked = name.lstrip("-").replace("-", "_").lower()
+    for rights, others in OPTIONS.items():
+        there = [right for right in rights.split() if right in plain]
+        if there and asked in (*rights.split(), *others.split()):
+            return plain[there[0]]
     worth = {each: score(words_of(name), each, known[each] if isinstance(known, Mapping) else "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
     return best if worth.get(best, 0.0) >= ENOUGH else ""
+
+
+def command(name: str, known: Iterable[str]) -> str:
+    """Return the command that a wrong name most likely means, or an empty text if the name is a typing error or unknown.
+
+    >>> command("simulate", ["plan"]), command("run-my-plan", ["plan"]), command("plna", ["plan"])
+    ('verify', 'execute', '')
+    """
+    name = name.lower().replace("_", "-")
+    words = {right: others.replace("-", "_") for right, others in COMMANDS.items()}
+    meant = whole(COMMANDS, name)
+    if meant or get_close_matches(name, [*known], n=1, cutoff=TYPED):
+        return meant
+    return by_words(words, words_of(name.replace("-", "_")))

@@ -1,174 +1,508 @@
-"""Names that users of other libraries may try, and the corresponding names in Confab."""
+"""Names under which users of other libraries look for functions of Confab, and the names of these functions.
+
+Each table belongs to a kind of object. A key is an expression of Confab; the value contains other names with the meaning of the
+expression. `confab.guessing` compares whole names first, then their words.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 MODULE = {
-    "confab.load(SCENE)": "open read read_scene load_scene load_file load_ontology from_file parse World Ontology",
-    "confab.scenes()": "list list_scenes list_examples available_scenes datasets samples",
-    "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner",
-    "confab.load(SCENE).query(TEXT)": "query ask sparql select",
-    "confab.load(SCENE).verify()": "verify simulate simulation Simulator connect",
-    "confab.load(SCENE).execute()": "execute run act step",
-    "confab.load(SCENE).behaviors": "Action Behavior Operator Skill actions",
-    "confab.load(SCENE).facts": "Fact Literal Predicate State Atom facts",
-    "confab.load(SCENE).goals": "Goal Task goals",
-    "confab.history.compared(RUNS, ONE, OTHER)": "diff compare compare_plans compare_runs",
-    "confab.validate(FILE)": "check lint verify_file validate_scene shacl",
-    "confab.generate(FAMILY, …)": "create new make make_scene random_scene new_scene",
-    "confab.new_domain(NAME)": "new_ontology create_domain init",
-    "confab.Memory.load(FILE)": "load_memory read_memory learn",
+    "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
+    "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
+    "from_graph from_string from_text loads load_domain load_problem Domain Robot Task get_scene get_problem "
+    "import_scene open_scene gym Kitchen reader OWLReader Model Dataset Store",
+    "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
+    "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
+    "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner "
+    "planning SequentialPlanner AnytimePlanner astar bfs Solver solver Plan SequentialPlan policy Search heuristic "
+    "TaskPlanner plan_scene compute_plan solve_problem replan Replanner",
+    "confab.load(SCENE).query(TEXT)": "query ask sparql select SparqlQuery run_query execute_query question "
+    "prepareQuery",
+    "confab.load(SCENE).verify()": "verify simulate simulation Simulator PlanValidator SequentialPlanValidator "
+    "validate_plan check_plan rollout physics Simulation sim pybullet test_plan verify_plan Verifier",
+    "confab.load(SCENE).execute()": "execute run act step Executor Agent run_scene execute_plan dispatch perform "
+    "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop",
+    "confab.load(SCENE).explain()": "explain why explanation justify why_not Explainer reasons",
+    "confab.load(SCENE).picture()": "draw show plot render image picture visualise visualize view display viz Viewer "
+    "Renderer",
+    "confab.load(SCENE).plan().report(FILE)": "report html page to_html write_report dashboard save_report",
+    "confab.load(SCENE).serve()": "serve server endpoint Server start_server web app api rest",
+    "confab.validate(FILE)": "check lint verify_file validate_scene shacl Validator is_valid consistent "
+    "is_consistent sync_reasoner reasoner check_scene validate_file validate_ontology pyshacl check_consistency",
+    "confab.generate(FAMILY, …)": "make_scene random_scene generate_scene Generator random synthetic families",
+    "confab.new_domain(NAME)": "new_ontology create_domain init new create make make_domain scaffold template "
+    "new_scene create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator "
+    "InstantaneousAction DurativeAction define UserType Variable add_action Situation build",
+    "confab.load(SCENE).read_plan(FILE)": "load_plan read_plan parse_plan open_plan plan_from_file from_plan",
+    "confab.load(SCENE).read_episode(FILE)": "load_episode read_episode load_execution open_episode",
+    "confab.load(SCENE).read_report(FILE, PLAN)": "load_report read_report load_verdicts load_verification",
+    "confab.Memory.load(FILE)": "load_memory read_memory open_memory Experience memory experience load_experience",
+    "confab.Memory.of(SCENE).learn(SCENE, PLAN)": "learn learning remember train fit Learner learn_from demonstrate "
+    "teach Trainer",
+    "from confab.history import runs, compared": "runs history compare diff compare_runs compare_plans load_run "
+    "read_runs list_runs log experiments",
+    "confab.within(SECONDS)": "timeout time_limit set_time_limit limit deadline set_timeout Timeout budget TimeLimit",
+    "confab.load(SCENE).to_pddl()": "to_pddl PDDLWriter write_pddl export export_pddl save_pddl",
+    "confab.load(SCENE).to_unified_planning()": "to_unified_planning to_up unified_planning up shortcuts",
+    "confab import DOMAIN.pddl PROBLEM.pddl -o SCENE.ttl (in a shell)": "PDDLReader read_pddl from_pddl import_pddl "
+    "load_pddl parse_pddl convert pddl parse_problem import_",
+    "confab.KnowledgeError": "Error ConfabError PlanningError ParseError exceptions errors SceneError NotFoundError "
+    "exception",
+    "confab.load(SCENE).with_fact(FACT)": "Fact add_fact with_fact set_fact State add update assert_fact set",
+    "confab.load(SCENE).with_goal(FACT)": "Goal add_goal with_goal set_goal goals goal",
+    "confab.load(SCENE).objects": "objects individuals Individual instances",
+    "confab.load(SCENE).graph": "graph rdf triples to_graph ConjunctiveGraph",
+    "confab.load(SCENE).owl": "owl onto_path owlready2 default_world",
+    "confab.load(SCENE).board()": "board widget gui edit editor ui",
+    "__version__": "version VERSION get_version",
 }
+COPY = "copy clone duplicate deepcopy fork snapshot"
+COMPARE = "diff compare difference compare_to equals is_equal same_as delta"
+SHOW = "print show display pretty pretty_print to_string str string format text pprint dump_text print_plan print_steps"
 SCENE = {
-    "query": "ask sparql select sparql_query execute_query run_query subjects predicates_objects triples_matching value",
-    "with_fact": (
-        "add_fact set_fact set add assert_fact insert delete remove retract remove_fact delete_fact clone reset update change tell "
-        "put set_value set_initial_value"
-    ),
-    "with_goal": "set_goal add_goal with_goals set_goals change_goal",
-    "plan": "solve find_plan search make_plan planner plan_to run_planner get_plan",
-    "verify": "simulate simulation check check_plan validate_plan physics rollout",
-    "execute": "run act apply step dispatch perform",
-    "objects": "individuals all_objects instances things entities get_objects",
-    "facts": "state initial initial_state init current_state get_state observe values",
-    "goals": "goal goal_state get_goals task tasks",
-    "picture": "draw show plot render image visualise visualize to_png",
-    "behaviors": "behaviours actions operators skills get_actions",
-    "problem.domain.situations": "situations situation_types predicates fluents",
-    "problem.classes": "classes types sorts user_types",
-    "problem.domain": "domain",
-    "to_pddl()": "pddl as_pddl get_pddl",
-    "export": "write_pddl save_pddl",
-    "to_unified_planning()": "unified_planning to_up",
+    "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch where question queries "
+    "get_results",
+    "with_fact": "add_fact set_fact set add assert_fact update change tell put set_value set_initial_value "
+    "remove_fact retract insert delete remove assume modify set_init set_state assign replace with_facts "
+    "set_property edit add_facts set_initial del_fact update_fact add_init observe_fact set_initial_state move "
+    "fluent_value with_init without patch apply_fact",
+    "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
+    "clear_goals delete_goal del_goal update_goal new_goal add_task",
+    "graph.add(TRIPLE)": "add_triple add_object add_individual new_individual add_instance insert_object "
+    "create_object add_node remove_object remove_triple delete_object destroy_entity add_edge remove_individual "
+    "add_objects add_class add_behavior add_action spawn add_fluent add_robot remove_node add_statement",
+    "graph": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise save write dump to_ttl to_turtle "
+    "subjects predicates_of to_owl_file store to_json json to_dict save_as write_ttl to_json_ld to_file turtle ttl "
+    "bind namespace_manager value_of triples_of statements quads to_networkx nodes edges networkx to_string "
+    "export_ttl n3 as_dict subject_objects predicate_objects knowledge_graph",
+    "plan": "solve find_plan search make_plan planner plan_to run_planner get_plan replan compute_plan plan_for "
+    "solve_for astar policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal",
+    "verify": "simulate simulation check check_plan validate_plan physics rollout verify_plan rollouts test "
+    "monte_carlo is_valid_plan sim simulate_plan evaluate test_plan run_simulation check_physics",
+    "execute": "run act apply step dispatch perform tick execute_plan run_plan do play replay rollout_plan start "
+    "loop tick_once spin go act_on monitor run_episode progress do_action apply_action send control perform_action "
+    "simulate_action transition",
+    "explain": "why why_not justify explanation reasons explain_plan because whynot why_unsolvable diagnose",
+    "objects": "individuals all_objects instances things entities get_objects instances_of objects_of_type "
+    "nodes_of_type members subjects_of items object user_objects get_instances names_of_objects constants "
+    "list_objects bodies search_objects",
+    "facts": "state initial initial_state init current_state get_state observe values initial_values "
+    "explicit_initial_values initial_value observation get_value initial_facts get_fact holds true_facts "
+    "world_state fact value get_initial belief is_true check_fact fluent_values get_facts current_facts init_state "
+    "atoms initial_defaults literals static_facts obs get_obs get_property predicate_values",
+    "goals": "goal_state get_goals task tasks goal get_goal goal_facts objective targets desired wanted "
+    "goal_conditions is_goal goal_reached target goal_description",
+    "picture": "draw show plot render image visualise visualize to_png view display map draw_scene screenshot "
+    "thumbnail diagram show_scene viewer figure svg print_map visualization",
+    "behaviors": "behaviours actions operators skills get_actions action action_space behavior behaviour operator "
+    "schemas schema capabilities get_behaviors action_names methods preconditions action_schemas effects "
+    "list_actions get_action abilities primitives primitive_actions durative_actions",
+    "problem.domain.situations": "situations situation_types predicates fluents fluent predicate properties "
+    "object_properties data_properties situation observation_space attributes state_variables features",
+    "problem.relations": "relations static relation",
+    "problem.classes": "classes types sorts user_types hierarchy taxonomy class_tree type_hierarchy subclasses "
+    "type_of object_types get_class kinds is_a class_hierarchy get_types list_classes",
+    "problem.domain": "domain domain_name",
+    "problem": "up_problem planning_problem as_problem task_definition ground grounded problem_kind",
+    "to_pddl()": "pddl as_pddl get_pddl domain_pddl problem_pddl to_domain",
+    "export": "write_pddl save_pddl export_pddl dump_pddl",
+    "to_unified_planning()": "unified_planning to_up as_up up to_unified",
     "read_episode(FILE)": "load_episode open_episode parse_episode load_execution read_execution",
     "read_report(FILE, PLAN)": "load_report load_verdicts read_verdicts load_verification",
-    "read_plan(FILE)": "load_plan open_plan parse_plan",
-    "affordances": "afforded afford possible_actions applicable applicable_actions successors legal_actions action_space",
-    "graph": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise",
-    "owl": "owlready ontology onto world get_ontology to_owl owlready2",
-    "embodiment": "robot robots arms body",
-    "iri": "name uri base_iri namespace",
-    "serve": "endpoint server start_server",
-    "board": "widget edit editor",
+    "read_plan(FILE)": "load_plan open_plan parse_plan from_plan plan_from_file plan_from_json",
+    "with_episodes(FILE)": "add_episode add_episodes load_history history episodes log",
+    "affordances": "afforded afford possible_actions applicable applicable_actions legal_actions available_actions "
+    "valid_actions action_mask get_legal_actions get_applicable_actions successors can can_do is_applicable "
+    "possible feasible_actions applicable_operators",
+    "owl": "owlready ontology onto world get_ontology to_owl owlready2 default_world load_owl",
+    "embodiment": "robot robots arms body urdf hands gripper joints geometry kinematics meshes poses get_robot "
+    "workspace links arm robot_model agents",
+    "iri": "name uri base_iri namespace identifier namespaces prefixes ns base url id title label",
+    "knowledge.path": "path file filename source location folder",
+    "serve": "endpoint server start_server web api host http app rest open_page browser",
+    "board": "widget editor interactive gui ui dashboard notebook",
     "construct": "constructs describe",
+    "confab.load(SOURCE)": "load open read parse from_file load_scene from_string from_graph load_file from_rdf "
+    "reload loads import_file from_pddl from_ttl read_file from_json from_dict from_path from_url include reset "
+    "restore imports undo",
+    "confab.validate(FILE)": "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
+    "reason sync_reasoner infer warnings check_scene inconsistent_classes validation problems consistency reasoner "
+    "run_reasoner",
+    "confab.generate(FAMILY)": "generate random sample random_scene",
+    "confab.Memory.of(scene).learn(scene, plan)": "learn memory train experience fit remember teach learn_from",
+    "plan().report(FILE)": "report html page to_html write_report save_report",
+    "plan().save(FILE)": "save_plan write_plan",
+    "plan().cost": "cost plan_cost quality_metrics",
+    "plan().solved": "is_solvable solvable solved is_solved has_plan unsolvable is_reachable feasible",
+    "execute().reached": "done success succeeded terminated truncated reward",
+    "with_fact(FACT) (returns a changed copy), or copy.deepcopy(scene)": COPY,
+    "facts == other.facts (confab plan SCENE --diff OLD says what changed in the plan)": COMPARE,
+    "export --bt (in a shell)": "behavior_tree behaviortree bt to_bt tree to_behavior_tree btcpp py_trees xml",
+    "applicable_query(BEHAVIOR)": "show_query get_query precondition_query",
+    "plan(time_limit=SECONDS)": "timeout time_limit set_time_limit set_timeout deadline",
 }
 RESULT = {
-    "plan.steps": "steps actions action_list sequence get_steps",
-    "plan.primitives": "primitives leaves low_level",
-    "plan.length": "length levels",
-    "solved": "success succeeded is_solved ok found is_solvable has_plan",
-    "outcome.status": "status state result",
-    "outcome.reason": "reason failure error message",
-    "cost": "metric value price total_cost",
-    "outcome.bound": "bound lower_bound",
-    "seconds": "time duration runtime elapsed",
-    "json": "to_json to_dict as_dict dict dumps serialize serialise",
-    "save": "dump write to_file store export",
-    "plan.to_networkx()": "to_networkx networkx to_graph nx digraph tree graph",
-    "plan.to_dot()": "to_dot dot graphviz",
-    "plan.to_dataframe()": "to_dataframe dataframe to_pandas df to_csv",
-    "why": "why_step reasons justify explain_step because",
-    "why_not": "whynot contrast alternatives why_isnt",
-    "verify": "simulate check validate physics rollout replay",
-    "execute": "run act perform dispatch",
-    "report": "html show page to_html render",
-    "confab.history.compared(RUNS, ONE, OTHER)": "diff compare compare_to difference",
-    "outcome.search": "log statistics stats search expansions nodes metrics log_messages",
+    "plan.steps": "steps actions action_list sequence get_steps action_names step list_actions action_sequence "
+    "solution actions_sequence step_names top_level first abstract_plan",
+    "plan.primitives": "primitives leaves low_level flat flatten primitive_actions commands motions atomic "
+    "lowest_level ground_actions",
+    "plan.length": "length levels plan_length num_steps n_steps number_of_steps len count size num_actions depth "
+    "number",
+    "plan.at_level(LEVEL)": "level at_level steps_at_level by_level level_steps",
+    "solved": "success succeeded is_solved ok found is_solvable has_plan solvable feasible valid_plan done "
+    "is_success reached is_feasible found_plan finished is_sat",
+    "outcome.status": "status state result code outcome_status planning_status exit_code result_status",
+    "outcome.reason": "reason failure error message why_failed unsolvable why_unsolvable error_message "
+    "unsolvable_reason diagnosis failure_reason explain_failure",
+    "cost": "metric value price total_cost plan_cost quality score objective reward metric_value g_value total_reward",
+    "outcome.bound": "bound lower_bound gap is_optimal optimal proved_optimal optimality optimality_gap upper_bound "
+    "best_bound",
+    "seconds": "time duration runtime elapsed planning_time total_time solve_time search_time wall_time cpu_time "
+    "timing timings elapsed_time metrics_time planning_seconds time_taken",
+    "json()": "to_json to_dict as_dict dict dumps serialize serialise data raw as_json asdict model_dump to_yaml",
+    "save": "dump write to_file store export save_plan write_plan save_json to_path save_to save_as write_json "
+    "persist pickle write_to_file export_plan",
+    "plan.to_networkx()": "to_networkx networkx to_graph nx digraph tree graph as_graph hierarchy dag causal_graph",
+    "plan.to_dot()": "to_dot dot graphviz to_graphviz",
+    "plan.to_dataframe()": "to_dataframe dataframe to_pandas df to_csv table to_table pandas csv",
+    "plan.to_records()": "records rows to_records to_list list as_list",
+    "why": "why_step reasons justify explain_step because explain_action reason_for why_action justification causes",
+    "why_not": "whynot contrast alternatives why_isnt counterfactual alternative instead why_not_action other_plans "
+    "what_if",
+    "verify": "simulate check validate physics rollout verify_plan simulation is_valid validate_plan simulate_plan "
+    "sim test check_plan rollouts monte_carlo evaluate valid run_simulation in_physics verified",
+    "execute": "run act perform dispatch do play replay tick apply execute_plan run_plan start send deploy execution "
+    "perform_plan",
+    "report": "html page to_html render plot view visualise visualize draw write_report open show_plan browse viewer "
+    "plot_plan gantt picture save_report image dashboard write_html save_html to_png figure",
+    "outcome.search": "statistics stats search expansions nodes metrics log_messages expanded generated evaluated "
+    "nodes_expanded search_stats num_expanded expanded_nodes n_expanded log logs evaluations search_statistics",
+    "verify().video": "animate animation video movie film record gif mp4 save_video",
+    "timed": "schedule makespan timeline time_triggered_plan temporal timed_plan to_schedule durations timed_actions "
+    "start_times critical_path parallel concurrent partial_order_plan",
+    "certificate": "proof certify unsolvability_proof proof_of_unsolvability unsat_core",
+    "purposes": "causal_links links dependencies causal supports",
+    "labels": "label labelled names words natural_language sentences captions verbalize in_words say",
+    "print(result), or report(FILE)": SHOW,
+    "result.plan == other.plan": COMPARE,
+    "copy.deepcopy(result)": COPY,
+    "scene.plan()": "replan plan_again repair again redo resolve next",
+    "scene.read_plan(FILE)": "load from_file read from_json parse load_plan read_plan from_dict loads",
+    "scene.to_pddl()": "to_pddl pddl as_pddl",
+    "confab export SCENE --bt (in a shell)": "behavior_tree to_bt bt behaviortree export_bt to_behavior_tree btcpp "
+    "py_trees xml to_xml",
+    "confab.Memory.of(scene).learn(scene, result)": "learn remember memory teach train add_to_memory",
+    "outcome.engine": "planner_name engine planner engine_name solver",
+    "outcome.forgone": "forgone soft_goals unmet violated preferences unmet_goals unsatisfied",
+    "problem.initial": "initial_state initial facts init state_before start_state",
+    "faults(PLAN)": "errors problems violations check_faults",
+}
+PLAN = {
+    "steps": "subplans actions action_list sequence get_steps children nodes items values step action_names "
+    "top_level roots to_list list as_list root first",
+    "primitives": "leaves low_level atoms primitive_actions flat flatten lowest leaf_steps commands motions atomic "
+    "flattened ground_actions linear bottom",
+    "at_level(LEVEL)": "level levels by_level steps_at get_level layer steps_at_level layers",
+    "length": "size n_steps count_steps depth num_steps number_of_steps len height plan_length num_actions "
+    "total_steps shape",
+    "walk()": "iter traverse all_steps visit descendants dfs preorder iterate all_actions flatten_all recursive "
+    "every_step iter_steps",
+    "to_networkx()": "graph networkx to_graph nx digraph tree edges dag as_graph hierarchy",
+    "to_dot()": "dot graphviz to_graphviz draw plot render pydot png visualize visualise figure image",
+    "to_dataframe()": "dataframe df to_pandas table to_table pandas",
+    "to_records()": "json to_json to_dict as_dict dict records rows to_csv dumps serialize to_dicts data as_json csv "
+    "to_yaml",
+    "index(STEP)": "find position locate index_of find_step get",
+    "scene.verify(plan)": "verify simulate check validate physics rollout is_valid valid simulation test check_plan "
+    "is_applicable evaluate validate_plan",
+    "scene.execute(plan)": "execute run act perform dispatch do play replay apply tick start execute_plan run_plan "
+    "send next simulate_steps",
+    "result.save(FILE)": "save write dump to_file store export save_json to_path write_plan save_plan save_as "
+    "persist write_to_file",
+    "scene.read_plan(FILE)": "load from_file open read from_json parse load_plan from_dict loads read_plan",
+    "result.report(FILE)": "report html show_page page to_html view browse gantt",
+    "result.why(STEP)": "why explain justify reasons because explanation explain_step reason",
+    "result.why_not(WHAT)": "why_not whynot contrast alternatives alternative",
+    "result.cost": "cost total_cost metric price quality plan_cost value",
+    "result.solved": "solved success is_solved found ok status",
+    "result.timed": "schedule makespan timed duration timeline timed_actions start_times times total_time durations "
+    "temporal parallel partial_order to_schedule end_times",
+    "result.purposes": "causal_links dependencies links causal ordering constraints adjacency_list",
+    "result.in_order(ID, …)": "reorder order sort permute swap shuffle reordered",
+    "result.goals": "goals goal task",
+    "result.labels": "labels label words in_words natural_language sentences verbalize",
+    "result.problem": "problem domain environment",
+    "scene.plan(GOALS) (plans aren't edited)": "append insert remove add pop replace extend delete edit "
+    "replace_action add_step replan repair substitute update set_step change refine splice clear remove_step",
+    "print(plan)": SHOW,
+    "plan == other": COMPARE,
+    "copy.deepcopy(plan)": COPY,
+    "confab export SCENE --bt (in a shell)": "behavior_tree to_bt bt behaviortree to_behavior_tree btcpp py_trees "
+    "xml to_xml",
+    "scene.to_pddl()": "to_pddl pddl as_pddl",
+    "confab.Memory.of(scene).learn(scene, plan)": "learn remember memory teach train",
+}
+STEP = {
+    "behavior": "name action operator action_name behaviour schema skill action_type verb type behavior_name kind "
+    "what function_name",
+    "arguments": "args parameters params objects actual_parameters operands args_list object target inputs "
+    "param_values argument_names agent location robot hand subject values",
+    "steps": "children substeps sub_steps refinement actions refinements subplan decomposition sub_plan is_leaf "
+    "is_primitive subtasks expand sub_actions has_children primitive leaf body tasks",
+    "bindings": "variables binding substitution assignment assignments env free_variables variable_values",
+    "walk()": "iter traverse descendants dfs all_steps preorder leaves primitives iterate",
+    "path": "position parent address index_path location_in_tree ancestors depth coordinates order parents tree_path",
+    "id": "number index key identifier uid uuid iri step_id action_id ident",
+    "level": "layer height abstraction abstraction_level level_number tier",
+    "rank": "score cogency weight priority probability",
+    "scene.behaviors[step.behavior].preconditions": "preconditions precondition conditions condition requires pre "
+    "requirements is_applicable applicable guard precond add_list needs",
+    "scene.behaviors[step.behavior].effects": "effects effect adds deletes changes postconditions post add_effects "
+    "del_effects results_in outcomes achieves result postcondition add_effect changed_facts consequences",
+    "scene.behaviors[step.behavior].cost": "cost price metric reward action_cost",
+    "result.why(step)": "why explain justify reasons because purpose explanation reason goal causal_links motivation "
+    "rationale",
+    "result.why_not(WHAT)": "why_not whynot contrast alternatives alternative instead other_options",
+    "result.timed": "duration start end start_time end_time time seconds makespan begin schedule finish interval "
+    "starts ends t0",
+    "result.labels.step(step)": "label labels words sentence description title caption natural_language verbalize "
+    "pretty_name describe display_name human_readable",
+    "scene.verify(plan)": "verify simulate check is_valid validate success status ok verdict succeeded failed valid",
+    "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor",
+    "print(step)": SHOW,
+    "vars(step)": "to_dict as_dict json to_json dict asdict serialize data to_record items keys",
+    "step == other": COMPARE,
+    "copy.deepcopy(step)": COPY,
+    "plan.index(step)": "next previous next_step prev previous_step successors predecessors before after sibling "
+    "siblings",
 }
 EXECUTION = {
-    "reached": "success succeeded ok solved done is_done finished goal_reached",
-    "plan": "steps actions executed done_plan trace",
-    "episode": "history log result trajectory record",
-    "episode.events": "events observations",
-    "episode.replans": "replans repairs changes",
-    "episode.failures": "failures errors faults",
-    "episode.status": "status state outcome",
-    "json": "to_json to_dict as_dict dict dumps serialize serialise",
-    "report": "html show page to_html render plot",
-    "save": "dump write to_file store export",
-    "summary()": "describe explain message text",
+    "reached": "success succeeded ok solved done is_done finished goal_reached completed complete verified result "
+    "terminated is_success achieved passed goals_reached truncated is_finished",
+    "plan": "steps actions executed done_plan trace executed_steps performed path action_history executed_plan "
+    "primitives",
+    "episode": "history log trajectory record logs steps_taken rollout transcript",
+    "episode.events": "events observations states observed seen messages event_log obs timeline observation "
+    "state_history feedback",
+    "episode.replans": "replans repairs changes replanning n_replans num_replans replan_count recoveries "
+    "number_of_replans repaired plan_changes",
+    "episode.failures": "failures errors faults failed problems exceptions failed_steps failed_actions failure error",
+    "episode.interventions": "interventions disturbances perturbations surprises changes_of_the_world interrupts",
+    "episode.status": "status state outcome reason return_code final_status",
+    "json()": "to_json to_dict as_dict dict dumps serialize serialise data asdict as_json",
+    "report": "html show page to_html render plot view visualise visualize video display draw replay write_report "
+    "film animate save_video dashboard movie picture",
+    "save": "dump write to_file store export persist save_json save_as write_ttl to_ttl save_episode",
+    "summary()": "describe explain message text info stats statistics print pretty to_string metrics string str",
+    "scene.read_episode(FILE)": "load from_file open read from_json parse loads",
+    "episode.observed": "final_state end_state last_state state_after current_state final_facts facts final",
+    "graph()": "networkx to_networkx to_graph nx tree to_dot dot digraph",
+    "scene.execute()": "resume continue_ restart run step again rerun execute repeat reset retry",
+    "memory.learn(scene, execution)": "learn remember train memory teach",
+    "copy.deepcopy(execution)": COPY,
+    "episode.seconds": "seconds time duration elapsed runtime total_time wall_time",
+    "result.cost": "cost reward total_reward total_cost score return_ returns",
+    "plan.length": "length num_steps n_steps size len count",
 }
 REPORT = {
-    "verified": "success succeeded ok passed valid is_valid result",
-    "rollouts": "runs trials simulations episodes",
-    "shown.failure": "failure error first_failure failed why reason",
-    "rate()": "success_rate accuracy score probability",
-    "good": "successes n_success count",
-    "trusted": "assumed unverified unchecked",
-    "json": "to_json to_dict as_dict dict dumps serialize serialise",
-    "table()": "to_dataframe dataframe steps details",
-    "video": "film movie mp4 save_video animation",
-    "summary()": "describe message text",
+    "verified": "success succeeded ok passed valid is_valid result reached solved status all_passed good_plan is_ok "
+    "is_verified outcome verdict correct feasible is_success",
+    "rollouts": "runs trials simulations episodes verdicts results samples all_rollouts each attempts",
+    "shown.failure": "failure error first_failure failed why reason failures errors fault failed_step "
+    "failed_rollouts faults cause explain failing failed_steps why_failed",
+    "rate()": "success_rate accuracy score probability reliability percentage mean pass_rate confidence average "
+    "success_probability",
+    "good": "successes n_success count num_success n_successes n_passed succeeded_count passed_count "
+    "number_of_successes",
+    "trusted": "assumed unverified unchecked assumptions on_trust",
+    "json()": "to_json to_dict as_dict dict dumps serialize serialise data as_json save write to_file dump asdict "
+    "store",
+    "table()": "to_dataframe dataframe steps details df rows to_csv csv records to_records to_pandas per_step "
+    "measurements step_results measured",
+    "video": "film movie mp4 save_video animation gif frames record animate render watch video_path clip recording "
+    "videos",
+    "summary()": "describe message text print info stats statistics pretty string to_string str",
+    "rollouts[0].cpu_seconds": "time duration elapsed runtime cpu_time total_time seconds",
+    "result.report(FILE)": "html report page to_html show view visualise visualize plot display write_report browse",
+    "scene.read_report(FILE, PLAN)": "load read open from_file from_json parse loads",
+    "scene.verify(plan)": "rerun again verify repeat run simulate validate rollout check",
+    "poured": "amount poured_amount filled spilled spill volume",
+    "copy.deepcopy(report)": COPY,
 }
 MEMORY = {
-    "Memory.load(FILE)": "open read from_file",
-    "save(FILE)": "write dump store to_file export persist",
-    "learn(SCENE, PLAN)": "add train update fit record remember append observe",
-    "teach(SCENE, PLAN)": "demonstrate show_plan imitate demonstration",
+    "confab.Memory.load(FILE)": "open read from_file load_from parse restore from_ttl loads from_path",
+    "confab.Memory.of(SCENE)": "new create empty for_scene from_scene init blank make from_scenes",
+    "save(FILE)": "write dump store to_file export persist save_to serialize to_ttl to_turtle commit write_ttl "
+    "save_as to_rdf",
+    "learn(SCENE, PLAN)": "add train update fit record remember append observe add_episode add_plan store_plan "
+    "insert learn_from add_experience partial_fit learn_episode reinforce add_example put experience_replay step "
+    "backward push",
+    "teach(SCENE, PLAN)": "demonstrate show_plan imitate demonstration add_demonstration from_demonstration "
+    "learn_from_demonstration",
+    "live": "add_execution learn_execution online learn_online",
+    "merge(OTHER)": "combine join union extend add_memory update_from plus merge_with concat share sync",
+    "table()": "counts stats statistics dataframe to_dataframe show links_table entries episodes rows list print "
+    "to_pandas df items all size len length num_episodes n_episodes records num_rules summary describe info data "
+    "count to_json to_dict json",
+    "advice()": "rules advise suggest suggestions recommend preferences weights learned what_learned insights "
+    "predict policy best model get_rules parameters coefficients",
+    "confab.Memory.of(SCENE) (a new memory)": "clear reset forget wipe delete erase remove empty_out unlearn drop",
+    "scene.explain(memory=memory)": "explain why",
+    "scene.plan(memory=memory)": "plan solve use apply query search guide rank",
+    "page()": "html report visualise visualize plot to_html draw view display dashboard",
+    "copy.deepcopy(memory)": COPY,
 }
+TABLE = {
+    "dataframe()": "to_dataframe df to_pandas pandas frame as_dataframe",
+    "csv()": "to_csv save write to_file export dump",
+    "records()": "to_dict to_dicts dicts to_records json to_json as_dict to_list dict data bindings asdict",
+    "[*table]": "rows list fetchall results all items tolist head fetch tail first values_list fetchone itertuples "
+    "iterrows sample one scalar single",
+    "len(table)": "length size count num_rows row_count n_rows shape nrows",
+    "columns": "vars variables header headers keys names fields column_names column",
+    "truth": "askAnswer ask answer boolean as_bool",
+    "print(table)": SHOW,
+    "copy.deepcopy(table)": COPY,
+}
+PROBLEM = {
+    "domain.behaviors": "actions operators behaviors behaviours action schemas action_schemas",
+    "domain.situations": "fluents predicates situations situation_types fluent",
+    "initial": "init initial_state initial_values state explicit_initial_values facts initial_facts",
+    "goal": "goals goal_state target objective tasks goal_facts",
+    "individuals": "objects all_objects instances constants user_objects",
+    "classes": "types user_types sorts kinds",
+}
+BEHAVIOR = {
+    "preconditions": "conditions precondition pre requires condition requirements when",
+    "effects": "effect add_effects del_effects postconditions changes adds deletes post add del_ outcomes",
+    "parameters": "args arguments params signature inputs",
+    "cost": "price metric",
+    "level": "layer depth abstraction",
+    "timing": "duration time durations",
+}
+HINTS: Mapping[str, Mapping[str, str]] = {
+    "confab": MODULE,
+    "scene": SCENE,
+    "result": RESULT,
+    "plan": PLAN,
+    "step": STEP,
+    "execution": EXECUTION,
+    "report": REPORT,
+    "memory": MEMORY,
+    "table": TABLE,
+    "problem": PROBLEM,
+    "behavior": BEHAVIOR,
+}
+"""The tables of wrong names, by kind of object."""
 COMMANDS = {
-    "plan": "solve search find optimise optimize planner schedule",
-    "run": "demo all pipeline go start main run-plan",
-    "scenes": "ls list examples samples datasets list-scenes",
-    "execute": "act step robot perform dispatch drive",
-    "verify": "simulate simulation sim test physics rollout rollouts replay check-plan",
-    "explain": "why why-not whynot reason reasons describe justify",
-    "report": "show view html page visualise visualize gantt dashboard",
-    "picture": "draw plot render image png svg map diagram",
-    "runs": "history log diff compare",
-    "query": "ask sparql select graph facts info inspect dump affordances",
-    "serve": "server open gui web ui browser endpoint",
-    "validate": "check lint doctor shacl",
-    "new": "init create skeleton template scaffold",
-    "generate": "random make gen",
-    "convert": "format translate rewrite",
-    "import": "load read parse from-pddl import-pddl",
-    "export": "save pddl to-pddl write export-pddl",
-    "learn": "train fit practise practice teach bench",
-    "memory": "experience",
-    "mcp": "agent agents tools",
-    "fetch": "download",
+    "plan": "solve search find compute think astar replan goal planner",
+    "plan --diff OLD_SCENE": "diff plan-diff changes delta what-changed",
+    "run": "demo all main pipeline start quickstart example tutorial hello main-job everything launch go bringup",
+    "verify": "simulate simulation sim physics rollout check-plan validate-plan test-plan verify-plan rollouts "
+    "evaluate eval val test",
+    "execute": "act do run-plan execute-plan play step perform dispatch exec loop robot control monitor tick replay "
+    "bt execute-bt send drive move",
+    "explain": "why why-not whynot reason reasons justify explain-plan because diagnose contrast",
+    "learn": "train fit teach practise practice learn-from demonstrate demo-learn imitate training",
+    "memory": "experience mem rules memories forget knowledge",
+    "report": "html page visualize visualise show view render write-report plot display present gantt report-plan "
+    "print",
+    "runs": "history compare log logs experiments results list-runs past show-runs compare-runs diff-runs mlflow "
+    "track previous",
+    "query": "ask sparql select search-graph find-facts facts objects triples rdf q state get arq",
+    "query SCENE --affords all": "affordances applicable affords legal-actions actions possible",
+    "query SCENE --show BEHAVIOR": "behaviors behaviours operators skills show-query",
+    "serve": "server web ui gui app endpoint start-server dashboard live host http watch browser board open webui "
+    "edit interactive rviz viewer api http-server up notebook daemon studio",
+    "mcp": "agent agents llm mcp-server tools chat assistant claude",
+    "picture": "draw image map diagram png svg screenshot graph tree picture-of visual dot graphviz classes "
+    "ontology-graph figure hierarchy",
+    "validate": "check lint shacl consistency reasoner doctor check-scene validate-file consistent infer errors "
+    "verify-file format fmt hermit test-scene",
+    "new": "init create scaffold startproject template begin create-domain new-domain make start-project bootstrap "
+    "add new-scene create-scene setup skeleton new-project",
+    "generate": "gen random make-scene random-scene synth generate-scene sample bench benchmark families build",
+    "convert": "transform translate to-sparql rewrite convert-behaviors",
+    "fetch": "download get-ontology pull install clone-ontology wget add-import update imports",
+    "import": "read-pddl from-pddl load import-pddl pddl2owl pddl-import parse ros load-pddl load-world upload",
+    "export": "to-pddl pddl write-pddl save export-pddl behavior-tree behaviortree bt-export trajectory dump write "
+    "to-bt",
+    "scenes": "list ls list-scenes examples info describe inspect catalog show-scenes domains available datasets "
+    "problems inventory status objects-of stat levels worlds envs samples about",
+    "--help": "help usage man manual commands docs ?",
+    "--version": "version ver",
+    "--completion SHELL": "completion completions install-completion",
 }
+"""Names of commands, and other words for them."""
 OPTIONS = {
-    "--json": "format output-format as-json",
-    "--output": "out file save dest destination html",
-    "--time-limit": "timeout max-time limit deadline seconds budget",
-    "--mode": "heuristic algorithm strategy search alg",
-    "--engine": "planner solver backend",
-    "--world": "sim simulator backend physics env environment gui",
-    "--intervene": "disturb interrupt event disturbance",
-    "--serve": "gui web browser live watch port",
-    "--rollouts": "n runs trials repeats repetitions count episodes num",
-    "--optimal": "best shortest optimize optimise",
-    "--minimise": "minimize objective metric",
-    "--goal": "goals target",
-    "--report": "page html visualize visualise",
-    "--memory": "experience learned",
-    "--verbose": "debug log",
-    "--quiet": "silent",
-    "--observed": "state initial facts",
-    "--video": "film movie mp4 record gif",
-    "--seed": "random-seed rng random",
-    "--noise": "sigma std",
-    "--both-hands": "parallel bimanual both",
+    "time_limit seconds": "timeout max_time deadline limit time max_seconds time_out budget t duration "
+    "max_planning_time overall_time_limit search_time_limit max_runtime wall_time seconds sec timelimit",
+    "rollouts": "trials runs n episodes repeat num_rollouts iterations times samples n_rollouts num_episodes "
+    "repetitions repeats n_episodes tries attempts n_trials k num_trials",
+    "rounds": "epochs iterations episodes repeat n_rounds n passes repeats",
+    "seed": "random_seed rng random_state s seeds",
+    "format": "fmt output_format csv results type as tsv f",
+    "json": "format fmt json_output as_json output_format machine to_json print_json structured jsonl",
+    "output path folder": "out outfile output_file out_dir save write dest to output_dir directory destination "
+    "out_file file target result_file plan_file save_to dir sas_plan output_folder o outdir output_path filename "
+    "file_name",
+    "report": "html page visualize visualise web show_html view render plot html_report",
+    "video": "film movie record record_video mp4 save_video video_file animation gif capture",
+    "gui": "render viewer window show display visualise visualize human headless gui_on interactive use_gui "
+    "render_mode",
+    "goals goal": "target task objective goal_state set_goal targets new_goal want desired goal_facts tasks to_achieve",
+    "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights "
+    "learned_from",
+    "no_memory": "without_memory no_learning fresh memoryless",
+    "engine": "planner solver backend heuristic search_engine up_engine planner_name fast_downward external "
+    "algorithm search use",
+    "mode": "strategy algorithm alias method search_mode policy config variant heuristic search",
+    "optimal minimise": "optimise optimize best shortest cost_optimal anytime optimality minimum_cost cheapest "
+    "optimality_guarantee is_optimal find_optimal",
+    "minimise": "minimize metric quality_metric criterion cost makespan minimise_cost quality objective",
+    "interventions intervene": "intervention disturb disturbance event interrupt disturbances inject events change "
+    "surprise perturbation",
+    "world": "sim simulator simulation env environment real physics backend pybullet use_physics simulate in_world",
+    "on": "robot connect interface hardware ros host address adapter driver",
+    "serve": "port web live http web_port",
+    "port": "p http_port address bind listen server_port host",
+    "workers": "jobs j threads processes parallel n_jobs cores cpus num_workers nproc num_threads n_workers procs "
+    "concurrency",
+    "noise": "sigma std stddev noise_level sensor_noise error perception_noise",
+    "perturb": "randomise randomize domain_randomization vary jitter perturbation random perturbations disturb robust",
+    "verbose": "debug log log_level loglevel trace verbosity logging info vv",
+    "quiet": "silent no_output no_log no_progress",
+    "not": "why_not instead alternative whynot but contrast",
+    "observed from_observed": "init initial state start from_state initial_state observation from start_state "
+    "current_state observations",
+    "level": "depth layer abstraction levels abstraction_level",
+    "leave_levels levels": "strict free hierarchy strict_levels",
+    "scene iri": "iri name problem scene_iri graph named_graph uri",
+    "source": "path file filename uri url scene address location name graph text data input",
+    "plan": "plan_file input_plan from_plan solution sas_plan action_list steps initial_plan",
+    "objects": "n_objects num_objects size n cups count number",
+    "hands": "arms n_hands robots grippers n_arms num_hands",
+    "clutter": "distractors irrelevant extra obstacles distraction",
+    "strict": "werror error fail_on_warning warnings_as_errors pedantic",
+    "deep": "hermit reasoner full owl consistency pellet thorough dl",
+    "bt": "behavior_tree behaviour_tree behaviortree tree btcpp py_trees xml",
+    "trajectory": "trajectories joints motion paths joint_trajectory",
+    "affords": "affordances object applicable actions what_can of",
+    "observer": "callback on_step listener hook on_event callbacks subscriber",
+    "watch": "live follow show display render visualize animate",
+    "perturbed": "randomised",
+    "keep": "history save_run store archive track log_run",
+    "no_video": "skip_video no_film without_video headless fast no_record",
+    "learn": "train remember update_memory learning fit",
+    "rows": "limit max_rows n head top max_results",
+    "diff": "compare changes against_scene delta difference",
+    "instead": "step replace at in_place_of",
+    "family": "kind type name template scenario",
+    "behavior": "action operator skill behaviour name",
 }
+"""Names of parameters in Python, which are also the names of options without ``--`` and with ``-``, and other words for them.
 
-
-def meant(name: str, known: Mapping[str, str], table: Mapping[str, str]) -> str:
-    """Return the known name that a wrong name means according to a table or its words; an empty text if there is none.
-
-    Parameters
-    ----------
-    name : str
-        A command, or an option with or without its hyphens.
-    known : mapping
-        The names to choose from, with their descriptions.
-    table : mapping
-        Right names with other names for the same thing: `COMMANDS` or `OPTIONS`.
-    """
-    from confab.guessing import chosen
-
-    word = name.lstrip("-").replace("_", "-").lower()
-    listed = (right for right, others in table.items() if right in known and word in others.split())
-    return next(listed, "") or chosen(name, known)
+If a key contains several names, the first one that the function or command has is used.
+"""

@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
 
 
-@right_names("a scene", "confab.hints", "SCENE", "confab.load(SCENE)")
+@right_names("a scene", "confab.load(SCENE)")
 @dataclass
 class Known(metaclass=RightNames):
     """A scene that can be read, queried and edited. The subclass `confab.scene.Scene` adds planning and acting.

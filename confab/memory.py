@@ -54,7 +54,7 @@ SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
 
 
-@right_names("a memory", "confab.hints", "MEMORY", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
+@right_names("a memory", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
 @dataclass
 class Memory(metaclass=RightNames):
     """A confabulation memory: experience from planning and execution.

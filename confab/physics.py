@@ -55,7 +55,7 @@ class ReportJson(TypedDict):
     rollouts: list[SeenRolloutJson]
 
 
-@right_names("a report", "confab.hints", "REPORT", "scene.verify() or scene.read_report(FILE, PLAN)")
+@right_names("a report", "scene.verify() or scene.read_report(FILE, PLAN)")
 @dataclass(frozen=True)
 class Report(metaclass=RightNames):
     """The report of a verification: the rollouts of a plan, and the film of the first rollout.

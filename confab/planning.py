@@ -290,7 +290,7 @@ AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 """The notations of a step of a plan, as `Result.why` describes them."""
 
 
-@right_names("a result", "confab.hints", "RESULT", "scene.plan()")
+@right_names("a result", "scene.plan()")
 @dataclass
 class Result(metaclass=RightNames):
     """The result of planning: the outcome, with the plan if one was found, and the scene of the call.

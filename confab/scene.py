@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from confab.why import Account
 
 
-@right_names("a scene", "confab.hints", "SCENE", "confab.load(SCENE)")
+@right_names("a scene", "confab.load(SCENE)")
 class Scene(Known):
     """A scene: an ontology file with all its imports.
 

@@ -205,11 +205,11 @@ def _usage(error: Any) -> str:
         sys.exit(MISUSE)
     command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from confab.hints import OPTIONS, meant
+        from confab.guessing import chosen
 
         options = [each for each in error.ctx.command.params if isinstance(each, click.Option)]
         helps = {one: each.help or "" for each in options for one in each.opts if one.startswith("--")}
-        right = meant(error.option_name, helps, OPTIONS)
+        right = chosen(error.option_name, helps)
         if right:  # click suggests only options of similar spelling
             return f"no such option '{error.option_name}'. Did you mean '{right}'? See {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")

@@ -21,44 +21,6 @@ class Node(NamedTuple):
     id: int
 
 
-PLAN = {
-    "steps": "actions action_list sequence get_steps children nodes",
-    "primitives": "leaves low_level atoms primitive_actions",
-    "at_level(LEVEL)": "level levels by_level flatten flat",
-    "length": "size n_steps count depth",
-    "walk()": "iter traverse all_steps visit",
-    "steps[0]": "first head",
-    "steps[-1]": "last tail",
-    "result.save(FILE)": "save write dump to_file store",
-    "result.execute()": "execute run act perform dispatch",
-    "result.verify()": "verify simulate check",
-    "result.faults(plan)": "faults validate is_valid valid",
-    "result.report(FILE)": "report show html",
-    "result.cost": "cost total_cost metric",
-    "result.why(STEP)": "why explain reasons",
-    "confab.history.compared(RUNS, ONE, OTHER)": "diff compare difference",
-    "to_networkx()": "graph networkx to_graph nx digraph tree",
-    "to_dot()": "dot graphviz to_graphviz draw plot",
-    "to_dataframe()": "dataframe df to_pandas table",
-    "to_records()": "json to_json to_dict as_dict dict to_list to_csv",
-}
-"""Attributes of a plan, each with other names that users try."""
-STEP = {
-    "behavior": "name action operator action_name behaviour",
-    "arguments": "args parameters params objects actual_parameters",
-    "steps": "children substeps sub_steps refinement actions is_primitive is_leaf leaf primitive",
-    "path": "parent position index_in_plan",
-    "level": "depth layer level_number",
-    "result.why(step)": "why explain preconditions effects precondition effect reason reasons purpose",
-    "result.cost": "cost price",
-    "result.timed": "start end begin duration time",
-    "bindings": "variables binding",
-    "walk()": "iter traverse descendants",
-    "id": "number index key",
-}
-"""Attributes of a step, each with other names that users try."""
-
-
 def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
     """Return a plan as a directed graph whose nodes are the paths of the steps.
 

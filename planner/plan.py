@@ -33,7 +33,7 @@ class Status(Enum):
     GAVE_UP = "gave-up"  # a limit came first
 
 
-@right_names("a step", "confab.planner.forms", "STEP")
+@right_names("a step")
 @dataclass(frozen=True)
 class Step:
     """One behaviour of a plan, with the steps of the next level that refine the behaviour.
@@ -64,7 +64,7 @@ class Step:
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
-@right_names("a plan", "confab.planner.forms", "PLAN", "scene.plan() or scene.read_plan(FILE)")
+@right_names("a plan", "scene.plan() or scene.read_plan(FILE)")
 @dataclass(frozen=True, repr=False)
 class Plan(Sequence[Step], metaclass=RightNames):
     """A tree of steps that leads from the initial state to the goal.

@@ -93,7 +93,7 @@ def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
     near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [
-        folded[name] for name in get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+        folded[name] for name in get_close_matches(word.lower(), folded, n=1, cutoff=0.75)
     ]
     return f"; did you mean '{near[0]}'?" if near else (f"; {hint}" if hint else "")
 
@@ -102,15 +102,8 @@ def _ontology_name(iri: str) -> str:
     return local_name(iri.partition("#")[0] if "#" in iri else iri.rpartition("/")[0])
 
 
-TYPED = 0.85
-"""Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
 FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong one."""
-CONSTRUCTORS = (
-    "load loads open read parse make create new build from_file from_json from_dict from_path from_graph from_pddl from_ttl "
-    "from_text from_string from_rdf from_owl from_yaml"
-)
-"""Names under which users look for the call that creates an object."""
 GUESSING: list[str] = []
 """Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one."""
 
@@ -124,33 +117,25 @@ class RightNames(ABCMeta):
             """Raise `WrongNameError` with the name that was probably meant."""
             if name.startswith("_"):
                 raise AttributeError(f"type object '{cls.__name__}' has no attribute '{name}'")
-            kind, hints = cls._creation
-            raise WrongNameError(f"the class of {kind}", name, cls, hints)
+            raise WrongNameError(f"the class of {cls._kind}", name, cls)
 
 
-def right_names(kind: str, module: str = "", table: str = "", made: str = "") -> Callable[[C], C]:
+def right_names(kind: str, made: str = "") -> Callable[[C], C]:
     """Return a class decorator that adds the correct name to errors for unknown attributes and arguments.
 
     Parameters
     ----------
     kind : str
         Description of the object, e.g. ``a scene``.
-    module, table : str
-        Module and name of a mapping from correct names to words with the same meaning; imported when a name is wrong.
     made : str, optional
-        The call that creates such an object. Errors of the constructor without arguments, and errors for names such as
-        ``from_file`` of the class, mention it.
+        The call that creates such an object; the error of the constructor without arguments mentions it.
     """
-
-    def hints() -> Mapping[str, str]:
-        found: Mapping[str, str] = getattr(import_module(module), table) if module else {}
-        return found
 
     def decorated(cls: C) -> C:
         def lacking(self: object, name: str) -> NoReturn:
-            raise WrongNameError(kind, name, type(self), hints)
+            raise WrongNameError(kind, name, type(self))
 
-        type.__setattr__(cls, "_creation", (kind, lambda: {made: CONSTRUCTORS, **hints()}))
+        type.__setattr__(cls, "_kind", kind)
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
         if made:
             begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class
@@ -221,14 +206,12 @@ class WrongNameError(AttributeError):
         Description of the object, e.g. ``a scene``.
     name : str
     there : object
-        The object; its public names are determined by `dir`.
-    hints : callable
-        Returns the mapping from a correct name to words with the same meaning.
+        The object or its class; its public names are determined by `dir`.
     """
 
-    def __init__(self, kind: str, name: str, there: object, hints: Callable[[], Mapping[str, str]]) -> None:
+    def __init__(self, kind: str, name: str, there: object) -> None:
         super().__init__(f"{kind} has no '{name}'")
-        self._wrong, self._there, self._hints = (kind, name), there, hints
+        self._wrong, self._there = (kind, name), there
 
     def __str__(self) -> str:
         """Return the message with the suggested name."""
@@ -238,11 +221,7 @@ class WrongNameError(AttributeError):
             return text
         every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
         known = sorted(each for each in every if not each.startswith("_"))
-        hints = {word: right for right, wrong in reversed([*self._hints().items()]) for word in wrong.split()}
-        singular = {word.rstrip("s"): right for word, right in hints.items()}
-        meant = hints.get(name) or singular.get(name.rstrip("s"), "")
-        if not meant and not get_close_matches(name, known, n=1, cutoff=TYPED):
-            meant = next((import_module(each).guessed(kind.split()[-1], name) for each in GUESSING), "")
+        meant = next((import_module(each).guessed(kind.split()[-1], name, known) for each in GUESSING), "")
         if meant:
             return f"{text}; use {meant}"
         return text + nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
