@@ -196,7 +196,7 @@ def test_what_follows_is_no_fact_of_the_scene() -> None:
 
 def test_working_out_what_follows_keeps_to_the_time_of_the_query() -> None:
     problem = confab.load("packing-small").problem
-    with within(0.0), pytest.raises(LimitError, match="while working out INSIDE in the initial state"):
+    with within(0.0), pytest.raises(LimitError, match="gave up after 0 s while"):
         list(_following(problem, ["INSIDE"]))
     with pytest.raises(LimitError):
         confab.load("packing-small").query(INSIDE, QueryLimits(seconds=0.0))
