@@ -63,7 +63,7 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
         return None if until is None else max(until - perf_counter(), 0.0) / parts
 
     first = in_time(problem, plan, left(3))
-    if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.serial, first.plan.makespan)):
+    if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.work, first.plan.makespan)):
         return first
     half = left(2)
     other = shared(problem, plan, None if half is None else perf_counter() + half, shorten)
@@ -189,7 +189,7 @@ def _timed(
     durations = durations_with(network, choices, found.turns)
     edges = (*network.edges, *turn_edges(order, found.turns))
     arcs = network.arcs(edges, durations)
-    slack = _slack(arcs, durations, found.begins)
+    slack = _slack(network, arcs, durations, found.begins)
     new = exchanged(problem, plan, renamed) if renamed else plan
     slots = []
     for i, (step, activity) in enumerate(zip(new.primitives, order.activities, strict=True)):
@@ -210,9 +210,14 @@ def _timed(
     return _ordered(problem, timed) if renamed or exchanged_turns else timed
 
 
-def _slack(arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins) -> list[int]:
-    """Return the slack of each activity: the time by which the activity can begin later without a longer makespan."""
-    latest = [begins.makespan - lasts for lasts in durations]
+def _slack(
+    network: Network, arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins
+) -> list[int]:
+    """Return the slack of each activity: the time by which it can begin later without a longer makespan or a missed time."""
+    latest = [
+        min([begins.makespan, *network.ends(i, begin, lasts)]) - lasts
+        for i, (begin, lasts) in enumerate(zip(begins.begins, durations, strict=True))
+    ]
     order = sorted(range(len(latest)), key=lambda i: -begins.begins[i])
     for _ in range(len(latest)):
         changed = False

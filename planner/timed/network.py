@@ -58,6 +58,13 @@ class Network:
         """Return the minimum time from the begin or end of activity `i` to the begin or end of activity `j`."""
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
+    def ends(self, i: int, begin: int, lasts: int) -> list[int]:
+        """Return the latest ends of an activity with this begin: those for its latest times, its window and its fixed time."""
+        fixed = self.at[i]
+        found = [by if which == END else by + lasts for which, by in self.latest[i]]
+        found += [high for low, high in self.windows[i] if high is not None and low <= begin and begin + lasts <= high]
+        return found if fixed is None else [*found, fixed + lasts]
+
     def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
         """Return the successors of each activity, each with the minimum time between the two begins."""
         found: list[dict[int, int]] = [{} for _ in durations]

@@ -69,6 +69,11 @@ class TimedPlan:
         """The sum of the durations of all primitives, in seconds."""
         return sum((slot.end - slot.begin for slot in self.slots), Fraction(0))
 
+    @property
+    def work(self) -> Fraction:
+        """The time that the actors are busy, added up, in seconds."""
+        return sum(((slot.end - slot.begin) * len(slot.actors) for slot in self.slots), Fraction(0))
+
     @cached_property
     def intervals(self) -> Mapping[tuple[int, ...], tuple[Fraction, Fraction]]:
         """The begin and the end of every step in seconds, by path.

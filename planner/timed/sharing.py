@@ -87,8 +87,8 @@ class _Sequence:
     stretches: list[_Stretch]
     cost: tuple[Fraction, Fraction, Fraction]
     """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
-    serial: Fraction
-    """The sum of all durations."""
+    work: Fraction
+    """The time that the actors are busy, added up."""
     end: Fraction
     """The end of the last stretch."""
     critical: list[tuple[int, Step, tuple[str, ...]]]
@@ -132,14 +132,14 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
         yield Crew(tuple(zip(several, its, strict=True)))
 
 
-def evenly_shared(problem: Problem, serial: Fraction, makespan: Fraction) -> bool:
-    """Return whether all actors of a problem are busy for almost the whole makespan of a plan; `serial` is its work."""
+def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
+    """Return whether all actors of a problem are busy for almost the whole makespan; `work` is the time that they are busy."""
     resting, actors = default_actors(problem), set[str]()
     for behavior in problem.domain.behaviors.values():
         actors.update(term for term in timing_of(behavior).actors if term not in behavior.kinds)
         for term in _actor_terms(problem, behavior, resting):
             actors.update(problem.members(behavior.kinds[term]))
-    return makespan * len(actors) <= serial * BUSY
+    return bool(actors) and makespan * len(actors) <= work * BUSY
 
 
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
@@ -236,7 +236,7 @@ class _Search:
         while barren < BARREN and now.critical:
             if not (self.shorten or now.cost[0]):
                 break
-            if not now.cost[0] and evenly_shared(self.problem, now.serial, now.cost[1]):
+            if not now.cost[0] and evenly_shared(self.problem, now.work, now.cost[1]):
                 break
             other = self.built(self.changed(now, random), now)
             barren += 1
@@ -416,4 +416,4 @@ class _Search:
         late, makespan = (cost * network.unit for cost in begins.cost)
         end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
         cost = late, makespan, sum((its**2 for its in work.values()), Fraction(0))
-        return _Sequence(tasks, stretches, cost, sum(network.durations) * network.unit, end, critical)
+        return _Sequence(tasks, stretches, cost, sum(work.values(), Fraction(0)), end, critical)

@@ -153,3 +153,10 @@ def test_the_same_task_gets_the_same_schedule(tmp_path: Path) -> None:
     robots, goals = {"r1": "hall", "r2": "cellar", "r3": "attic"}, dict.fromkeys(("a", "b", "c", "d"))
     one, other = (planned(tmp_path, robots, goals, minimise="makespan") for _ in range(2))
     assert one.timed == other.timed
+
+
+def test_a_step_has_no_slack_beyond_its_deadline(tmp_path: Path) -> None:
+    result = planned(tmp_path, {"r1": "hall", "r2": "hall"}, {"a": 13, "b": None, "c": None}, [("r1", 0, 14)])
+    assert result.timed is not None
+    slack = {(slot.step.behavior, slot.step.arguments[1]): slot.slack for slot in result.timed.slots}
+    assert {slack["WASH", "a"], slack["GO", "a"]} == {1}
