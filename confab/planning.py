@@ -520,7 +520,7 @@ class Result(metaclass=RightNames):
             return f"{circles} of the {of} primitives only undo each other (the steps above ask for them); {how}"
         costs = {behavior.cost for behavior in self.problem.domain.behaviors.values()}
         if self.outcome.cost is not None or len(costs) > 1:
-            return f"the plan costs {self.cost:g}; a cheaper one wasn't looked for: {how}"
+            return f"the plan costs {self.cost:g}, and no bound is known: {how}"
         return ""
 
     @property

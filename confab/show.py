@@ -107,7 +107,7 @@ def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
         return f"{said}, proved {best} on the lowest level"
     least = f"has at least {bound:g} primitives" if cost is None else f"costs at least {bound:g}"
     least = f": any plan for these goals {least}" if bound > 0 else ""
-    return f"{said}; not proved {best}{least}; a longer time limit may prove more, or find a better plan"
+    return f"{said}; not proved {best}{least}; --optimal and a longer time limit may prove more, or find a better plan"
 
 
 def summary(outcome: Outcome) -> str:

@@ -25,6 +25,7 @@ from confab.planner.grounded.landmarks import landmarks
 from confab.planner.grounded.lookahead import ahead
 from confab.planner.grounded.novelty import Novelty
 from confab.planner.grounded.plan_windows import shorter
+from confab.planner.grounded.shortest import least
 from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError
@@ -97,7 +98,8 @@ def plan_level(
     except OutOfTimeError:
         found = Flat(Status.GAVE_UP, (), Reason("the time limit came first"))
     plan = Plan(task.steps(found.plan)) if found.status is Status.SOLVED else None
-    return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began)
+    bound = least(task) if plan is not None else None
+    return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began, bound=bound)
 
 
 def search(

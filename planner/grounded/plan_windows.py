@@ -41,8 +41,8 @@ WAYS = 20
 """Number of alternatives of derived bits that are processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
 """Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
-OPERATORS, EVALUATIONS = 150, 100
-"""Maximum number of operators, and of evaluations of h_FF, in the search of a window."""
+OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
+"""Maximum number of operators in the search of a window. Evaluations of h_FF: one per `SHARE` of the work, at least 100."""
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
@@ -74,7 +74,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         best, proved = cheapest(task, best, work, deadline)
         if proved:
             return best
-    windows = _Windows(task, work, deadline)
+    windows = _Windows(task, work, max(EVALUATIONS, work // SHARE), deadline)
     while True:
         before = task.cost_of(best)
         for size in SIZES:
@@ -202,6 +202,8 @@ class _Windows:
 
     task: Task
     work: int
+    most: int
+    """Maximum number of evaluations in the search of a window."""
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
     """Windows without a cheaper replacement, each as a state, required bits and a cost."""
@@ -269,7 +271,7 @@ class _Windows:
             return None
         operators = self.near(steps, state, wanted)
         task, operators = self.part(operators, state, wanted)
-        found = self.search(task, spent)
+        found = self.search(task, spent, self.most)
         if found is None:
             self.failed.add((state, wanted, spent))
             return None
@@ -282,7 +284,7 @@ class _Windows:
         found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
         return plan if found is None else shortened(self.task, found, self.deadline)
 
-    def search(self, task: Task, upper: float, most: int = EVALUATIONS, weight: int = 1) -> list[int] | None:
+    def search(self, task: Task, upper: float, most: int, weight: int = 1) -> list[int] | None:
         """Search for a plan cheaper than `upper` by A*; drop states whose cost plus weighted h_FF reaches `upper`."""
         found = shortest(task, cost_left(task), upper, deadline=self.deadline, known=most, weight=weight, cut=self.cut)
         self.work -= len(found.states) * len(task.owners)

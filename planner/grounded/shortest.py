@@ -138,13 +138,12 @@ def shortest(
 def ways(task: Task) -> Bound:
     """Return a lower bound on the cost of a plan: the sum, over all goals, of the least cost of achieving the goal alone.
 
-    Each operator counts for only one symbol. Therefore no plan is cheaper than the bound. A goal on a symbol with a single bit
-    contributes 0.
+    Each operator counts for only one symbol. Therefore no plan is cheaper than the bound.
     """
     of_symbol: dict[object, list[int]] = {}
     for bit, fact in enumerate(task.facts):
         of_symbol.setdefault(fact.symbol, []).append(bit)
-    wanted = [(bits, at) for bits in of_symbol.values() if len(bits) > 1 for at in bits if task.goal >> at & 1]
+    wanted = [(bits, at) for bits in of_symbol.values() for at in bits if task.goal >> at & 1]
     wanted.sort(key=lambda pair: -len(pair[0]))
     symbol = np.full(task.size, -1)  # for each bit, the position of its symbol in `wanted`
     for number, (bits, _) in enumerate(wanted):
@@ -165,6 +164,9 @@ def ways(task: Task) -> Bound:
         if np.array_equal(least, old):
             break
     tables = {at: (sum(1 << bit for bit in bits), {1 << bit: float(least[bit]) for bit in bits}) for bits, at in wanted}
+    for number, (bits, at) in enumerate(wanted):
+        if len(bits) == 1:  # the symbol has another value if the bit isn't set; a derived bit is set by no operator
+            tables[at][1][0] = float(anyhow[number]) if np.isfinite(anyhow[number]) else 0.0
     goal = sum(1 << at for at in tables)
 
     def bound(state: int) -> float:
@@ -175,6 +177,11 @@ def ways(task: Task) -> Bound:
         return total
 
     return bound
+
+
+def least(task: Task) -> float | None:
+    """Return a lower bound on the cost of every plan if operators have different costs (`ways`); None if that is 0."""
+    return (ways(task)(task.initial) if len(set(task.costs)) > 1 else 0.0) or None
 
 
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

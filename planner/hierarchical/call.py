@@ -82,6 +82,8 @@ class Call:
         """Number of times that all steps were undone and replaced by other steps."""
         self.saving: float | None = None
         """The cost per second that the last round of shortening saved; None before shortening."""
+        self.bound: float | None = None
+        """A lower bound on the cost of every plan, if the primitives have different costs."""
         self.settled = False
         """Whether the planner has tried to bring the symbols to rest that aren't at rest in the initial state."""
 
@@ -171,6 +173,7 @@ class Call:
             misses=cache.misses,
             given_up=given_up,
             saving=self.saving,
+            bound=self.bound if plan is not None else None,
         )
 
     def tree(self) -> Plan:

@@ -26,7 +26,7 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.windows import regroupings
+from confab.planner.hierarchical.windows import refined, regroupings
 from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
@@ -95,7 +95,7 @@ def _plan(
     flat = None
     if one_level and advised is alone:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
-        if flat.status is Status.SOLVED:
+        if flat.status is Status.SOLVED and deadline is None:
             return flat
     call = Call(problem, using or compiled(problem), deadline, limits.expansions)
     call.space.most_work = limits.work
@@ -107,8 +107,10 @@ def _plan(
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
-            if flat.status is not Status.GAVE_UP:
-                return call.outcome(flat.status, flat.plan, flat.reason)
+            if flat.status is Status.UNSOLVABLE or (flat.status is Status.SOLVED and deadline is None):
+                return replace(call.outcome(flat.status, flat.plan, flat.reason), bound=flat.bound)
+            if flat.plan is not None:
+                call.steps, call.bound, done = refined(call, flat.plan.steps), flat.bound, True
         if done or agenda.achieve_all():
             call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()

@@ -34,6 +34,8 @@ SHUFFLES = 3
 """Number of random orders of the goals that are tried before small changes of the best order."""
 LEAST_EFFORT = 400_000
 """Minimum effort assumed for a first plan, in states times operators, so that a plan found at once is shortened, too."""
+LEAST_ROUNDS = 5
+"""Minimum number of rounds with a time limit, where the first may be too short to improve a plan."""
 DOING, BEGINNING = 20, 1_000
 """Work of replaying a primitive, and of beginning a call, in states times operators."""
 MANY = 1.25
@@ -51,21 +53,20 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
-    """Shorten the steps of a call in rounds.
+    """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
     Without a time limit there is one round. With a time limit, rounds continue up to twice the number of the last round that saved
-    primitives.
+    something; there are at least `LEAST_ROUNDS` if windows of the lowest level can make refinements cheaper.
     """
+    least = LEAST_ROUNDS if lasting(call) else 1
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    while rounds < max(1, 2 * useful):
+    while not rounds or (call.space.deadline is not None and rounds < max(least, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)
-        rounds, saved = rounds + 1, before - cost(call)
+        rounds, work, saved = rounds + 1, 2 * work, before - cost(call)
         call.saving = saved / max(perf_counter() - begin, 1e-6)
         useful = rounds if saved else useful
-        if call.space.deadline is None or not useful:
-            break
 
 
 def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:

@@ -62,6 +62,7 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     if any(step.level != level for step in steps):
         return None
     from confab.planner.grounded.plan_windows import shorter
+    from confab.planner.grounded.shortest import least
 
     between = level not in (call.program.levels[0], call.program.levels[-1])
     problem = replace(call.problem, domain=binding(call.problem, level)) if between else call.problem
@@ -69,6 +70,8 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
     if task is None or operators is None:
         return None
+    if level == call.program.levels[-1]:
+        call.bound = least(task)
     found = shorter(task, operators, work, call.space.deadline)
 
     def cost(plan: Sequence[int]) -> tuple[float, int]:

@@ -90,8 +90,10 @@ def lift(ways: list[tuple[int, int]], floors: int) -> Problem:
 
 def test_a_default_plan_buys_what_makes_the_later_steps_cheap() -> None:
     problem = tour(9)
-    found = solve(Request(problem)).plan
-    assert found is not None
+    outcome = solve(Request(problem))
+    assert outcome.plan is not None
+    assert outcome.bound == 9, "each stop is looked at"
+    found = outcome.plan
     assert {"BUY", "RIDE"} <= {step.behavior for step in found.steps}
     assert cost_of(problem, found) == 2 * 4 + 5 + 6 * 0.5 + 9
 
