@@ -92,7 +92,7 @@ def walk(problem: Problem, chance: Random) -> Plan:
     return Plan(tuple(steps))
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(text=worlds(), seed=st.integers(0, 1000))
 def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: Forgetful, text: str, seed: int) -> None:
     """Whatever individual recognition loses, of steps that can be done without it those are refused that can't be done with it."""

@@ -104,7 +104,7 @@ def test_a_weight_that_is_no_cost_is_refused_with_the_remedy(tmp_path: Path, wei
 
 def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_path: Path) -> None:
     judged = 0
-    for seed in range(440_000_000, 440_000_060):
+    for seed in range(440_000_000, 440_000_040):
         world = mixed(seed, 0.0)
         if len(world.problem.goal) < 2 or len(world.problem.domain.levels) > 1:
             continue
@@ -128,7 +128,7 @@ def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_p
         assert cost + unmet == best, seed
         assert outcome.bound is not None, seed
         assert Fraction(outcome.bound) <= cost, seed
-    assert judged > 7
+    assert judged > 4
 
 
 def least(problem: Problem, weights: dict[Symbol, Fraction]) -> Fraction | None:
