@@ -2,7 +2,7 @@
 
 crew      the chosen individual for each class of actors, barred actors, and barred steps; steps towards a goal name no others. The
           empty crew allows all.
-task      a goal with its crew
+task      a goal, or a step that is done early, with its crew
 stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
 
 The first sequence of tasks is that of the plan, or a greedy one: each goal is given to the crew that achieves it first. Then the
@@ -33,7 +33,7 @@ from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, Facts, validate
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol
+from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol, ValueCondition
 from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64
@@ -50,15 +50,19 @@ MOST_KNOWN = 4
 """Maximum number of known steps that are tried for a stretch."""
 MOST_COMPILED = 200
 """Maximum number of crews for which behaviours are compiled; then no more steps are barred."""
-HALF, PREFERRED = 0.5, 0.8
-"""Shares of the bars that concern an actor, and of the changes that concern a task on the critical path."""
+HALF, PREFERRED, EARLY = 0.5, 0.8, 0.25
+"""Shares of the bars that concern an actor, of the changes on the critical path, and of those that do a late step early."""
 MOST_FAILED = 2
 """Number of failed searches after which no more steps are searched for a task."""
 EXPANSIONS, WORK = 500, 200_000
 """Maximum number of expansions for a stretch, and maximum work of its searches in states times operators."""
 
 State: TypeAlias = "dict[Symbol, str]"
-Task: TypeAlias = "tuple[Symbol, Crew]"
+Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
+"""A behaviour with its arguments."""
+Aim: TypeAlias = "Symbol | Ground"
+"""A goal, or a step of the first level that is done early."""
+Task: TypeAlias = "tuple[Aim, Crew]"
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Crew:
 
     chosen: tuple[tuple[str, str], ...] = ()
     without: frozenset[str] = frozenset()
-    barred: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
+    barred: frozenset[Ground] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -91,8 +95,11 @@ class _Sequence:
     """The time that the actors are busy, added up."""
     end: Fraction
     """The end of the last stretch."""
-    critical: list[tuple[int, Step, tuple[str, ...]]]
-    """The steps on the critical path, or on the path to the activity that is latest, each with its task's number and its actors."""
+    critical: list[tuple[int, Step, tuple[str, ...], Ground]]
+    """The steps on the critical path, or on the path to the activity that is latest.
+
+    Each has its task's number, its actors, and the step of the first level that contains it.
+    """
 
 
 def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = True) -> Plan | None:
@@ -181,8 +188,8 @@ class _Search:
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
     work: int = 0
     most: int = MOST_WORK
-    known: dict[Task, list[tuple[Step, ...]]] = field(default_factory=dict)
-    """The steps found for each task, which are tried again before other steps are searched."""
+    known: dict[tuple[Task, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
+    """The steps found for each task after the same early steps; they are tried again before others are searched."""
     failed: Counter[Task] = field(default_factory=Counter)
     """How often no steps were found for each task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
@@ -258,7 +265,7 @@ class _Search:
             steps = renumbered(self.plan.steps[at:upto])
             state, at = self.after(state, steps), upto
             stretches.append(_Stretch(steps, state))
-            self.known[goal, Crew()] = [steps]
+            self.known[(goal, Crew()), frozenset()] = [steps]
         return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
     def greedy(self) -> _Sequence | None:
@@ -284,10 +291,17 @@ class _Search:
     def changed(self, now: _Sequence, random: Random) -> list[Task]:
         """Return the tasks of a sequence with a change.
 
-        One task gets another crew, two exchange their crews, an actor or a step of one is barred, or one gets another position.
+        One task gets another crew, two exchange their crews, an actor or a step of one is barred, or one gets another position. If
+        a step is late, it may become a task of its own that is done early, or such a task is dropped.
         """
         tasks = list(now.tasks)
-        i, step, actors = random.choice(now.critical)
+        i, step, actors, above = random.choice(now.critical)
+        if now.cost[0] and random.random() < EARLY:
+            if isinstance(tasks[i][0], Symbol):
+                tasks.insert(random.randrange(i + 1), (above, Crew()))
+            else:
+                del tasks[i]
+            return tasks
         i = i if random.random() < PREFERRED else random.randrange(len(tasks))
         j, kind = random.randrange(len(tasks)), random.randrange(4)
         goal, crew = tasks[i]
@@ -323,26 +337,41 @@ class _Search:
             state = stretch.after
         return self.scheduled(list(tasks), stretches)
 
-    def stretch(self, state: State, goals: Sequence[Symbol], crew: Crew) -> _Stretch | None:
-        """Return the steps by which a crew achieves the last of some goals and keeps the others; None if they aren't found."""
-        key = frozenset(state.items()), frozenset(goals), crew
+    def stretch(self, state: State, aims: Sequence[Aim], crew: Crew) -> _Stretch | None:
+        """Return the steps by which a crew achieves the last of some aims and keeps the goals; None if they aren't found."""
+        early, aim = frozenset(one for one in aims[:-1] if not isinstance(one, Symbol)), aims[-1]
+        key = frozenset(state.items()), frozenset(aims), aim, crew
         if key not in self.stretches:
-            problem = replace(self.problem, initial=state, goal=self.wanted(goals))
-            known = self.known.setdefault((goals[-1], crew), [])
+            problem = replace(self.problem, initial=state, goal=self.wanted(aims))
+            known = self.known.setdefault(((aim, crew), early), [])
             again = (steps for steps in reversed(known[-MOST_KNOWN:]) if not validate(problem, Plan(steps)))
             steps = next(again, None)
-            if steps is None and self.failed[goals[-1], crew] < MOST_FAILED:
-                steps = self.planned(problem, crew)
+            if steps is None and self.failed[aim, crew] < MOST_FAILED:
+                steps = self.planned(problem, crew, aim)
             if steps is None:
-                self.failed[goals[-1], crew] += 1
+                self.failed[aim, crew] += 1
             elif steps not in known:
                 known.append(steps)
             self.stretches[key] = None if steps is None else _Stretch(steps, self.after(state, steps))
         return self.stretches[key]
 
-    def wanted(self, goals: Sequence[Symbol]) -> State:
-        """Return some goals, and those that the plan doesn't change, with their values."""
-        return {s: v for s, v in self.problem.goal.items() if s in goals or s not in self._open}
+    def wanted(self, aims: Sequence[Aim]) -> State:
+        """Return the goals among some aims, and those that the plan doesn't change, with their values."""
+        return {s: v for s, v in self.problem.goal.items() if s in aims or s not in self._open}
+
+    def asked(self, aim: Aim) -> State:
+        """Return the values that a step of an aim requires of symbols of its arguments."""
+        if isinstance(aim, Symbol):
+            return {}
+        behavior = self.problem.domain.behaviors[aim[0]]
+        terms = {p.name: argument for p, argument in zip(behavior.parameters, aim[1], strict=True)}
+        found = {}
+        for one in behavior.preconditions:
+            if isinstance(one, ValueCondition) and not one.negated:
+                *arguments, value = (terms.get(term, term) for term in (*one.arguments, one.value))
+                if not any(term.startswith("?") for term in (*arguments, value)):
+                    found[Symbol(one.situation, tuple(arguments))] = value
+        return found
 
     def after(self, state: State, steps: tuple[Step, ...]) -> State:
         """Return the state after steps."""
@@ -352,24 +381,35 @@ class _Search:
                 facts.put(*change)
         return facts.state()
 
-    def planned(self, problem: Problem, crew: Crew) -> tuple[Step, ...] | None:
-        """Return steps of a crew that the default planner finds for a problem."""
+    def planned(self, problem: Problem, crew: Crew, aim: Aim) -> tuple[Step, ...] | None:
+        """Return steps of a crew that the default planner finds for a problem, with the step of an aim in the end."""
         if crew not in self.compiled:
             allowed = with_crew(self.problem, crew) if crew != Crew() else self.problem
             self.compiled[crew] = allowed, compiled(allowed)
         allowed, using = self.compiled[crew]
-        call = Call(replace(allowed, initial=problem.initial, goal=problem.goal), using, self.until, EXPANSIONS)
+        goal = {**problem.goal, **self.asked(aim)}
+        call = Call(replace(allowed, initial=problem.initial, goal=goal), using, self.until, EXPANSIONS)
         call.space.most_work = WORK
         self.spend(PLANNING)
         levels = problem.domain.levels
         leaves = any(step.level != levels[0] for step in self.plan.steps)
         agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, solvable=True, forward=True)
+        found = None
         with suppress(LimitError, UnsolvableError):
             if agenda.achieve_all():
-                self.spend(call.space.effort)
-                return call.tree().steps
+                found = self.with_last(problem, call, aim)
         self.spend(call.space.effort)
-        return None
+        return found
+
+    def with_last(self, problem: Problem, call: Call, aim: Aim) -> tuple[Step, ...] | None:
+        """Return the steps of a call, with the step of an aim in the end; None if that step isn't possible."""
+        if not isinstance(aim, Symbol):
+            last = call.refiner.do(problem.domain.behaviors[aim[0]].level, *aim)
+            if last is None:
+                return None
+            call.steps.append(last)
+        steps = call.tree().steps
+        return None if not isinstance(aim, Symbol) and validate(problem, Plan(steps)) else steps
 
     def spend(self, work: int) -> None:
         """Count work; raise `LimitError` if too much is done, or the time is over."""
@@ -401,13 +441,14 @@ class _Search:
             return _Sequence(tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), Fraction(0), [])
         of = [k for k, one in enumerate(stretches) for _ in Plan(one.steps).primitives]
         ends = [begin + lasts for begin, lasts in zip(begins.begins, network.durations, strict=True)]
-        critical, at = list[tuple[int, Step, tuple[str, ...]]](), begins.latest
+        critical, at = list[tuple[int, Step, tuple[str, ...], Ground]](), begins.latest
         if at < 0:
             at = max(range(len(of)), key=ends.__getitem__)
         passed = set[int]()
         while at >= 0 and at not in passed:
             passed.add(at)
-            critical.append((of[at], steps[at], order.activities[at].actors))
+            above = plan.steps[steps[at].path[0]]
+            critical.append((of[at], steps[at], order.activities[at].actors, (above.behavior, above.arguments)))
             at = begins.waits_for[at]
         work: dict[str, Fraction] = defaultdict(Fraction)
         for one in order.activities:

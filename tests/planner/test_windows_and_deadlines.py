@@ -160,3 +160,33 @@ def test_a_step_has_no_slack_beyond_its_deadline(tmp_path: Path) -> None:
     assert result.timed is not None
     slack = {(slot.step.behavior, slot.step.arguments[1]): slot.slack for slot in result.timed.slots}
     assert {slack["WASH", "a"], slack["GO", "a"]} == {1}
+
+
+BATTERY = """
+:CHARGED a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :charge ; c:leastAmount 0 ; c:mostAmount 3 .
+:charge a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Robot ; rdfs:range xsd:integer .
+"""
+HALL = """
+:hall a :Room, owl:NamedIndividual . :yard a :Room, owl:NamedIndividual .
+:a a :Room, owl:NamedIndividual . :b a :Room, owl:NamedIndividual .
+:r1 a :Robot, owl:NamedIndividual ; :in :yard ; :charge 1 . :k1 a :Charger, owl:NamedIndividual ; :stands :hall .
+[] a owl:AllDifferent ; owl:distinctMembers ( :hall :yard :a :b :r1 :k1 ) .
+:w a owl:NamedIndividual, c:Window ; c:ofIndividual :k1 ; c:availableUntil "PT10S"^^xsd:dayTimeDuration .
+"""
+
+
+def test_a_battery_is_charged_before_it_is_empty_if_the_charger_is_available_only_then(tmp_path: Path) -> None:
+    text = ROBOTS.replace(":CHARGED a owl:Class, owl:NamedIndividual, c:SituationType .", BATTERY)
+    text = text.replace(EVER, "DELETE { ?robot :charge ?n }").replace(
+        "INSERT { ?room :CLEAN true }", "INSERT { ?room :CLEAN true . ?robot :charge ?m }"
+    )
+    text = text.replace("; :CHARGED true }", "; :charge ?n . BIND(?n - 1 AS ?m) FILTER(?n >= 1) }")
+    text = text.replace("INSERT { ?robot :CHARGED true }", "DELETE { ?robot :charge ?n } INSERT { ?robot :charge ?m }")
+    text = text.replace(
+        "?charger :stands ?room }", "?charger :stands ?room . ?robot :charge ?n . BIND(?n + 1 AS ?m) FILTER(?n < 3) }"
+    )
+    (tmp_path / "robots.ttl").write_text(text + HALL, "utf-8")
+    result = confab.load(tmp_path / "robots.ttl").plan(["a CLEAN true", "b CLEAN true"])
+    assert result.timed is not None
+    (charge,) = (slot for slot in result.timed.slots if slot.step.behavior == "CHARGE")
+    assert charge.end <= 10
