@@ -73,11 +73,8 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     if level == call.program.levels[-1]:
         call.bound = least(task)
     found = shorter(task, operators, work, call.space.deadline)
-
-    def cost(plan: Sequence[int]) -> tuple[float, int]:
-        return task.cost_of(plan), len(plan)
-
-    return [task.describe(operator)[:2] for operator in found] if cost(found) < cost(operators) else None
+    better = (task.cost_of(found), len(found)) < (task.cost_of(operators), len(operators))
+    return [task.describe(operator)[:2] for operator in found] if better else None
 
 
 def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
@@ -125,11 +122,6 @@ def primitives(steps: Sequence[RefinedStep]) -> list[RefinedStep]:
     return [one for step in steps for one in (primitives(step.steps) if step.steps else (step,))]
 
 
-def abstract(problem: Problem, plan: Plan) -> int:
-    """Return the number of steps of the most abstract level in a plan."""
-    return sum(step.level == problem.domain.levels[0] for step in plan.steps)
-
-
 def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     """Return whether a new plan is cheaper than the old plan and violates no more conditions of upper levels.
 
@@ -137,8 +129,9 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     primitives replace such steps, the new plan must be cheaper by the factor `KEPT`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
-    lost = abstract(problem, old) - abstract(problem, new)
-    dear = lost > 0 and problem.domain.levels[0] != level == problem.domain.levels[-1]
+    first, last = problem.domain.levels[0], problem.domain.levels[-1]
+    lost = sum(step.level == first for step in old.steps) - sum(step.level == first for step in new.steps)
+    dear = lost > 0 and first != level == last
     return (
         before > price * (KEPT if dear else 1.0)
         and PER_PRIMITIVE * (before - price) * len(old.primitives) > lost * before
