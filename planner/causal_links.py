@@ -184,7 +184,7 @@ class _Course:
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the changes of a step in the present state; None if the step isn't applicable."""
+        """Return the changes of a step in the current state, or None if the step isn't applicable."""
         behavior = self.problem.domain.behaviors[step.behavior]
         found = self.rules.changes(behavior, step.arguments, self.facts)
         return None if found is None else {(situation, key): value for situation, key, value in found}

@@ -1,13 +1,12 @@
 """Checker of certificates of unsolvability; the checker shares no code with any search.
 
-It checks the whole task on its lowest level, since a failure of an upper level proves nothing. It reads behaviours and conditions
-as they are written (`confab.planner.possibilities`) and verifies that the certificate's set of states
+The checker examines only the lowest level of the task, because a failure of an upper level proves nothing. Behaviours and
+conditions are evaluated by `confab.planner.possibilities`. The checker verifies three properties of the certificate's set of
+states. First, the set contains the initial state. Second, no behaviour of the lowest level leads out of the set. For this test,
+each case of the certificate is expanded with all applicable behaviours. Third, the set contains no final state. In a final
+state, the goal holds, and each symbol with a rest value has its rest value or its initial value.
 
-1. contains the initial state; 2. is closed: no lowest-level behaviour leads out of it; Each case of the certificate is
-   expanded with all applicable behaviours;
-3. contains no goal state in which each symbol with a rest value has its rest value or its initial value.
-
-A plan of several levels is a sequence of behaviours of the lowest level that ends in such a state (docs/levels.md).
+A plan of several levels is a sequence of behaviours of the lowest level that ends in a final state (docs/levels.md).
 """
 
 from __future__ import annotations
@@ -24,9 +23,10 @@ from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 OTHER, ANY, KEPT = "", "?", "="
-"""Entries of a case: `OTHER` is any value that isn't distinguished; `ANY` is any value.
+"""The special entries of a case.
 
-`KEPT`, in a successor, is the value before the behaviour.
+The entry `OTHER` means any value that isn't distinguished. The entry `ANY` means any value. In a successor, the entry `KEPT`
+means the value before the behaviour.
 """
 WORK = 3_000_000
 """Maximum work of a check, as the number of tested conditions and of behaviours tried in a case."""
@@ -35,8 +35,10 @@ MOST_CASES = 200_000
 T = TypeVar("T")
 Case: TypeAlias = "tuple[str, ...]"
 Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
-"""The result of a behaviour in a case: the entries that change, each with its possible values (None if the behaviour
-isn't applicable), and the violated claim "never" or "always"."""
+"""The result of a behaviour in a case: the changed entries, each with its possible values, and a violated claim.
+
+The changed entries are None if the behaviour isn't applicable.
+"""
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
@@ -98,7 +100,7 @@ class Decisions(Generic[T]):
 class CaseView:
     """The values that symbols can have in one case of a certificate.
 
-    `reads` lists the entries that were read, `unknown` the symbols without an entry.
+    `reads` lists the entries that were read. `unknown` lists the symbols without an entry.
     """
 
     claims: Claims
@@ -130,7 +132,7 @@ class CaseView:
         return True
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has another value in at least one state of the case."""
+        """Return whether a symbol has a value other than the given value in at least one state of the case."""
         claims = self.claims
         at = claims.places.get(symbol)
         if at is not None:
@@ -195,14 +197,14 @@ class Claims:
         return self._ranges[symbol]
 
     def broken(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol with this value violates a claim "never" or "always"."""
+        """Return whether a symbol with the given value violates a claim "never" or "always"."""
         always = self.certificate.always.get(symbol)
         return (always is not None and always != value) or Fact(symbol, value) in self.certificate.never
 
 
 @dataclass
 class Try:
-    """A behaviour with its individuals, and its results known so far."""
+    """A behaviour with its individuals, and its known results."""
 
     behavior: Behavior
     env: Mapping[str, str]
@@ -228,7 +230,7 @@ class Cases:
     # ---------------------------------------------------------------------------------------------------- beginning
 
     def first(self) -> Case | None:
-        """Return the initial case; None, and set `fault`, if some claim doesn't hold in the initial state."""
+        """Return the initial case, or None if some claim doesn't hold in the initial state; `fault` then names the claim."""
         lowest, certificate = self.lowest, self.certificate
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
             if not lowest.exists(symbol.situation, symbol.arguments):
@@ -431,7 +433,7 @@ def unified(
     terms: tuple[str | None, ...],
     words: tuple[str | None, ...],
 ) -> dict[str, str] | None:
-    """Return the bindings of a behaviour's own variables that make the terms of an effect equal to the given words.
+    """Return the bindings of a behaviour's variables that make the terms of an effect equal to the given words.
 
     Return None if there are no such bindings. A word that is None matches any term.
     """
@@ -449,5 +451,5 @@ def unified(
 
 
 def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield the bindings of a behaviour's own variables that extend `given` and with which the behaviour may be applicable."""
+    """Yield the bindings of a behaviour's variables that extend `given` and with which the behaviour may be applicable."""
     yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

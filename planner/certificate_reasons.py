@@ -324,7 +324,7 @@ class _Causes:
         behavior: Behavior,
         kinds: dict[str, str] | None = None,
     ) -> list[Condition] | None:
-        """Return a minimal set of jointly unsatisfiable conditions; None if all conditions are satisfiable."""
+        """Return a minimal set of jointly unsatisfiable conditions, or None if all conditions are satisfiable."""
         kinds = kinds or dict(behavior.kinds)
 
         def can(some: Sequence[Condition]) -> bool:
@@ -439,7 +439,7 @@ class _Noting(CaseView):
         return found
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
-        """Return whether a symbol has another value in at least one state of the case."""
+        """Return whether a symbol has a value other than the given value in at least one state of the case."""
         found = super().may_not(symbol, value)
         if not found and symbol in self.claims.certificate.always:
             self.claimed[Fact(symbol, value)] = None

@@ -1,17 +1,17 @@
-"""Find a certificate that a task has no plan.
+"""The search for a certificate that a task has no plan.
 
-First step of the search for a certificate: relaxed reachability. Relaxed reachability determines which facts can become
-true if no fact ever becomes false. The computation works backwards from the goal, so that only relevant facts are
-considered. A required fact that isn't reachable in this way never holds.
+The first step is relaxed reachability, which determines the facts that can become true if no fact ever becomes false. The
+computation works backwards from the goal, so that only relevant facts are considered. A required fact that isn't reachable
+in the relaxed task never holds.
 
-Second step, if the relaxed goal is reachable: distinguish a few values, at first those of the goal, and search the
-cases, which are the combinations of these values. A path through the cases to the goal is executed on the original
-task. If the execution fails, the values that the path assumed wrongly are distinguished, too. The second step is
-repeated until no path is left (the task is unsolvable) or a path succeeds (there is a plan).
+If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then it
+searches the cases, which are the combinations of the distinguished values. A path through the cases to the goal is executed
+on the original task. If the execution fails, the values that the path assumed wrongly are also distinguished. The second
+step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a plan.
 
-Last step of the search for a certificate: distinguish all values, so that each case is a state. One choice of
-distinguished values may have infinitely many cases and another choice few, so each is tried with a small work limit
-first, and then with larger limits.
+The last step distinguishes all values, so that each case is a state. A choice of distinguished values may have infinitely
+many cases, while another choice has only few cases. Therefore each choice is tried first with a small work limit, and then
+with larger limits.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ WORK = 3_000_000
 LITTLE = 2_000, 20_000
 """Maximum number of tests per goal in the first and in the second round.
 
-Afterwards all goals are examined with the full limit.
+After the second round, all goals are examined with the full limit.
 """
 PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 """Maximum number of tests for each pair of goals, and for removing symbols from a certificate.
@@ -61,7 +61,7 @@ GETS, LEAVES, ENDS = "gets", "leaves", "ends"
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
-    """Return a certificate that a task has no plan; None if there is a plan, or if the work limit is too small.
+    """Return a certificate that a task has no plan, or None if there is a plan, or if the work limit is too small.
 
     With `few_states`, a search has already examined all states, so a certificate of all states is tried first.
     """
@@ -134,8 +134,8 @@ def _contested(lowest: Lowest) -> Certificate | None:
 class Relaxed:
     """Relaxed reachability, computed backwards from the questions.
 
-    A new question counts as impossible until an achiever is found; then all answers that depend on it are computed
-    again.
+    A new question has the answer "impossible" until an achiever is found. When an answer changes, all answers that depend on
+    it are computed again.
     """
 
     def __init__(self, lowest: Lowest) -> None:
@@ -503,7 +503,7 @@ def _met(problem: Problem, facts: Facts, fact: Fact) -> bool:
 
 
 def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
-    """Return the rest values, or initial values, that a final state must have and that this state doesn't have."""
+    """Return the rest values, or initial values, that a final state must have and that the given state doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):
         rest = problem.domain.situations[symbol.situation].rest

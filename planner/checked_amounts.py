@@ -12,12 +12,12 @@ from confab.reasoner.symbols import Comparison
 Arguments: TypeAlias = "tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Arguments]"
 Said: TypeAlias = "Callable[[str, Arguments], str | None]"
-"""Function that returns the value of a symbol; None if the symbol doesn't exist."""
+"""Function that returns the value of a symbol, or None if the symbol doesn't exist."""
 Values: TypeAlias = "list[str]"
 Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
 """Function that returns a selector: the selector picks the values of some terms from the values of all terms."""
 Worth: TypeAlias = "Callable[[Said, Values], Fraction | None]"
-"""Function that returns the value of an amount; None if the amount has no value."""
+"""Function that returns the value of an amount, or None if the amount has no value."""
 Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
 
 
@@ -67,7 +67,7 @@ def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[
 def changed(
     effects: Iterable[tuple[Cell, str, Fraction | None]], said: Said, quantities: Mapping[str, Quantity | None]
 ) -> list[tuple[str, Arguments, str]] | None:
-    """Return the amounts after effects, each calculated from the state before; None if an amount is invalid.
+    """Return the amounts after effects, each calculated from the state before, or None if an amount is invalid.
 
     An effect is a symbol, an operation and a number; an effect on a symbol that doesn't exist is ignored.
     """

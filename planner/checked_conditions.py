@@ -119,7 +119,7 @@ class ConditionReader:
         return given
 
     def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
-        """Return a test that holds if the rest holds with one of the candidates for a variable."""
+        """Return a test that holds if the remaining tests hold with one of the candidates for a variable."""
         place, members = self.place(variable), self.problem.members(kind)
 
         def some(facts: Stated, values: Values) -> bool:

@@ -19,7 +19,7 @@ Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
 def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]]:
-    """Return for each defined situation type all types that depend on it and on which it depends."""
+    """Return, for each defined situation type, the situation types that depend on it and on which it depends."""
     return {name: group for group in strata(rules) for name in group}
 
 
@@ -99,7 +99,7 @@ class Total:
         return False
 
     def value(self, facts: Stated, arguments: tuple[str, ...]) -> str | None:
-        """Return the sum for some arguments as text; None if an argument isn't of the required class."""
+        """Return the sum for some arguments as text, or None if an argument isn't of the required class."""
         if not all(a in members for a, members in zip(arguments, self._members, strict=True)):
             return None
         self._found = {}

@@ -142,7 +142,7 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, a
 def _beyond(
     rules: BehaviorReader, behavior: Behavior, arguments: tuple[str, ...], state: State
 ) -> tuple[Condition, ...]:
-    """Return the condition on an amount that keeps the amount within its bounds; empty if it stays within them."""
+    """Return the condition that keeps an amount within its bounds, or nothing if the amount stays within its bounds."""
     found = rules.beyond(behavior, arguments, Facts(rules.problem, state))
     if found is None:
         return ()
@@ -216,7 +216,7 @@ def _fewest_failures(
 def _refined(
     problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
 ) -> tuple[Step | None, Reason | None]:
-    """Return a step with its refinement from a state, or the reason why it has no refinement."""
+    """Return a step with its refinement from a state, or the reason why the step has no refinement."""
     step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
     after = successor(problem, behavior, arguments, state)
     if behavior.level == problem.domain.levels[-1] or after is None or after == state:

@@ -1,4 +1,4 @@
-"""Defined situations in generated Python: a defined situation is derived when it is read from a table."""
+"""Defined situations in generated Python code: a defined situation is derived when its value is read from a table."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Stratum:
         self.asked: dict[Cell, None] | None = None  # during a derivation: the cells read, with the results
 
     def holds(self, cell: Cell) -> bool:
-        """Return whether a symbol is true; during another derivation, return the value known so far."""
+        """Return whether a symbol is true; during another derivation, return the preliminary value."""
         if self.age != self.table.age:
             self.age = self.table.age
             self.known.clear()

@@ -24,7 +24,7 @@ class Node(NamedTuple):
 def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
     """Return a plan as a directed graph whose nodes are the paths of the steps.
 
-    Nodes have the attributes ``label``, ``level`` and ``id``. Edges have the attribute ``kind``: ``refines`` or ``then``.
+    Nodes have the attributes ``label``, ``level`` and ``id``. The attribute ``kind`` of an edge is ``refines`` or ``then``.
     """
     import networkx
 

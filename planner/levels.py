@@ -73,7 +73,7 @@ class _Watch:
                 self.step(part[0])
 
     def broken(self, level: int) -> Iterator[Broken]:
-        """Yield the violations of a finished run of steps, except those of changes that the run undid."""
+        """Yield the violations of a finished run of steps, except violations by changes that the run undid."""
         before: dict[Cell, str | None] = {}
         for cell, old in self.history.pop(level):
             before.setdefault(cell, old)
@@ -118,7 +118,7 @@ class _Watch:
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level makes this change")
 
     def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
-        """Return the bindings with which an effect makes a change; None if there are none."""
+        """Return the bindings with which an effect makes a change, or None if there are none."""
         kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None
@@ -135,7 +135,7 @@ class _Watch:
     def could(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
     ) -> bool:
-        """Return whether a behaviour could make a change, possibly together with the visible changes just before."""
+        """Return whether a behaviour could make a change, possibly together with the visible changes just before the change."""
         view = self.views[level]
         conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         if self.rules.satisfied(conditions, terms, kinds, view) is not None:
@@ -208,7 +208,10 @@ def failing_conditions(
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 
     def fewest(part: Sequence[int], facts: Facts, limit: int) -> tuple[int, ...] | None:
-        """Return the smallest set of conditions in `part` without which the others hold; None if it exceeds `limit`."""
+        """Return the smallest set of conditions in `part` whose removal makes the remaining conditions true.
+
+        Return None if the set would have more than `limit` conditions.
+        """
         for without in (c for size in range(min(len(part), limit) + 1) for c in combinations(part, size)):
             if rules.satisfied([conditions[i] for i in part if i not in without], terms, kinds, facts) is not None:
                 return without

@@ -40,7 +40,7 @@ class Step:
 
     `path` is the position of the step in the tree. `bindings` are the individuals that the situation assigns to the variables of
     the behaviour, for example the object that GRASP grasps. `rank` is the cogency ranking score c_m of eq. (4) at the time when
-    the planner chose the behaviour; None if the score wasn't computed.
+    the planner chose the behaviour. `rank` is None if the score wasn't computed.
     """
 
     path: tuple[int, ...]
@@ -60,7 +60,7 @@ class Step:
             waiting += reversed(step.steps)
 
     def __str__(self) -> str:
-        """Return the step as the paper's figures print it, e.g. ``22 B1_MOVE cup1 location7``."""
+        """Return the step in the form of the paper's figures, for example ``22 B1_MOVE cup1 location7``."""
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
@@ -139,7 +139,7 @@ class Plan(Sequence[Step], metaclass=RightNames):
         """Return the plan as a directed graph whose nodes are the paths of the steps.
 
         Edges lead from each step to its sub-steps and to the next step. Nodes have the attributes ``label``, ``level`` and
-        ``id``. Edges have the attribute ``kind``: ``refines`` or ``then``.
+        ``id``. The attribute ``kind`` of an edge is ``refines`` or ``then``.
         """
         from confab.planner.forms import digraph
 
@@ -221,8 +221,8 @@ class Broken:
     """A change by a lower-level step that no behaviour of the level above could make in the state.
 
     `step` is the path of the primitive that makes the change. `behavior` is the behaviour of the level above with the fewest
-    failing `conditions`; None if no behaviour of the level has an effect that makes the change. `text` is a sentence, e.g.
-    ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
+    failing `conditions`. `behavior` is None if no behaviour of the level has an effect that makes the change. `text` describes the
+    violation.
     """
 
     step: tuple[int, ...]
@@ -260,7 +260,7 @@ class Forgone:
     weight : Fraction
         The cost of leaving the goal unmet.
     price : Fraction, optional
-        The additional cost of a plan that also meets the goal; None if no such plan was found.
+        The additional cost of a plan that also meets the goal, or None if no such plan was found.
     """
 
     fact: Fact
@@ -278,12 +278,12 @@ class Outcome:
 
     If `status` is solved, the outcome has a `plan`; otherwise the outcome has a `reason`. `search` contains the effort of all
     searches of each level. `fallbacks` counts how often a level had no refinement for the level above. `hits` counts refinements
-    found in the cache, and `misses` counts refinements found by search. `cost` is the cost of the plan if some behaviour has a
-    price. `bound` is a proved lower bound on the cost of every lowest-level plan for the same goals. `engine` names the external
+    found in the cache, and `misses` counts refinements that required a search. `cost` is the cost of the plan if some behaviour has
+    a price. `bound` is a proved lower bound on the cost of every lowest-level plan for the same goals. `engine` names the external
     planner that found the plan. `given_up` describes the levels that the planner gave up, each with its goal. `left` contains the
     runs of lower-level steps in the plan, with the violated conditions of the level above. `saving` is the decrease of the plan's
-    cost per second at the end of shortening; None if the plan wasn't shortened. `certificate` proves that the task is unsolvable;
-    every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
+    cost per second at the end of shortening, or None if the plan wasn't shortened. `certificate` proves that the task is
+    unsolvable; every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
     """
 
     status: Status
@@ -313,7 +313,7 @@ class Outcome:
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call; None means no limit. In the paper's mode, `expansions` limits each search. In the other
+    `seconds` limits the whole call, unless it is None. In the paper's mode, `expansions` limits each search. In the other
     modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals together.
     `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states times
     operators, about a microsecond each.
@@ -324,7 +324,7 @@ class Limits:
     work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
-        """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`; None without a limit.
+        """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`, or None without a limit.
 
         The remaining time is the smaller of `seconds` and the time to the current deadline (`confab.reasoner.limits`).
         """

@@ -151,7 +151,7 @@ class Lowest:
         return self.problem.initial.get(symbol, FALSE)
 
     def quantity(self, situation: str) -> Quantity | None:
-        """Return the quantity of a situation type; None if its values aren't amounts."""
+        """Return the quantity of a situation type, or None if its values aren't amounts."""
         return self.problem.domain.situations[situation].quantity
 
     def allowed(self, symbol: Symbol) -> Range:
@@ -245,7 +245,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------- values
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
-        """Return whether a symbol has a value in every state if `must`; otherwise, whether it may have the value."""
+        """If `must`, return whether a symbol has a value in every state; otherwise, return whether it may have the value."""
         lowest = self.lowest
         lowest.spend()
         if not lowest.exists(situation, arguments):
@@ -276,7 +276,7 @@ class Reading:
         return False
 
     def between(self, situation: str, arguments: tuple[str, ...]) -> Range | None:
-        """Return the range of the amount of a symbol; None if the symbol doesn't exist."""
+        """Return the range of the amount of a symbol, or None if the symbol doesn't exist."""
         if not self.lowest.exists(situation, arguments):
             return None
         symbol = Symbol(situation, arguments)
@@ -291,7 +291,7 @@ class Reading:
         return Range(max(known.low, total.low), min(known.high, total.high))
 
     def before(self, symbol: Symbol) -> Range | None:
-        """Return the range of an amount before an effect; None if the symbol doesn't exist.
+        """Return the range of an amount before an effect, or None if the symbol doesn't exist.
 
         The range of a total without bounds is taken from the knowledge, and not calculated by its definition.
         """
@@ -322,7 +322,7 @@ class Reading:
         return self._totals[key]
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """Return whether an amount satisfies a goal in every state if `must`; otherwise, whether it may satisfy the goal.
+        """If `must`, return whether an amount satisfies a goal in every state; otherwise, whether it may satisfy the goal.
 
         The goal is a number or a pair of bounds.
         """
@@ -334,7 +334,7 @@ class Reading:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """Return whether a goal holds in every state if `must`; otherwise, whether the goal may hold.
+        """If `must`, return whether a goal holds in every state; otherwise, return whether the goal may hold.
 
         A nonexistent symbol counts as false.
         """
@@ -347,7 +347,7 @@ class Reading:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """Return whether a condition holds in every state if `must`; otherwise, whether the condition may hold.
+        """If `must`, return whether a condition holds in every state; otherwise, return whether the condition may hold.
 
         `env` contains the individuals of the variables.
         """
@@ -382,7 +382,7 @@ class Reading:
     def solutions(
         self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
     ) -> Iterator[dict[str, str]]:
-        """Yield the bindings with which all conditions hold in every state if `must`; otherwise, may hold."""
+        """Yield the bindings with which all conditions may hold; if `must`, the bindings with which they hold in every state."""
         yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
 
     def _extended(
@@ -460,7 +460,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------ amounts
 
     def expression(self, expression: Expression, env: Env) -> Range | None:
-        """Return the range of an expression; None if the expression has no value in any state."""
+        """Return the range of an expression, or None if the expression has no value in any state."""
         match expression:
             case Amount(situation, arguments):
                 return self.between(situation, tuple(env.get(a, a) for a in arguments))
@@ -543,7 +543,7 @@ def variables(condition: Condition) -> set[str]:
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """Return whether a comparison holds for all pairs of amounts from two ranges if `must`; otherwise, for some pair."""
+    """If `must`, return whether a comparison holds for all pairs of amounts from two ranges; otherwise, for some pair."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):
@@ -557,7 +557,7 @@ def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
 
 
 def calculated(sign: str, one: Range, other: Range) -> Range | None:
-    """Return the range of the results of an arithmetic operation on two ranges; None if there is no result."""
+    """Return the range of the results of an arithmetic operation on two ranges, or None if there is no result."""
     partial = one.partial or other.partial
     if sign == "+":
         return Range(one.low + other.low, one.high + other.high, partial)

@@ -97,7 +97,7 @@ class _Choices:
         return self.outcomes[kept]
 
     def least(self, kept: Goals) -> Fraction | None:
-        """Return a proved lower bound on the cost of a plan for a choice; None if there is no plan.
+        """Return a proved lower bound on the cost of a plan for a choice, or None if there is no plan.
 
         The method stores the cheapest plan for the choice.
         """
@@ -112,7 +112,7 @@ class _Choices:
         return self.bounds[kept]
 
     def cost(self, kept: Goals) -> Fraction | None:
-        """Return the cost of the plan for a choice; None if no plan was found."""
+        """Return the cost of the plan for a choice, or None if no plan was found."""
         found = self.outcome(kept)
         return None if found.plan is None else self.price(found)
 
@@ -122,7 +122,7 @@ class _Choices:
         return Fraction(cost_of(self.problem, found.plan))
 
     def total(self, kept: Goals) -> Fraction | None:
-        """Return the total cost of a choice: the cost of its plan plus the unmet weights; None if no plan was found."""
+        """Return the total cost of a choice: the cost of its plan plus the unmet weights, or None if no plan was found."""
         cost = self.cost(kept)
         return None if cost is None else cost + self.unmet(kept)
 

@@ -11,7 +11,7 @@ paper      A* with eq. (5) on each level                                `confab.
 =========  ==========================================================  ================================
 
 `confab.planner.validation` has accepted every returned plan. `confab.planner.certificate_checks` has accepted the certificate
-of every unsolvable outcome. These two modules share no code with any search.
+of every unsolvable outcome. Both checkers share no code with any search.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """A state as a table that is changed in place, and Python code generated for conditions and effects.
 
-now      the state: situation type → key → value; a key is an individual, or a tuple if the symbol has several arguments
-holders  situation type → value → the keys that have the value, in order of assignment; `FALSE` has no entry
-trail    the overwritten values, oldest first; `undo` restores the values at a mark
-age      number of changes, including undone changes; results derived from the table are valid while the age is the same
+The dictionary ``now`` of a table is the state: it maps each situation type and key to a value. A key is an individual, or a
+tuple of individuals if the symbol has several arguments. The dictionary ``holders`` maps each situation type and value to the
+keys with this value, except for the value false. The list ``trail`` contains the overwritten values, oldest first, and lets
+`undo` restore earlier values. The number ``age`` counts all changes, including undone changes. Results that are derived from
+the table are valid while the age is the same.
 
 The table contains no defined situations. ``now`` derives a defined situation when its value is read
 (`confab.planner.derived_facts`).

@@ -113,7 +113,7 @@ def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
 
 
 def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], state: State) -> dict[Symbol, str] | None:
-    """Return the state after a behaviour; None if the behaviour isn't applicable."""
+    """Return the state after a behaviour, or None if the behaviour isn't applicable."""
     rules = BehaviorReader(problem)
     fits = rules.fits(behavior, tuple(arguments))
     changes = rules.changes(behavior, tuple(arguments), Facts(problem, state)) if fits else None
@@ -372,7 +372,7 @@ class BehaviorReader:
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 
     def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[NewValue] | None:
-        """Return the values that a behaviour gives to symbols, in order; None if the behaviour isn't applicable.
+        """Return the values that a behaviour gives to symbols, in order, or None if the behaviour isn't applicable.
 
         The arguments must belong to the classes of the parameters.
         """
@@ -415,7 +415,7 @@ class BehaviorReader:
         return None
 
     def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-        """Return the price of a behaviour in the current state; None if it has no price or isn't applicable."""
+        """Return the price of a behaviour in the current state, or None if it has no price or isn't applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         return read.price(facts.value, values) if read.price and all_hold(read.preconditions, facts, values) else None
@@ -423,7 +423,7 @@ class BehaviorReader:
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
-        """Return bindings of the variables with which all conditions hold; None if there are none.
+        """Return bindings of the variables with which all conditions hold, or None if there are none.
 
         `terms` contains the variables that are already bound.
         """

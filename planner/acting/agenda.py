@@ -43,7 +43,7 @@ class Agenda:
 class ReplanRequest:
     """A request to check the agenda.
 
-    It contains the reason (empty if there is no request) and the expected values that were not observed.
+    The request contains the reason, and the expected values that were not observed. The reason is empty if there is no request.
     """
 
     why: str = ""

@@ -54,7 +54,7 @@ class Belief:
 
     @cached_property
     def using(self) -> Compiled:
-        """The compiled domain; compiled when it is first needed, so that the time limit of an episode applies."""
+        """The compiled domain; it is compiled at its first use, so that the time limit of an episode applies."""
         return compiled(self.problem)
 
     @property
@@ -64,7 +64,7 @@ class Belief:
 
     @property
     def goal(self) -> dict[Symbol, str]:
-        """The present goal."""
+        """The current goal."""
         return dict(self.problem.goal)
 
     @property
@@ -81,7 +81,7 @@ class Belief:
         return self.problem.domain.situations[symbol.situation].boolean
 
     def fault(self, symbol: Symbol, value: str) -> str:
-        """Return the reason why an observed value isn't credible; an empty text if it is credible."""
+        """Return the reason why an observed value isn't credible, or an empty text if the value is credible."""
         situation = self.problem.domain.situations.get(symbol.situation)
         if situation is None:
             return f"the scene has no situation type {symbol.situation}"

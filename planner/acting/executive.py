@@ -434,7 +434,7 @@ class _Run:
         return bool(spots)
 
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
-        """Drop all goals, so that only rest values remain to be restored; if that was done before, end the episode."""
+        """Drop all goals, so that only rest values remain to be restored; end the episode if all goals were dropped before."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status

@@ -28,7 +28,7 @@ DOUBTFUL = 0.5
 
 @dataclass(frozen=True)
 class Caution:
-    """The number of times that plans relied on each static fact, and the number of times that it failed.
+    """The number of times that plans relied on each static fact, and the number of times that the fact failed.
 
     >>> reach = ("canReach", ("hand", "shelf"))
     >>> round(Caution({reach: (3, 2)}).failure_probability(reach), 2)
@@ -113,7 +113,7 @@ def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield upper-level behaviours that have the same effect as a refuted one and that only `likewise` could refine."""
+    """Yield upper-level behaviours with the effect of a refuted behaviour that only the behaviours `likewise` could refine."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:

@@ -38,7 +38,7 @@ CLOSE = 1.1
 """Maximum ratio of a repair's cost to a new plan's cost; if the repair costs more, the new plan is taken."""
 
 MOST = 5_000
-"""Maximum number of expansions of a repair; after these, the whole task is planned again."""
+"""Maximum number of expansions of a repair; at this number, the whole task is planned again."""
 
 SHARE = 0.5
 """Share of the remaining time for a repair; the rest is reserved for a new plan."""
@@ -298,7 +298,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
 
 
 def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
-    """Apply a step with its own primitives; if that fails, leave the table unchanged and return None.
+    """Apply a step with its primitives; on failure, leave the table unchanged and return None.
 
     A step in `begun` was begun earlier, so only its primitives are checked; any other step must be applicable and have
     its effects.
@@ -328,7 +328,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
-    """Achieve the present goal value of a symbol in place of the value that a step gives, if one step can achieve it."""
+    """Achieve the current goal value of a symbol instead of the value that a step gives, if one step can achieve the goal."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
             call.achieve(call.program.levels[0], cell, ONE_STEP)

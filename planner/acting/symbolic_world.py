@@ -73,7 +73,7 @@ class SymbolicWorld:
         return DONE
 
     def stop(self) -> None:
-        """Do nothing, since a primitive takes no computing time."""
+        """Do nothing, because a primitive of a symbolic world takes no computing time."""
 
     def disturb(self, intervention: Intervention) -> None:
         """Apply an intervention.

@@ -48,7 +48,7 @@ class Verdict(Protocol):
 
     @property
     def code(self) -> str | None:
-        """The kind of failure; `INTERRUPTED` if the primitive was stopped; None if it succeeded."""
+        """The kind of failure, or None if the primitive succeeded; the kind of a stopped primitive is `INTERRUPTED`."""
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -111,10 +111,10 @@ class Discoverer(Protocol):
         """
 
     def free_spots(self) -> Sequence[Discovery]:
-        """Return free spots for putting objects down; called once, when the places of the scene don't suffice."""
+        """Return free spots for putting objects down; the executive asks once, when the places of the scene don't suffice."""
 
     def why_unplaced(self, individual: str) -> str:
-        """Return why an object has no perceived place, e.g. ``lies 4 cm from shelf``.
+        """Return the reason why an object has no perceived place, for example ``lies 4 cm from shelf``.
 
         Return an empty text if the reason is unknown.
         """
@@ -193,7 +193,7 @@ class Guarded:
             return tuple(self.world.free_spots())
 
     def why_unplaced(self, individual: str) -> str:
-        """Return why an object has no perceived place; an empty text if the world doesn't know the reason."""
+        """Return the reason why an object has no perceived place, or an empty text if the world doesn't know the reason."""
         if not isinstance(self.world, Discoverer):
             return ""
         with _asking(f"why_unplaced({individual})"):

@@ -32,7 +32,7 @@ from confab.reasoner.symbols import Problem
 
 @dataclass
 class Memory:
-    """Experience in the form in which the planner uses it.
+    """Experience in the form that the planner uses.
 
     Parameters
     ----------
@@ -65,15 +65,15 @@ class Memory:
         return Scorer(self.experience)
 
     def record(self, rule: Rule) -> Tally:
-        """Return how often the rules achieved goals of this kind, and how often they failed."""
+        """Return how often rules achieved goals of the rule's kind, and how often rules failed for goals of this kind."""
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
 
     def helps(self, rule: Rule) -> bool:
-        """Return whether the rules have achieved goals of this kind at least as often as they failed."""
+        """Return whether rules have achieved goals of the rule's kind at least as often as rules have failed."""
         return self.record(rule).chosen >= max(1, self.record(rule).failed)
 
     def harms(self, rule: Rule) -> bool:
-        """Return whether the rules have failed for goals of this kind more often than they succeeded."""
+        """Return whether rules have failed for goals of the rule's kind more often than rules have succeeded."""
         return self.record(rule).chosen < self.record(rule).failed
 
     def leads(self, problem: Problem, mode: str) -> bool:

@@ -18,7 +18,7 @@ class OverspentError(Exception):
 
 
 class Allowance:
-    """Counts the effort of rules in a call, and limits the effort of unsuccessful rules.
+    """The count of the effort of rules in a call, with a limit on the effort of unsuccessful rules.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Allowance:
         self.wasted_effort, self.wasted_expansions = 0.0, 0
 
     def left(self) -> float:
-        """Return how much more effort unsuccessful rules may use."""
+        """Return the remaining effort that unsuccessful rules may use."""
         return (self.space.effort + self.spent + FREE) / WASTE - self.wasted_effort
 
     def ready(self) -> bool:
@@ -50,7 +50,7 @@ class Allowance:
             raise OverspentError
 
     def bounded(self, attempt: Callable[[], Found | None]) -> Found | None:
-        """Return the result of an attempt; None if the attempt fails, or if matching rules exceeds the limit.
+        """Return the result of an attempt, or None if the attempt fails, or if matching rules exceeds the limit.
 
         Attempts may be nested: the effort of an inner attempt doesn't count towards the limit of the outer attempt.
         """

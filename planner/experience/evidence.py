@@ -28,13 +28,13 @@ DECAY = 0.9
 CROWD = 4
 """Maximum size of a class for which preferences for single individuals are counted."""
 Named: TypeAlias = "Mapping[str, str]"
-"""The individuals by role."""
+"""The individual in each role, by role."""
 Answer: TypeAlias = "Callable[[str, Named], str]"
-"""Returns the answer to a question about an individual in a role."""
+"""Function that returns the answer to a question about an individual in a role."""
 
 
 class FactReader:
-    """Reads facts about the individuals in a rule's roles from one table and goal."""
+    """Reader of facts about the individuals in a rule's roles, for one table and one goal."""
 
     def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
         self.problem, self.table, self.goal = program.problem, table, goal
@@ -46,7 +46,7 @@ class FactReader:
         self._plans: dict[tuple[str, bool], list[tuple[int, str, Answer]]] = {}
 
     def facts(self, rule: Rule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
-        """Return the facts about the individuals in a rule's roles; on request only those of given questions."""
+        """Return the facts about the individuals in a rule's roles, optionally only the facts for given questions."""
         plan = self._plans.get((rule.name, among is None))
         if plan is None:
             asked = [question for question in self._questions(rule) if among is None or question[1] in among]
@@ -134,7 +134,7 @@ class Factor:
 
 
 class Scorer:
-    """Computes the cogency of following a rule from counts."""
+    """Computation of the cogency of following a rule from counts."""
 
     def __init__(self, experience: Experience) -> None:
         self.totals = experience.totals()
@@ -164,7 +164,7 @@ class Scorer:
         return found
 
     def factors(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
-        """Yield the summands of the cogency of following a rule where these facts hold."""
+        """Yield the summands of the cogency of following a rule in a situation with the given facts."""
         weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
         for fact in (ITSELF, *facts):
             if fact in weights:
@@ -175,7 +175,7 @@ class Scorer:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
     def cogency(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
-        """Return the sum of the factors."""
+        """Return the sum of the summands of the cogency."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
     def score(self, reader: FactReader, rule: Rule, roles: tuple[str, ...]) -> float:
@@ -189,7 +189,7 @@ class Scorer:
 
 
 def told_apart(problem: Problem) -> tuple[str, ...]:
-    """Return the classes that behaviours, situation types or terms use; no others affect applicability."""
+    """Return the classes that behaviours, situation types or terms use; other classes don't affect applicability."""
     found: dict[str, None] = {}
     for behavior in problem.domain.behaviors.values():
         found.update(dict.fromkeys(behavior.kinds.values()))

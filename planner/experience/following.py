@@ -1,8 +1,8 @@
 """Learned rules used as methods: to achieve a goal, achieve the unmet conditions of a rule, then apply the rule's step.
 
 Other rules achieve the unmet conditions, one condition at a time. The cheapest rule instances for a goal are tried first
-(`confab.planner.experience.instances`); of equally cheap instances, the most cogent is tried first. A condition that earlier
-plans achieved before the others comes first; otherwise the most expensive condition comes first.
+(`confab.planner.experience.instances`); of equally cheap instances, the most cogent is tried first. Conditions are achieved in
+the order of earlier plans; without such an order, the most expensive condition is achieved first.
 
 Rules spend the budget of the search. Failed attempts may waste a tenth of the budget (`confab.planner.experience.allowance`).
 If `RulePolicy.follow` fails, the table of current values is unchanged, and the planner continues with a search.
@@ -271,7 +271,7 @@ class RulePolicy:
     def achieve_condition(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
         """Achieve one unmet condition of a rule instance so that the other unmet conditions remain reachable.
 
-        Return None if the rules achieve no condition in this way.
+        Return None if the rules achieve no unmet condition.
         """
         conditions, named, table = self.instances.achievers[instance.rule.name].soft, instance.named, self.call.table
         goals = dict[int, list[Goal]]()
@@ -345,8 +345,8 @@ class RulePolicy:
     def achieve_jointly(self, level: int, goals: Sequence[Goal]) -> Steps | None:
         """Achieve the conditions of the last steps of all goals first, then apply the last steps; return the steps.
 
-        This method is for goals of which each makes the others unreachable. No individual is consumed by the rule instances
-        of two goals. On failure the method returns None and may leave the table changed.
+        This method is for goals that make each other unreachable. No individual is consumed by the rule instances of two goals.
+        On failure, the method returns None and may leave the table changed.
         """
         chosen, steps = list[tuple[Goal, RuleInstance]](), list[RefinedStep]()
         try:

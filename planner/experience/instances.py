@@ -112,7 +112,7 @@ class Instances:
     # ------------------------------------------------------------------------------------------------------------- instances
 
     def exclude(self, individuals: frozenset[str]) -> None:
-        """Set the individuals that fill no role."""
+        """Set the individuals that are excluded from all roles."""
         self.excluded, self.age = individuals, -1
 
     def refresh(self) -> None:
@@ -160,7 +160,7 @@ class Instances:
     def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
         """Return candidates for a role whose individual becomes the value of a situation type, free candidates first.
 
-        Of many candidates, the result contains one for each combination of symmetry class and state.
+        If there are many candidates, the result contains one candidate for each combination of symmetry class and state.
         """
         found = self.picked.get((id(candidates), situation))
         if found is None:
@@ -211,15 +211,15 @@ class Instances:
         return meets(self.call.table.now[situation].get(key, FALSE), value)
 
     def distance(self, level: int, goal: Goal) -> float:
-        """Return the cost of a goal with the individuals that the state suggests.
+        """Return the cost of a goal with the individuals that the state suggests, or otherwise with any individuals.
 
-        If their cost is infinite, return the cost with any individuals; infinity if no chain of rules achieves the goal.
+        The cost is infinite if no chain of rules achieves the goal.
         """
         cost = self.cost(level, goal, False)
         return cost if cost < inf else self.cost(level, goal, True)
 
     def cost(self, level: int, goal: Goal, suggested_or_not: bool) -> float:
-        """Return the least number of rules in a chain that achieves a goal; infinity if the number exceeds `FARTHEST`."""
+        """Return the least number of rules in a chain that achieves a goal, or infinity if the number exceeds `FARTHEST`."""
         for most in range(FARTHEST + 1):
             self.cut, self.seen, before = False, set(), len(self.least)
             if self.within(level, goal, most, suggested_or_not):
@@ -306,9 +306,9 @@ class Instances:
         return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
 
     def next(self, level: int, instance: RuleInstance, goal: Goal) -> RuleInstance | None:
-        """Return the cheapest instance of the same rule for a goal in the current state; None if there is none.
+        """Return the cheapest instance of the same rule for a goal in the current state, or None if there is none.
 
-        Among equally cheap instances, fewer unmet conditions are preferred, then the same step.
+        Among equally cheap instances, instances with fewer unmet conditions are preferred, then the same step as before.
         """
         same_rule = ([w for w in equal if w.rule is instance.rule] for _, equal in self.by_cost(level, goal))
         equal = next(filter(None, same_rule), [])

@@ -43,7 +43,7 @@ SINGLE, OTHERS = 6, 2
 SHORT = Limits(expansions=20_000, seconds=20.0)
 """Limits of one planning call during learning."""
 CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
-"""A single case in which a choice was made, passed over, or failed."""
+"""Counts of a single case in which an instance or individual was chosen, was passed over, or failed."""
 
 
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:

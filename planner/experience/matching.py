@@ -1,6 +1,6 @@
 """Matching of rules: each rule is compiled to a Python function that yields the rule instances in the current state.
 
-The static conditions of an instance hold. The other conditions may be *unmet*, because steps can achieve unmet conditions
+The static conditions of an instance hold. Conditions on the state may be *unmet*, because steps can achieve these conditions
 later. The preferred candidates for a role are values of symbols and holders of values. If no preferred candidate fits, or
 if all instances are requested, the candidates are one individual of each symmetry class, taken from a static relation or
 from the role's class. Different roles have different individuals.
@@ -43,7 +43,7 @@ def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
 
 
 def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind | None:
-    """Return the function that binds a compiled rule to a table of current values; None if the rule has too many roles.
+    """Return the function that binds a compiled rule to a table of current values, or None if the rule has too many roles.
 
     The problem must have the rule's behaviour, classes and situation types (`known`).
     """
@@ -92,7 +92,7 @@ class _Join:
         self.bound: set[str] = set()
 
     def lines(self) -> list[str] | None:
-        """Return the lines of the function; None if the function would need too many nested loops."""
+        """Return the lines of the function, or None if the function would need too many nested loops."""
         rule, depth = self.rule, 0
         given = (*rule.goal.arguments, rule.goal.value)
         lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}, everybody):"]

@@ -6,8 +6,8 @@ step; the step's preconditions then replace this condition. Each needed change o
 for the step. In a rule, individuals that no behaviour names become roles; a role has the narrowest class that a condition
 requires.
 
-Goal regression is due to R. Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977). Lifted rules
-are learned in a similar way by Moose (D. Z. Chen et al., AAAI 2026). In this module, each rule stands for one causal link;
+Goal regression is due to Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977). Lifted rules
+are learned in a similar way by Moose (Chen et al., AAAI 2026). In this module, each rule stands for one causal link;
 chains of rules cover longer plans. A condition with a quantifier or alternatives is replaced by the condition of the individual
 or the alternative that held. The plan checker evaluates all conditions (`confab.planner.validation`).
 """
@@ -274,8 +274,8 @@ class PlanTrace:
     def hindered(self, achieved: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
         """For each achieved "no object …" condition that exactly one individual violated, yield two results.
 
-        The first result are the conditions that the individual satisfied before the step. The second result is the condition
-        that no other individual satisfies them.
+        The first result contains the conditions that the individual satisfied before the step. The second result is the
+        condition that no other individual satisfies these conditions.
         """
         for c in achieved:
             if isinstance(c, Witness) and c.negated:
@@ -375,7 +375,7 @@ class PlanTrace:
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
-    """Return the conditions with those inside positive witnesses instead of the witnesses, and the classes of all variables."""
+    """Return the classes of all variables, and conditions in which the conditions of a positive witness replace the witness."""
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:

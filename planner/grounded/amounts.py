@@ -1,10 +1,10 @@
 """Amounts of a grounded level.
 
-A state is an integer. The low bits are facts. The number above these bits identifies a tuple of amounts.
+A state is an integer. The low bits of a state represent facts. The high bits of a state are the number of a tuple of amounts.
 
-Each ground comparison has a bit that is derived from the tuple. Therefore conditions, goals and all functions that read bits are
-the same with and without amounts. An operator may make a comparison true if it changes the difference of both sides in the right
-direction (`Push`), or if the change depends on the state.
+Each ground comparison has a bit that is derived from the tuple. Therefore conditions, goals and all functions that read bits
+are the same with and without amounts. An operator may make a comparison true if it changes the difference of both sides in the
+right direction (`Push`), or if the change depends on the state.
 
 Comparisons are linear: both sides are sums of amounts times constants. Numbers are exact. Whole numbers are Python integers,
 because arithmetic with integers is fast.
@@ -37,7 +37,7 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 Exact: TypeAlias = "int | Fraction"
 Vector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
-"""The change of a comparison's difference by an operator; None if the change depends on the state."""
+"""The change of a comparison's difference by an operator, or None if the change depends on the state."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ class Linear:
 class Move:
     """A change of one amount by an operator: the operation, the operand `by`, and the required bits `when`.
 
-    `by` is None if the operand is undefined. Changes with the same `position` are alternatives of one effect; the operator makes
-    only the first change whose required bits are set.
+    `by` is None if the operand is undefined. Changes with the same `position` are alternatives of one effect; the operator
+    makes only the first change whose required bits are set.
     """
 
     position: int
@@ -129,7 +129,7 @@ class AmountTable:
         return written(Fraction(self.now[symbol]))
 
     def linear(self, expression: Expression, terms: Mapping[str, str]) -> Linear | None:
-        """Return a linear expression in which individuals replace terms; None if the expression has no value.
+        """Return a linear expression in which individuals replace terms, or None if the expression has no value.
 
         Raises
         ------
@@ -170,9 +170,10 @@ class AmountTable:
     def comparison(
         self, left: Linear | None, sign: str, right: Linear | None, negated: bool, fresh: Callable[[], int]
     ) -> tuple[tuple[int, ...] | None, ...]:
-        """Return the alternatives under which a comparison holds, each as literals; if `negated`, doesn't hold.
+        """Return the alternatives under which a comparison is true, each as literals.
 
-        `fresh` returns the next free bit. Each bit means that a difference is at least zero, more than zero, or equal to zero.
+        If `negated`, return the alternatives under which the comparison is false. `fresh` returns the next free bit. Each bit
+        means that a difference is at least zero, more than zero, or equal to zero.
         """
         if left is None or right is None:
             return ((),) if negated else (None,)
@@ -195,7 +196,10 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return whether a comparison is always true or never true within the bounds of its amounts; otherwise None."""
+        """Return True if a comparison is always true within the bounds of its amounts, False if it is never true.
+
+        Return None if the comparison depends on the amounts.
+        """
         least, most = difference.bounds(self.quantities)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
@@ -204,7 +208,7 @@ class AmountTable:
         return None
 
     def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
-        """Return the alternatives under which the comparison of a bit is false; None if the bit belongs to no comparison."""
+        """Return the alternatives under which the comparison of a bit is false, or None if the bit belongs to no comparison."""
         for (difference, sign), its in self.bits.items():
             if its == bit:
                 return list(self.comparison(difference, sign, Linear((), 0), True, fresh))
@@ -260,8 +264,8 @@ class Amounts:
     def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
         """Return the number of a tuple.
 
-        A new tuple receives the next number. Its comparison bits are those of another tuple, `mask`, updated for the amounts at
-        the `changed` positions.
+        A new tuple receives the next number. The comparison bits of a new tuple are derived from `mask`, the bits of another
+        tuple; only the amounts at the `changed` positions differ.
         """
         number = self._number.get(vector)
         if number is None:

@@ -196,9 +196,9 @@ class Derived:
 
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
-        """The parts that require a bit, by the bit; each part as its number, its mask, and whether its bit is opposite.
+        """The parts that require a bit, by the bit.
 
-        The mask of a part with several bits is 0 here.
+        A part is represented by its number, its mask, and whether its bit is opposite. The mask is 0 for a part with several bits.
         """
         found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
@@ -283,10 +283,10 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return derived bits grouped into parts, each after its dependencies (Tarjan, SIAM J. Computing 1, 1972).
+    """Return derived bits grouped into parts, each after its dependencies (Tarjan, SIAM Journal on Computing 1, 1972).
 
-    A part is a strongly connected component of the dependencies. An alternative of a bit that requires the same bit is dropped,
-    because the bit would otherwise stay set forever.
+    A part is a strongly connected component of the dependencies. If an alternative of a bit requires the bit itself, the
+    alternative is dropped. Otherwise the bit would stay set forever.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}

@@ -34,7 +34,7 @@ class SearchOrder(Protocol):
 
     `work` counts the bits processed by relaxed plans; a turn of the order ends when `work` reaches `turn`. `reached` maps each
     state to the last accepted candidate. `bytes` is the memory of the order without the states in `reached`. `best` is the final
-    state of the best plan; None if no plan was found.
+    state of the best plan. `best` is None if no plan was found.
     """
 
     reached: dict[int, Candidate]
@@ -47,7 +47,7 @@ class SearchOrder(Protocol):
         """Yield candidates until no candidate remains or a sufficiently good plan is found."""
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a newly reached state; discard the state if the goal is unreachable from there."""
+        """Rank a newly reached state; discard the state if the goal is unreachable from the state."""
 
 
 def explore(task: Task, order: SearchOrder) -> Iterator[int]:
@@ -101,7 +101,7 @@ class OpenList(Generic[Entry]):
         heapq.heappush(self.queues[queue], (rank, self.number, entry))
 
     def first(self) -> tuple[int, Entry] | None:
-        """Return the number of the queue that is next in turn, and the queue's first entry; None if all queues are empty."""
+        """Return the number of the queue that is next in turn, and the queue's first entry, or None if all queues are empty."""
         filled = [which for which, queue in enumerate(self.queues) if queue]
         if not filled:
             return None

@@ -80,7 +80,7 @@ class _Part:
 class Formulas:
     """Ground conditions as conjunctions of bits; each disjunction becomes one derived bit.
 
-    The caller fills `bits`. Before that, only static conditions can be evaluated.
+    Before the caller fills `bits`, only static conditions can be evaluated.
     """
 
     def __init__(self, reached: ReachableFacts) -> None:
@@ -131,14 +131,14 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return the formula that some group of conditions holds for some individuals; if `negated`, that no group holds."""
+        """Return the formula that some group of conditions holds for some individuals; if `negated`, return the negation."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
     def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
-        """Return the formula that some individuals satisfy a part; if `negated`, that no individuals satisfy the part."""
+        """Return the formula that some individuals satisfy all conditions of a part; if `negated`, return the negation."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
         if key not in self._known:
@@ -256,7 +256,7 @@ class Formulas:
         return self._members[kind]
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return the formula that a symbol has a value; if `negated`, that the symbol doesn't have the value."""
+        """Return the formula that a symbol has a value; if `negated`, return the negation."""
         kind = self.reached.situations.get(situation)
         if kind is None:  # the situation type doesn't exist on this level
             return () if negated else None

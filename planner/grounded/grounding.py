@@ -4,7 +4,7 @@ The first stage finds the facts that can become true under delete relaxation (`c
 unreachable, there is no plan. The second stage creates bits for the facts that can change, and operators from the joined rows.
 
 The joins ignore conditions that depend on the state and aren't atoms. Therefore reachability is overestimated. In the second
-stage, each of these conditions becomes a conjunction of bits for each combination of individuals
+stage, each ignored condition becomes a conjunction of bits for each combination of individuals
 (`confab.planner.grounded.formulas`).
 
 The method is semi-naive evaluation, known from databases (Helmert, "Concise finite-domain representations for PDDL planning

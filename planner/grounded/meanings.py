@@ -87,7 +87,7 @@ class Meanings:
         return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
-        """Add the meanings of required negations of defined facts, except for recursively defined facts."""
+        """Add the meaning of each negated defined fact that a condition requires, except for recursively defined facts."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
         for bit in waiting:  # the list grows

@@ -1,17 +1,17 @@
 """The search order by novelty: states with a new fact come first.
 
-A goal is open if it doesn't hold. A landmark is open if the path to the state hasn't reached it. The distance of a state is a pair
-of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed plan. A new relaxed plan is
-computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier state with the same distance had.
-This test is one operation on two integers. The open list is sorted by novelty, then by the number of open goals and landmarks.
-Among equal states, the newest state comes first.
+A goal is open if it doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The distance of a
+state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed plan. A
+new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier state with
+the same distance had. The test for novelty is one operation on two integers. The open list is sorted by novelty, then by the
+number of open goals and landmarks. Among equal states, the newest state comes first.
 
 Relaxed plans are computed only for expanded states that reach an open goal or landmark. Therefore the order ranks a hundred
-thousand states per second. The order drops only states from which the goal is unreachable. If the open list is empty, there is no
-plan.
+thousand states per second. The order drops only states from which the goal is unreachable. If the open list is empty, there is
+no plan.
 
-The method is best-first width search with novelty of width one (Lipovetzky and Geffner, "Best-first width search: exploration and
-exploitation in classical planning", AAAI 2017).
+The method is best-first width search with novelty of width one (Lipovetzky and Geffner, "Best-first width search: exploration
+and exploitation in classical planning", AAAI 2017).
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ CHILD, VISIT = 20, 2
 class Progress(NamedTuple):
     """The progress of a state.
 
-    `open` is the number of open goals and landmarks, and `unmet` is the mask of open landmarks. `wanted` is the mask of the relaxed
-    plan's facts; -1 if the relaxed plan isn't computed. `met` is the mask of the reached facts of the relaxed plan.
+    `open` is the number of open goals and landmarks, and `unmet` is the mask of open landmarks. `wanted` is the mask of the
+    relaxed plan's facts; -1 if the relaxed plan isn't computed. `met` is the mask of the reached facts of the relaxed plan.
     """
 
     state: int
@@ -46,7 +46,8 @@ class Progress(NamedTuple):
 class Novelty:
     """The search order by novelty for a task.
 
-    `marks` is the mask of the landmarks. `relaxing` is the work of a relaxed plan in bits. The order adds its effort to `counts`.
+    `marks` is the mask of the landmarks. `relaxing` is the work of a relaxed plan in bits. The order adds its effort to
+    `counts`.
     """
 
     def __init__(self, task: Task, evaluate: Evaluate, relaxing: int, marks: int, counts: Counts) -> None:
@@ -99,7 +100,7 @@ class Novelty:
         self.open.push((not state & ~old, open_, -len(self.reached)), place)
 
     def relaxed(self, place: Progress) -> Progress | None:
-        """Return the progress of a state with the facts of a relaxed plan; None if the goal is unreachable."""
+        """Return the progress of a state with the facts of a relaxed plan, or None if the goal is unreachable."""
         if place.wanted >= 0:
             return place
         evaluation = self.evaluate(place.state)
@@ -115,7 +116,7 @@ class Novelty:
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
-    """Return the bits that an operator keeps, and the bits that the operator sets; None if the bits depend on the state."""
+    """Return the bits that an operator keeps, and the bits that the operator sets, or None if the bits depend on the state."""
     changes = task.changes_of(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.made(operator)):
         return None

@@ -42,7 +42,10 @@ WAYS = 20
 SIZES = (8, 16, 32, 64)
 """Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
-"""Maximum number of operators in the search of a window. Evaluations of h_FF: one per `SHARE` of the work, at least 100."""
+"""Limits of the search of a window: the number of operators, and the minimum number of evaluations of h_FF.
+
+The search may use one evaluation for each `SHARE` of the work if this allows more evaluations.
+"""
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
@@ -203,7 +206,7 @@ class _Windows:
     task: Task
     work: int
     most: int
-    """Maximum number of evaluations in the search of a window."""
+    """Maximum number of evaluations of h_FF in the search of a window."""
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
     """Windows without a cheaper replacement, each as a state, required bits and a cost."""
@@ -309,8 +312,8 @@ class _Windows:
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
         """Return the operators nearest to a window in ascending order, including the operators of the window.
 
-        An operator is excluded if it clears a required bit that no step of the window clears. Another operator would have to set
-        this bit again.
+        An operator is excluded if it clears a required bit that no step of the window clears, because another operator would have
+        to set the bit again.
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
@@ -360,8 +363,8 @@ class _Windows:
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
         """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
 
-        The task has no bits for symbols that these operators don't change. Operators that require another value of such a symbol
-        are excluded.
+        The task has no bits for symbols that the given operators don't change. Operators that require another value of a symbol
+        without bits are excluded.
         """
         task = self.task
         if task.amounts is not None:

@@ -103,8 +103,8 @@ class RelaxedChanges:
     ) -> tuple[Grouped, list[tuple[tuple[int, ...], int]]]:
         """Return the bits that each relaxed operator may set, and the bits that auxiliary bits imply.
 
-        An effect sets the complements of the values that its symbol may have had before. If there are many such complements, the
-        effect sets one auxiliary bit "changed" of the symbol instead. In the relaxed task, this bit implies the complements.
+        An effect sets the complements of the values that its symbol may have had before. An effect with many complements sets one
+        auxiliary bit "changed" of the symbol instead. In the relaxed task, the auxiliary bit implies the complements.
         """
         changed: dict[int, int] = {}
         opposites: dict[int, dict[int, int]] = {}
@@ -151,10 +151,7 @@ def only(groups: Grouped, wanted: Flags) -> Grouped:
 def with_derived(
     need: Grouped, add: Grouped, owner: Ints, cases: Sequence[tuple[tuple[int, ...], int]]
 ) -> tuple[Grouped, Grouped, Ints]:
-    """Return the required bits, the added bits and the owners with an additional relaxed operator for each alternative.
-
-    The alternatives are those of derived bits.
-    """
+    """Return the required bits, the added bits and the owners, with a relaxed operator for each alternative of a derived bit."""
     if not cases:
         return need, add, owner
     more = np.array([bit for group, _ in cases for bit in group], np.int64)

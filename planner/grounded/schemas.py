@@ -71,8 +71,8 @@ def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[lis
     """Return rules in which each witness has a separate auxiliary rule, and the auxiliary situation types.
 
     A single join of "there is a full cup and there is a free shelf" would yield all pairs of a cup and a shelf. Therefore a witness
-    becomes an auxiliary situation type over the terms that the witness shares with other conditions. The exception is a rule
-    without other changing conditions.
+    becomes an auxiliary situation type over the terms that the witness shares with other conditions. In a rule without other
+    changing conditions, the conditions of the witness replace the witness.
     """
     found: list[Behavior] = []
     made: dict[str, SituationType] = {}

@@ -1,11 +1,11 @@
 """Proof of unsolvability by shortage: a sum that no operator increases is less than the goal requires.
 
-The sum has two kinds of terms. The first kind are the amounts of a situation type, either of all symbols or of one symbol. The
-second kind are facts that operators set while consuming such amounts. The worth of a fact is the least amount that an operator
-consumes to set the fact. If an operator sets several facts together, the consumed amount is divided among these facts. An operator
-that returns an amount doesn't increase the sum if the operator also clears facts of at least the same worth. For example, the
-return of a lent book increases the number of books, and clears the fact that a reader has the book. The goal requires the worth of
-its facts, plus the amount that must remain because of the goal or the bounds.
+The sum has two kinds of terms. Terms of the first kind are the amounts of a situation type, either of all symbols or of one
+symbol. Terms of the second kind are facts that operators set while consuming amounts of the situation type. The worth of a fact
+is the least amount that an operator consumes to set the fact. If an operator sets several facts together, the consumed amount
+is divided among these facts. An operator that returns an amount doesn't increase the sum if the operator also clears facts of
+at least the same worth. For example, the return of a lent book increases the number of books, and clears the fact that a reader
+has the book. The goal requires the worth of its facts, plus the amount that must remain because of the goal or the bounds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from confab.reasoner.amounts import written
 
 
 def shortage(task: Task) -> Reason | None:
-    """Return the reason why an amount doesn't suffice for the goal; None if no sum proves a shortage."""
+    """Return the reason why an amount doesn't suffice for the goal, or None if no sum proves a shortage."""
     amounts = task.amounts
     if amounts is None:
         return None
@@ -181,12 +181,12 @@ class _Sums:
         }
 
     def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
-        """Return the greatest lower bound on an amount among the comparisons in `bits`; None if there is no such bound."""
+        """Return the greatest lower bound on an amount among the comparisons in `bits`, or None if there is no such bound."""
         found = (self.limits[bit] for bit in bits if bit in self.limits)
         return max((wanted for of, wanted in found if of == place), default=None)
 
     def kept(self, place: int) -> Fraction | None:
-        """Return the part of an amount that no operator can consume; None if unknown.
+        """Return the part of an amount that no operator can consume, or None if unknown.
 
         The part exists if every consuming operator requires more than it consumes.
         """
@@ -201,7 +201,7 @@ class _Sums:
         return least
 
     def left(self, place: int) -> Fraction | None:
-        """Return a lower bound on an amount in every goal state; None if there is no bound."""
+        """Return a lower bound on an amount in every goal state, or None if there is no bound."""
         wanted = self.asked(bits_of(self.task.goal), place)
         found = (self.amounts.quantities[place].least, self.kept(place), wanted)
         floor = [limit for limit in found if limit is not None]
@@ -211,7 +211,7 @@ class _Sums:
 def _extent(
     amounts: Amounts, place: int, vector: Vector, moves: Mapping[int, Sequence[Move]]
 ) -> tuple[Fraction | None, Fraction | None]:
-    """Return the minimum and the maximum that operators can give to an amount; None means no limit."""
+    """Return the minimum and the maximum that operators can give to an amount, with None for no limit."""
     low: Fraction | None = Fraction(vector[place])
     high: Fraction | None = Fraction(vector[place])
     for move in (move for its in moves.values() for move in its if move.place == place):

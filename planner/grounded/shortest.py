@@ -1,4 +1,4 @@
-"""Cheapest plans of a grounded task: A* with a given estimate of the remaining cost.
+"""Cheapest plans of a grounded task, found by A* with a given estimate of the remaining cost.
 
 g:       cost of the operators from the start to a state
 h:       estimated cost from a state to the goal; infinite if the goal is unreachable
@@ -32,8 +32,8 @@ Bound: TypeAlias = "Callable[[int], float]"
 class Shortest:
     """The result of a search for a cheapest plan.
 
-    `bound` is a lower bound on the cost of a plan. `plan` contains the operators of the cheapest plan found; None if no plan was
-    found. `states` contains the reached states.
+    `bound` is a lower bound on the cost of a plan. `plan` contains the operators of the cheapest plan found. `plan` is None if no
+    plan was found. `states` contains the reached states.
     """
 
     bound: float
@@ -180,7 +180,7 @@ def ways(task: Task) -> Bound:
 
 
 def least(task: Task) -> float | None:
-    """Return a lower bound on the cost of every plan if operators have different costs (`ways`); None if that is 0."""
+    """Return the lower bound `ways` on the cost of every plan, or None if the bound is 0 or all operators cost the same."""
     return (ways(task)(task.initial) if len(set(task.costs)) > 1 else 0.0) or None
 
 

@@ -96,7 +96,7 @@ class Task:
     describe : function of an operator
         Returns the operator's behaviour, arguments and bindings.
     amounts : Amounts, optional
-        The amounts of the task; None if no operator changes an amount.
+        The amounts of the task, or None if no operator changes an amount.
     prices : mapping of operator to Linear
         The costs that depend on amounts.
     barred : set of (state, operator)
@@ -143,7 +143,7 @@ class Task:
         return total
 
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
-        """Return the state after an operator; None if the operator isn't applicable.
+        """Return the state after an operator, or None if the operator isn't applicable.
 
         If `follow` is false, derived bits aren't updated.
         """
@@ -200,7 +200,7 @@ class Task:
         return known
 
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
-        """Return the operators of `steps` (behaviours with arguments), applied in sequence; None if a step isn't applicable."""
+        """Return the operators of `steps` (behaviours with arguments), applied in sequence, or None if a step isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
         for operator in range(len(self)):
             step = self.describe(operator)[:2]

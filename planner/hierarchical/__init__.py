@@ -1,1 +1,1 @@
-"""The default planner: achieves goals one after another on a mutable state table and refines each step at once."""
+"""The default planner: it achieves goals one after another on a table of current values, and refines each step at once."""

@@ -74,7 +74,7 @@ class Agenda:
 
     @property
     def too_large(self) -> Reason | None:
-        """The reason why the lowest level can't be grounded; None unless grounding was tried and failed."""
+        """The reason why the lowest level can't be grounded, or None unless grounding was tried and failed."""
         return self._lowest if isinstance(self._lowest, Reason) else None
 
     # ------------------------------------------------------------------------------------------------- one goal after another
@@ -121,7 +121,7 @@ class Agenda:
     def at_once(self, cell: Cell) -> bool:
         """Achieve a goal by advice or by one step of the most abstract level; return whether that succeeded.
 
-        If that fails, put the goal to sleep.
+        If neither the advice nor one step achieves the goal, put the goal to sleep.
         """
         call, first = self.call, self.call.program.levels[0]
         unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
@@ -275,7 +275,7 @@ class Agenda:
     def all_goals(self, level: int) -> bool:
         """Achieve all goals together on a level from the current state; return whether that succeeded.
 
-        The agenda tries this at most once for each number of applied steps.
+        The agenda makes at most one attempt for each number of applied steps.
         """
         call = self.call
         if (
@@ -338,7 +338,7 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Return, for each goal, the goals that must be achieved before, because the goal makes them unreachable."""
+    """Return, for each goal, the goals that must be achieved earlier, because the goal makes them unreachable."""
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None

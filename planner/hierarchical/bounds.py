@@ -2,8 +2,8 @@
 
 The upper bound is the cost of the best plan so far, initially the shortened plan of the default planner. The lower bound is the
 least f of A* on the lowest level. The first heuristic of A* is the sum of the costs of achieving each goal alone; the second
-heuristic is LM-cut. If both bounds are equal, the plan is optimal. If a limit is reached before, the plan costs at most
-upper / lower times the optimum.
+heuristic is LM-cut. If both bounds are equal, the plan is optimal. If a limit ends the search earlier, the plan costs at most
+upper / lower times the cost of an optimal plan.
 
 LM-cut is due to Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. In
 this implementation, all relaxed operators of one quantified behaviour share the behaviour's cost. Therefore the heuristic is
@@ -106,7 +106,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     """Return a lower bound on the cost of a plan, and a cheaper plan if the search finds one.
 
     Symbols that are initially at rest must be at rest in the end. Other symbols must end at rest if a step changes them. The search
-    ignores the second condition. Therefore the bound is valid, but the plan may be invalid.
+    ignores the condition on other symbols. Therefore the bound is valid, but the plan may be invalid.
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))

@@ -4,7 +4,7 @@ targets:  the symbols to be changed, each with its required value
 off:      symbols without their required final value; the search succeeds when there are none
 changed:  the symbols that differ from the start, each with its value; these values identify a state
 
-The search tries only relevant behaviours (`confab.planner.hierarchical.relevance`). Therefore it finds a shortest sequence of
+The search tries only relevant behaviours (`confab.planner.hierarchical.relevance`). Therefore the result is a shortest sequence of
 relevant steps. Longer sequences and other steps require the search of a scope (`confab.planner.hierarchical.scope`).
 """
 

@@ -5,10 +5,8 @@ level, such as "a filled cup isn't moved". Therefore the behaviours of a level t
 behaviour may change a symbol that an upper level sees only if some behaviour of the upper level could make the same change. The
 conditions of the upper behaviour on the changed individuals become preconditions.
 
-Two kinds of conditions aren't inherited:
-
-- conditions on other individuals of the upper behaviour, such as the second vessel of pouring;
-- conditions on the old value of the changed symbol, if the upper level doesn't see all values of the symbol.
+Conditions on other individuals of the upper behaviour, such as the second vessel of pouring, aren't inherited. Conditions on the
+old value of the changed symbol aren't inherited if the upper level doesn't see all values of the symbol.
 """
 
 from __future__ import annotations

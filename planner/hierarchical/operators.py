@@ -1,8 +1,8 @@
 """Behaviours compiled to Python functions.
 
 Each behaviour has a function ``forward`` that returns its changes (`confab.planner.transitions`). Each effect has a function
-``achieve(key …, value)``. This function yields every binding with which the effect would give the value to the symbol. The unmet
-preconditions of each binding are also yielded.
+``achieve(key …, value)``. The function ``achieve`` yields every binding with which the effect would give the value to the symbol,
+and the unmet preconditions of the binding.
 
 The candidates for an unbound parameter come from the cheapest source. The sources are a static relation to a bound term, the
 holders of a value that no behaviour can change, and the members of the parameter's class. Terms that only the state determines are
@@ -315,7 +315,7 @@ class Program:
     def changeable(
         self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str], behavior: Behavior
     ) -> bool:
-        """Return whether an effect on the level of `behavior` can change a symbol with these terms."""
+        """Return whether an effect on the level of `behavior` can change a symbol whose arguments are the given terms."""
         if situation in self.domain.rules:
             return True  # the rules may depend on a symbol that changes
         here = [self._possible(term, kinds, behavior) for term in arguments]

@@ -1,11 +1,11 @@
-"""The default planner: achieves the goals one after another, refines each step at once, then shortens the plan.
+"""The default planner: it achieves the goals one after another, refines each step at once, and finally shortens the plan.
 
 ======  =========================================================================  =========================================
 word    meaning                                                                    module
 ======  =========================================================================  =========================================
 agenda  achieve the goals in turn; raise the search budget if all are blocked      `confab.planner.hierarchical.agenda`
-call    achieve one goal by steps of a level, which are applied to the table       `confab.planner.hierarchical.call`
-chains  search for a few steps, backwards from the wanted values                   `confab.planner.hierarchical.chains`
+call    achieve one goal by steps of a level, and apply these steps to the table   `confab.planner.hierarchical.call`
+chains  search for a few steps, backwards from the required values                 `confab.planner.hierarchical.chains`
 scope   ground and search a part of the world, on one level                        `confab.planner.hierarchical.scope`
 refine  replace a step by steps of the next level: a method, a chain or a scope    `confab.planner.hierarchical.refinement`
 prove   test whether there is no plan, when all goals are blocked                  `confab.planner.hierarchical.unsolvability`
@@ -36,16 +36,19 @@ from confab.reasoner.symbols import Problem, Symbol
 __all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
 
 FLAT = 50_000_000
-"""Maximum work of searching a one-level task as a whole, before planning goal by goal, in bits of relaxed plans (some seconds)."""
+"""Maximum work of searching a task of one level as a whole, before planning goal by goal; the unit is a bit of a relaxed plan.
+
+The maximum work corresponds to a few seconds.
+"""
 FLAT_ROWS = 30_000
-"""Maximum number of rows of a join when a one-level task is grounded as a whole."""
+"""Maximum number of rows of a join when a task of one level is grounded as a whole."""
 NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
-"""Share of the time limit that is used for search; the rest is for releasing memory."""
+"""Share of the time limit that is used for search; the rest of the time is for releasing memory."""
 
 
 def alone(call: Call) -> None:
-    """Attach no advice to the call."""
+    """Do nothing: the call gets no advice."""
 
 
 def plan(
@@ -57,20 +60,20 @@ def plan(
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
 ) -> Outcome:
-    """Return a plan for a problem: achieve its goals one after another and refine each step at once.
+    """Plan: achieve the goals of a problem one after another, and refine each step at once.
 
     Parameters
     ----------
     problem : Problem
     limits : Limits
     improve : int
-        Work for shortening the first plan, in sixteenths of the effort of finding it; 0 for no shortening.
+        Work of shortening the first plan, in sixteenths of the effort of finding the plan; 0 for no shortening.
     using : Compiled, optional
         The result of `compiled` for a problem with the same domain, individuals and static facts.
     leave_levels : bool
-        Whether the plan may have steps of a lower level where the upper level has no refinable plan.
+        Whether steps of a lower level may replace steps of a level that has no plan with refinements.
     advised : function of a call, optional
-        Attaches advice to the call.
+        Function that attaches advice to the call.
 
     Returns
     -------
@@ -127,7 +130,7 @@ def _plan(
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
-    """Search the lowest level as a whole, unless levels must not be left or the level is too large."""
+    """Search the lowest level as a whole; give up if levels must not be left or the level is too large."""
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
     if upper and not leave_levels:
@@ -150,22 +153,22 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
 
 
 def given_up(call: Call, why: str) -> Outcome:
-    """Return an outcome that reports that planning gave up, with `why` and the point it had reached."""
+    """Return the outcome of a call that gave up, with the reason `why`, the current goal and the current step."""
     from confab.planner.hierarchical.stuck import gave_up
 
     return call.outcome(Status.GAVE_UP, reason=gave_up(call, why))
 
 
 def by_rules_alone(call: Call) -> bool:
-    """Achieve all goals by learned rules, if there are rules for every kind of goal; return whether that succeeded."""
+    """Achieve all goals by learned rules if there are rules for all goals; return whether that succeeded."""
     return call.advice is not None and call.advice.expects and Agenda(call, (), solvable=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
     """Search a task of one level as a whole with bounded work; give up when the bound is reached.
 
-    In a task of one level, no refinements guide planning goal by goal, so the whole task is tried first. The work is bounded, since
-    the task may have too many goals or be too large to be grounded.
+    A task of one level has no refinements that guide planning goal by goal. Therefore the planner tries the whole task first. The
+    work is bounded, because the task may have too many goals, or may be too large for grounding.
     """
     from confab.planner.grounded.best_first import plan_level
 
@@ -177,8 +180,8 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     """Search the lowest level from the initial state.
 
-    If the plan is invalid because a symbol that it changes isn't at rest in the end, the search is repeated with all rest values
-    as goals.
+    If a changed symbol isn't at rest at the end of the plan, the plan is invalid. The search is then repeated with all rest values
+    as additional goals.
     """
     from confab.planner.grounded.best_first import plan_level
 

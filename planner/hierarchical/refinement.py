@@ -136,11 +136,11 @@ class Refiner:
         level : int
         targets : mapping of cell to value
         keep : function of a cell and its first value
-            Returns the required final value of the cell; None if any value is allowed.
+            Returns the required final value of the cell, or None if any value is allowed.
         budgets : sequence of SearchBudget
             Budgets that are tried one after another.
         task : RefinementTask, optional
-            The step to be refined; None if the targets are goals.
+            The step to be refined, or None if the targets are goals.
         """
         here: object = None
         if task is not None:
@@ -223,7 +223,7 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a target or a changed symbol without its required value; None if there is none.
+        """Return a target or a changed symbol without its required value, or None if there is none.
 
         Changed symbols are those that were set since a mark.
         """

@@ -71,7 +71,7 @@ def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
 
 
 def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
-    """Return the initial state and the state after each step; None if a step isn't applicable."""
+    """Return the initial state and the state after each step, or None if a step isn't applicable."""
     found: list[State] = [dict(problem.initial)]
     for step in steps:
         values = found[-1]

@@ -1,7 +1,7 @@
 """A scope: a part of the world that is grounded and searched on one level if no short chain of relevant steps suffices.
 
 The individuals in *focus* are those in the targets, and those in chains towards the targets. Steps involve only individuals in
-focus. *Frozen* individuals have a fixed state. They are the values of individuals in focus, and the individuals that conditions
+focus. *Frozen* individuals have a fixed state. The values of individuals in focus are frozen, and the individuals that conditions
 quantify over. Because of the frozen individuals, quantified conditions have the same truth value as in the whole world.
 
 The state of the individuals in focus is exact. Therefore the steps of a successful search are applicable in the whole world. A
@@ -113,7 +113,7 @@ class Scope:
 
 
 def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: SearchBudget) -> set[str] | None:
-    """Return the individuals in focus for the given targets; None means all individuals."""
+    """Return the individuals in focus for the given targets, or None for all individuals."""
     if budget.questions is None:
         return None
     program, table = space.program, space.table
@@ -145,7 +145,7 @@ def problem_of(
 ) -> Problem:
     """Return one level of the problem in the current state, without a goal.
 
-    The arguments of behaviours are restricted to the individuals in `inside`; None means no restriction.
+    The arguments of behaviours are restricted to the individuals in `inside`, unless `inside` is None.
     """
     program, table = space.program, space.table
     problem = program.problem
@@ -183,8 +183,8 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
     """Return the individuals in focus together with the frozen individuals.
 
     The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies over
-    individuals, further individuals are frozen. These individuals have an individual of the scope as a value, or a static relation
-    relates them to an individual of the scope.
+    individuals, an individual is also frozen if its value is an individual of the scope, or if a static relation relates it to an
+    individual of the scope.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)

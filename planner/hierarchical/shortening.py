@@ -1,12 +1,13 @@
-"""Shortening of a plan, with at most half the effort of finding it.
+"""Shortening of a plan, by default with at most half of the effort of finding the plan.
 
-orders:   run the agenda with other orders of the goals, which decide what has to be moved away; known refinements are reused
-windows:  on each level, from the top, replace consecutive steps by cheaper steps (`confab.planner.hierarchical.windows`)
-detours:  remove steps whose changes cancel out (`confab.planner.hierarchical.detours`)
+The first method plans the goals again in other orders, and reuses known refinements. The second method replaces consecutive steps
+of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
+(`confab.planner.hierarchical.detours`).
 
-Orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of the levels
-between first and lowest are tried only if the plan moves an object away. The cheapest plan is kept; of equally cheap plans, the
-one with the fewest primitives. Steps of the first level explain the steps below, so they are dropped only if this saves enough.
+Other orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of the
+levels between the first and the lowest level are tried only if the plan moves an object away. The cheapest plan is kept; among
+equally cheap plans, the plan with the fewest primitives. Steps of the first level explain the steps below. Therefore steps of the
+first level are dropped only if the plan becomes much cheaper.
 """
 
 from __future__ import annotations
@@ -29,22 +30,25 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
 ORDERS = 8
-"""Default work for shortening a plan, in sixteenths of the effort of finding it; more work gives shorter plans."""
+"""Default work of shortening a plan, in sixteenths of the effort of finding the plan; more work leads to shorter plans."""
 SHUFFLES = 3
 """Number of random orders of the goals that are tried before small changes of the best order."""
 LEAST_EFFORT = 400_000
-"""Minimum effort assumed for a first plan, in states times operators, so that a plan found at once is shortened, too."""
+"""Minimum effort that is assumed for finding the first plan, in states times operators.
+
+Because of this minimum, the planner also shortens plans that were found with little effort.
+"""
 LEAST_ROUNDS = 5
-"""Minimum number of rounds with a time limit, where the first may be too short to improve a plan."""
+"""Minimum number of rounds of shortening with a time limit; the first rounds may be too short to improve a plan."""
 DOING, BEGINNING = 20, 1_000
-"""Work of replaying a primitive, and of beginning a call, in states times operators."""
+"""Work of replaying a primitive, and work of beginning a call, in states times operators."""
 MANY = 1.25
 """Number of first-level steps per goal above which other orders of the goals are tried."""
 
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
     """Return the plan of a call, shortened with work proportional to `improve`."""
-    with suppress(LimitError):  # the plan so far is kept
+    with suppress(LimitError):  # at a limit, the current plan is kept
         shorten(call, improve, leave_levels, advised)
     plan = call.tree()
     if all(step.level == call.program.levels[0] for step in plan.steps):
@@ -55,8 +59,9 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
     """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
-    Without a time limit there is one round. With a time limit, rounds continue up to twice the number of the last round that saved
-    something; there are at least `LEAST_ROUNDS` if windows of the lowest level can make refinements cheaper.
+    Without a time limit, there is one round. With a time limit, the number of rounds is at most twice the number of the last round
+    that made the plan cheaper. If windows of the lowest level can make refinements cheaper, there are at least `LEAST_ROUNDS`
+    rounds.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
@@ -70,7 +75,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
 
 def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:
-    """Try other orders of the goals, windows of each level, and removal of detours, each with bounded work."""
+    """Try other orders of the goals, windows of each level, and the removal of detours, each with bounded work."""
     levels = call.program.levels
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
@@ -85,18 +90,18 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
 
 
 def lasting(call: Call) -> bool:
-    """Return whether the cost of a refinement depends on the steps before it, or on a choice of primitives of different costs."""
+    """Return whether the cost of a refinement may depend on earlier steps, or on a choice of primitives with different costs."""
     primitives = call.problem.domain.at_level(call.program.levels[-1])
     return call.refiner.drifting or len({(one.cost, one.price) for one in primitives}) > 1
 
 
 def cost(call: Call) -> float:
-    """Return what shortening minimises: the cost of a call's primitives; among equal costs, their number."""
+    """Return the quantity that shortening minimises: the cost of a call's primitives and, among equal costs, their number."""
     return compared(call.problem, primitives(call.steps))
 
 
 def puts_aside(call: Call) -> bool:
-    """Return whether a step overwrites a value that no step required after it was set; if not, hardly any step is needless."""
+    """Return whether a step overwrites a value that no step has required; otherwise hardly any step is superfluous."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
@@ -124,9 +129,10 @@ def puts_aside(call: Call) -> bool:
 
 
 def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Random) -> None:
-    """Achieve the goals in other orders, with bounded work; keep the shortest steps and continue from their order.
+    """Achieve the goals in other orders with bounded work; keep the cheapest steps, and continue from their order.
 
-    Only steps of the most abstract level are tried. Advice is used for refinements; for goals it would lead to the same steps.
+    Only steps of the most abstract level are tried. Advice is used only for refinements, because advice for goals would lead to the
+    same steps.
     """
     order = list(call.kept)
     tried = {tuple(order)}
@@ -152,7 +158,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
 
 
 def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
-    """Yield the reversed order, a few random orders, then endlessly the current `order` with a few goals moved."""
+    """Yield the reversed order, a few random orders, and then endlessly the current `order` with a few goals moved."""
     yield order[::-1]
     for _ in range(SHUFFLES):
         yield random.sample(order, len(order))
@@ -167,7 +173,7 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Drop steps of a level that cancel out, if that improves the plan; return whether any were dropped."""
+    """Drop steps of a level that cancel out if this improves the plan; return whether steps were dropped."""
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)
     if improves(call.problem, call.tree(), old, level):

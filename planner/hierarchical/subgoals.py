@@ -200,7 +200,7 @@ class Subgoals:
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
         """Return the candidates that are individuals of the current search (`concern`).
 
-        If there are none, return a few candidates with the fewest unmet conditions.
+        If there are no such candidates, return a few candidates with the fewest unmet conditions.
         """
         found = [pair for pair in lacking if pair[0] in self._concern]
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]

@@ -87,7 +87,7 @@ class SymmetryClasses:
         return found
 
     def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
-        """Return the values of an individual in the mappings `cells`; None replaces values that no behaviour names."""
+        """Return the values of an individual in the mappings `cells`, with None for values that no behaviour names."""
         values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 

@@ -65,7 +65,7 @@ def closed(problem: Problem, level: int, deadline: float | None, initial: State 
 
 
 def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
-    """Return the reason why grounding a level would need too much memory; None if the memory suffices.
+    """Return the reason why grounding a level would need too much memory, or None if the memory suffices.
 
     An effect leads to a separate change for each value of its symbol.
     """
@@ -123,7 +123,7 @@ def looked_at(task: Task, space: Workspace, before: int) -> int:
 
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
-    """Return the reason why no reachable state satisfies the goal; None if `most` states don't suffice for a proof."""
+    """Return the reason why no reachable state satisfies the goal, or None if `most` states don't suffice for a proof."""
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)

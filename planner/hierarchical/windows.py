@@ -78,7 +78,7 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
 
 
 def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
-    """Return the grounded task of a level with the goals and rest values that the level sees; None if the level is too large."""
+    """Return the grounded task of a level with the goals and rest values that the level sees, or None if the level is too large."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
 
@@ -126,7 +126,7 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     """Return whether a new plan is cheaper than the old plan and violates no more conditions of upper levels.
 
     The new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If
-    primitives replace such steps, the new plan must be cheaper by the factor `KEPT`.
+    primitives replace steps of the most abstract level, the new plan must be cheaper by the factor `KEPT`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     first, last = problem.domain.levels[0], problem.domain.levels[-1]

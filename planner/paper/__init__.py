@@ -1,1 +1,1 @@
-"""The paper's mode: A* with cogency on each level, each behaviour refined on the level below."""
+"""The paper's mode, which plans with A* and cogency on each level, and refines each behaviour on the level below."""

@@ -23,7 +23,7 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.limits import OutOfTimeError
 
 Goal = Mapping[int, str]
-"""Wanted values by position in the state."""
+"""The goal of a search: the required values of symbols, by the position of the symbol in the state."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The hierarchical planner of the paper.
 
-The planner searches the most abstract level, then refines each behaviour on the level below, down to primitives.
-docs/levels.md defines the goal of a refinement. Symbols that the level of the refined behaviour sees must end with the values
+The planner searches the most abstract level, then refines each behaviour on the level below, down to primitives. The goal of a
+refinement is defined in docs/levels.md. Symbols that the level of the refined behaviour sees must end with the values
 that the behaviour gives them. Symbols that only the lower level sees must end at rest if the refinement changed them; for
 example, hands must be empty, raised and upright. The next behaviour begins in the state in which the refinement ended.
 
@@ -43,7 +43,7 @@ The function returns an `UnsolvableError` if the problem is proved unsolvable, o
 """
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
-"""A step with its refinement, and the state after the refinement; None if there is no refinement."""
+"""A step with its refinement, and the state after the refinement, or None if there is no refinement."""
 
 
 @dataclass
@@ -161,7 +161,7 @@ def _call(
 
 
 def task(call: PaperCall, level: int) -> list[Step] | None:
-    """Return a plan of one level, refined down to primitives; None if the level has no plan with refinements."""
+    """Return a plan of one level, refined down to primitives, or None if the level has no plan with refinements."""
     problem, start = call.model.problem, call.model.values(call.model.problem.initial)
     goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
     found = solve(call, level, start, target(call.model, 0, level, start, goal))

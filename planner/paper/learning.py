@@ -17,7 +17,7 @@ from confab.reasoner.symbols import GroundBehavior, Problem, State
 
 
 def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:
-    """Return the links after one successful execution of a plan; `links` itself is unchanged.
+    """Return the links after one successful execution of a plan, without changing the given links.
 
     Parameters
     ----------

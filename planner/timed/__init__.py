@@ -1,1 +1,1 @@
-"""Plans in time: the order that the steps of a plan need, schedules of it, and their checker (docs/levels.md, "In time")."""
+"""Timed plans: the necessary order of a plan's steps, schedules of the steps, and a checker (docs/levels.md, "In time")."""

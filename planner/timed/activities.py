@@ -66,7 +66,7 @@ class Activity:
     middle: Access
     end: Access
     at: Fraction | None = None
-    """The fixed time of a step that is an external event, in seconds; None for other steps."""
+    """The fixed time of a step that is an external event, in seconds, or None for other steps."""
 
     @property
     def accesses(self) -> tuple[Access, Access, Access]:

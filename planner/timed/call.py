@@ -213,7 +213,10 @@ def _timed(
 def _slack(
     network: Network, arcs: Sequence[Sequence[tuple[int, int]]], durations: Sequence[int], begins: Begins
 ) -> list[int]:
-    """Return the slack of each activity: the time by which it can begin later without a longer makespan or a missed time."""
+    """Return the slack of each activity.
+
+    The slack is the time by which the activity can begin later without a longer makespan and without missing a time limit.
+    """
     latest = [
         min([begins.makespan, *network.ends(i, begin, lasts)]) - lasts
         for i, (begin, lasts) in enumerate(zip(begins.begins, durations, strict=True))

@@ -289,12 +289,12 @@ class _Finder:
             yield whole
 
     def ending(self, operator: int) -> int | None:
-        """Return the operator that ends a step which the given operator begins; None if the step can't end."""
+        """Return the operator that ends a step which the given operator begins, or None if the step can't end."""
         name, arguments = self.named[operator]
         return self.end_of.get((name.partition("@")[0], arguments))
 
     def completed(self, operators: list[int]) -> list[int] | None:
-        """Return operators followed by the ends of the running steps; None if an end is impossible or undoes a goal."""
+        """Return operators followed by the ends of the running steps, or None if an end is impossible or undoes a goal."""
         state, _ = self.task.carried_out(self.task.initial, operators)
         if not state & self.marks:
             return operators
@@ -364,7 +364,7 @@ class _Finder:
         return [*preferred, *sorted(possible.difference(preferred))]
 
     def after(self, node: _Node, operator: int) -> _Node | None:
-        """Return the node after an operator; None if the node isn't allowed.
+        """Return the node after an operator, or None if the node isn't allowed.
 
         A node isn't allowed if the operator is inapplicable, violates a condition of a running step, or delays the end of a running
         step too long.
@@ -444,7 +444,7 @@ class _Finder:
         return {}
 
     def held(self, end: int) -> int:
-        """Return the bits that the end of a running step requires; 0 if the behaviour has separate conditions at its end."""
+        """Return the bits that the end of a running step requires, or 0 if the behaviour has separate conditions at its end."""
         if end not in self._held:
             whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
             asked = self.task.changes_of(end)[0]

@@ -119,7 +119,7 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
 def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
     """Return a function that tests whether a turn can have another actor.
 
-    The test requires that each step that names the actor has either all of the actor's primitives in the turn, or none.
+    For each step that names the actor, either all of the actor's primitives in the step belong to the turn, or none.
     """
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
     naming: dict[str, list[set[int]]] = defaultdict(list)
@@ -151,7 +151,7 @@ def _durations(
     members: Sequence[int],
     names: Mapping[str, str],
 ) -> dict[int, int] | None:
-    """Return the durations of activities with other actors; None if static facts don't allow these actors."""
+    """Return the durations of activities with other actors, or None if static facts don't allow these actors."""
     found = {}
     for member in members:
         step = order.activities[member].step

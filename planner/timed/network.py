@@ -59,7 +59,10 @@ class Network:
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
     def ends(self, i: int, begin: int, lasts: int) -> list[int]:
-        """Return the latest ends of an activity with this begin: those for its latest times, its window and its fixed time."""
+        """Return the latest ends that the latest times, the window and the fixed time of an activity allow.
+
+        The activity stays in the window in which it lies with the given begin.
+        """
         fixed = self.at[i]
         found = [by if which == END else by + lasts for which, by in self.latest[i]]
         found += [high for low, high in self.windows[i] if high is not None and low <= begin and begin + lasts <= high]
@@ -136,7 +139,7 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
 
 
 def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
-    """Return the earliest begins that satisfy the edges of a network and additional edges; None if the edges form a cycle.
+    """Return the earliest begins that satisfy the edges of a network and additional edges, or None if the edges form a cycle.
 
     Activities may miss their latest times, windows or fixed times (`Begins.late`).
 
@@ -174,7 +177,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
-    """Return the time by which an activity misses its latest times, windows or fixed time; 0 if it misses none."""
+    """Return the time by which an activity misses its latest times, windows or fixed time, or 0 if it misses none."""
     late, end, fixed = 0, begin + lasts, network.at[i]
     for which, by in network.latest[i]:
         late = max(late, (end if which == END else begin) - by)

@@ -94,7 +94,7 @@ def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts:
 
 
 def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-    """Return the duration of a step at its begin, in seconds; None if the duration isn't a number or is negative.
+    """Return the duration of a step at its begin, in seconds, or None if the duration isn't a number or is negative.
 
     `arguments` is a result of `terms_at`.
     """

@@ -71,7 +71,7 @@ class TimedPlan:
 
     @property
     def work(self) -> Fraction:
-        """The time that the actors are busy, added up, in seconds."""
+        """The sum of the times during which the actors are busy, in seconds."""
         return sum(((slot.end - slot.begin) * len(slot.actors) for slot in self.slots), Fraction(0))
 
     @cached_property

@@ -54,7 +54,7 @@ class CandidateSchedule:
 def shortest(
     order: Order, network: Network, choices: Choices, until: float, bound: int = 0
 ) -> CandidateSchedule | None:
-    """Return the best schedule that the greedy construction and the exchanges of turns find; None if they find none.
+    """Return the best schedule that the greedy construction and the exchanges of turns find, or None if they find none.
 
     The schedule may be late (`Begins.late`). The search stops at a schedule that isn't late and whose makespan is the lower bound.
 
@@ -114,7 +114,7 @@ class _Search:
                     self.turns_of[member].append((resource, number))
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
-        """Return the schedule for an order of turns; None if the order has no schedule."""
+        """Return the schedule for an order of turns, or None if the order has no schedule."""
         durations = durations_with(self.network, self.choices, turns)
         begins = earliest(self.network, turn_edges(self.order, turns), durations)
         return None if begins is None else CandidateSchedule(turns, begins)

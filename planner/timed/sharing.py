@@ -1,13 +1,13 @@
-"""Who does what: the goals are achieved again one after another, in another order and by other actors, for a better schedule.
+"""Sharing of goals among actors: the goals are planned again, in another order and with other actors, for a better schedule.
 
-crew      the chosen individual for each class of actors, barred actors, and barred steps; steps towards a goal name no others. The
-          empty crew allows all.
-task      a goal, or a step that is done early, with its crew
-stretch   the steps that achieve a task from a state, found by the default planner; all goals achieved before hold afterwards
+A crew restricts the actors and the steps towards a goal: it contains a chosen individual for each class of actors, barred actors,
+and barred steps. The empty crew allows all actors and steps. A task is a goal, or a step to be executed early, with a crew. A
+stretch consists of the steps that achieve a task from a state. The default planner finds the steps of a stretch. All goals that
+were achieved before still hold after a stretch.
 
-The first sequence of tasks is that of the plan, or a greedy one: each goal is given to the crew that achieves it first. Then the
-crew or position of one task is changed at a time, preferably of a task on the critical path. The work is bounded, so the result is
-the same on every machine unless a time limit comes first.
+The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
+search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
+The work is bounded. Therefore the result is the same on every machine, unless a time limit ends the search.
 """
 
 from __future__ import annotations
@@ -39,35 +39,39 @@ from confab.reasoner.timing import timing_of
 MOST_CREWS = 64
 """Maximum number of crews."""
 MOST_WORK = 20_000_000
-"""Maximum work, in states times operators (about a microsecond each)."""
+"""Maximum work of sharing, in states times operators (about a microsecond each)."""
 PLANNING, SCHEDULING = 2_500, 60
-"""Work of planning a stretch, in addition to its searches, and of scheduling a primitive."""
+"""Work of planning a stretch without its searches, and work of scheduling a primitive, in states times operators."""
 BARREN = 150
-"""Maximum number of changes that are tried without a better schedule."""
+"""Maximum number of successive changes without a better schedule."""
 BUSY = Fraction(103, 100)
-"""Maximum of the actors' time divided by the work, up to which a schedule isn't improved."""
+"""Ratio of the actors' total time to their total work up to which a schedule isn't improved further."""
 MOST_KNOWN = 4
-"""Maximum number of known steps that are tried for a stretch."""
+"""Maximum number of known sequences of steps that are tried for a stretch."""
 MOST_COMPILED = 200
-"""Maximum number of crews for which behaviours are compiled; then no more steps are barred."""
+"""Maximum number of crews for which behaviours are compiled; at this number, the search bars no further actors or steps."""
 HALF, PREFERRED, EARLY = 0.5, 0.8, 0.25
-"""Shares of the bars that concern an actor, of the changes on the critical path, and of those that do a late step early."""
+"""Three probabilities of changes.
+
+`HALF` is the probability that an actor is barred instead of a step. `PREFERRED` is the probability that a change concerns a task on
+the critical path. `EARLY` is the probability that a late step becomes an early task.
+"""
 MOST_FAILED = 2
-"""Number of failed searches after which no more steps are searched for a task."""
+"""Number of failures after which the planner searches no further steps for a task."""
 EXPANSIONS, WORK = 500, 200_000
-"""Maximum number of expansions for a stretch, and maximum work of its searches in states times operators."""
+"""Maximum number of expansions for a stretch, and maximum work of the searches for a stretch, in states times operators."""
 
 State: TypeAlias = "dict[Symbol, str]"
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour with its arguments."""
 Aim: TypeAlias = "Symbol | Ground"
-"""A goal, or a step of the first level that is done early."""
+"""The aim of a task: a goal, or a step of the first level that is executed early."""
 Task: TypeAlias = "tuple[Aim, Crew]"
 
 
 @dataclass(frozen=True)
 class Crew:
-    """The chosen individual for each class of actors, the actors that are barred, and the barred steps.
+    """A crew: a chosen individual for each class of actors, the barred actors `without`, and the barred steps.
 
     A barred step is a behaviour with its arguments.
     """
@@ -85,35 +89,37 @@ class _Stretch:
 
 @dataclass
 class _Sequence:
-    """Tasks with their stretches and the schedule of all their steps."""
+    """A sequence of tasks with their stretches and the schedule of all steps."""
 
     tasks: list[Task]
     stretches: list[_Stretch]
     cost: tuple[Fraction, Fraction, Fraction]
     """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
     work: Fraction
-    """The time that the actors are busy, added up."""
+    """The sum of the times during which the actors are busy."""
     end: Fraction
     """The end of the last stretch."""
     critical: list[tuple[int, Step, tuple[str, ...], Ground]]
-    """The steps on the critical path, or on the path to the activity that is latest.
+    """The steps on the critical path, or on the path to the activity with the greatest lateness.
 
-    Each has its task's number, its actors, and the step of the first level that contains it.
+    Each step comes with the number of its task, with its actors, and with the first-level step that contains it.
     """
 
 
 def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = True) -> Plan | None:
-    """Return a plan for the same goals whose steps are shared among actors for a short schedule; None if none is found.
+    """Return a plan for the goals of a plan, whose steps are shared among actors for a short schedule.
+
+    Return None if no such plan is found.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-        A plan of it, which determines the first order of the goals.
+        A plan of the problem; it determines the first order of the goals.
     until : float, optional
         The end of the search, on the clock of `perf_counter`.
     shorten : bool
-        Whether the search continues after a schedule has been found that keeps all windows and deadlines.
+        Whether the search continues after it has found a schedule that keeps all windows and deadlines.
     """
     search = _Search(problem, plan, until, shorten)
     with suppress(LimitError):
@@ -125,7 +131,7 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
 
 
 def crews_of(problem: Problem) -> Iterator[Crew]:
-    """Yield the crews of a problem, first the one that allows all individuals."""
+    """Yield the crews of a problem; the first crew allows all individuals."""
     resting = default_actors(problem)
     kinds = dict.fromkeys(
         behavior.kinds[term]
@@ -140,7 +146,10 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
 
 
 def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
-    """Return whether all actors of a problem are busy for almost the whole makespan; `work` is the time that they are busy."""
+    """Return whether all actors of a problem are busy for almost the whole makespan of a plan.
+
+    `work` is the sum of the times during which the actors are busy.
+    """
     resting, actors = default_actors(problem), set[str]()
     for behavior in problem.domain.behaviors.values():
         actors.update(term for term in timing_of(behavior).actors if term not in behavior.kinds)
@@ -150,7 +159,7 @@ def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
 
 
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the parameters and variables of a behaviour that denote actors."""
+    """Return the parameters and the variables of a behaviour that denote actors."""
     stated = timing_of(behavior).actors
     if stated:
         return tuple(term for term in stated if term in behavior.kinds)
@@ -159,7 +168,7 @@ def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) 
 
 
 def with_crew(problem: Problem, crew: Crew) -> Problem:
-    """Return a problem in which only the steps of a crew are possible."""
+    """Return a problem in which only the actors and the steps that a crew allows are possible."""
     lowest, resting, chosen = problem.domain.levels[-1], default_actors(problem), dict(crew.chosen)
 
     def asked(behavior: Behavior) -> Behavior:
@@ -189,24 +198,24 @@ class _Search:
     work: int = 0
     most: int = MOST_WORK
     known: dict[tuple[Task, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
-    """The steps found for each task after the same early steps; they are tried again before others are searched."""
+    """The known steps of each task after the same early steps; the planner tries known steps before it searches for others."""
     failed: Counter[Task] = field(default_factory=Counter)
-    """How often no steps were found for each task."""
+    """The number of times that no steps were found for a task, by task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
 
     @cached_property
     def rules(self) -> BehaviorReader:
-        """The behaviours as the checker reads them."""
+        """The compiled behaviours of the plan checker."""
         return BehaviorReader(self.problem)
 
     @cached_property
     def crews(self) -> list[Crew]:
-        """The crews to choose from."""
+        """The crews that the search may assign to tasks."""
         return list(islice(crews_of(self.problem), MOST_CREWS))
 
     @cached_property
     def last(self) -> dict[Symbol, int]:
-        """The number of the primitive of the plan that changes each symbol last."""
+        """The position of the last primitive of the plan that changes a symbol, by symbol."""
         rules, facts = self.rules, Facts(self.problem, self.problem.initial, self.rules)
         last: dict[Symbol, int] = {}
         for number, step in enumerate(self.plan.primitives):
@@ -218,7 +227,10 @@ class _Search:
 
     @cached_property
     def goals(self) -> list[Symbol]:
-        """The goals that the plan achieves, those with deadlines first, then in the order of their last changes."""
+        """The goals that the plan achieves.
+
+        Goals with deadlines come first, sorted by deadline. The other goals are sorted by their last changes.
+        """
         last = self.last
         deadlines = self.problem.times.deadlines if self.problem.times else {}
         count = len(self.plan.primitives)
@@ -228,7 +240,7 @@ class _Search:
         return sorted(open_, key=lambda s: (s not in deadlines, deadlines.get(s, 0), last.get(s, count)))
 
     def run(self) -> None:
-        """Change the better one of the plan's sequence and a greedy one."""
+        """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
         self.best, until, greedy = self.own(), self.until, None
         self.most, self.until = MOST_WORK // 2, None if until is None else (perf_counter() + until) / 2
         with suppress(LimitError):
@@ -254,7 +266,10 @@ class _Search:
             now = self.best = other
 
     def own(self) -> _Sequence | None:
-        """Return the plan as a sequence: its goals in the order of their last changes, each with the steps up to this change."""
+        """Return the sequence of tasks that follows the plan.
+
+        The goals have the order of their last changes. The stretch of a goal contains the steps up to its last change.
+        """
         numbers = iter(range(len(self.plan.primitives)))
         ends = [[next(numbers) for one in step.walk() if not one.steps][-1] for step in self.plan.steps]
         goals = sorted(self.goals, key=lambda goal: self.last.get(goal, ends[-1] if ends else 0))
@@ -269,9 +284,9 @@ class _Search:
         return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
     def greedy(self) -> _Sequence | None:
-        """Return the goals in their order, each given to the crew that achieves it first; None if a goal isn't achieved.
+        """Return the greedy sequence of tasks: each goal is assigned to the crew that achieves the goal first.
 
-        A goal that no crew achieves yet waits for the next one.
+        If no crew achieves a goal, the goal is tried again after the next goal. Return None if no crew achieves a remaining goal.
         """
         now: _Sequence | None = None
         waiting = list(self.goals)
@@ -289,7 +304,7 @@ class _Search:
         return now
 
     def changed(self, now: _Sequence, random: Random) -> list[Task]:
-        """Return the tasks of a sequence with a change.
+        """Return the tasks of a sequence after one random change.
 
         One task gets another crew, two exchange their crews, an actor or a step of one is barred, or one gets another position. If
         a step is late, it may become a task of its own that is done early, or such a task is dropped.
@@ -319,9 +334,9 @@ class _Search:
         return tasks
 
     def built(self, tasks: Sequence[Task], like: _Sequence | None) -> _Sequence | None:
-        """Return the sequence of tasks; None if one of them isn't achieved.
+        """Return the sequence of tasks with stretches and schedule, or None if a task isn't achieved.
 
-        Where it begins as another sequence does, it has the same stretches.
+        The sequence reuses the stretches of the common first tasks of the sequence `like`.
         """
         same = 0
         if like is not None:
@@ -338,7 +353,10 @@ class _Search:
         return self.scheduled(list(tasks), stretches)
 
     def stretch(self, state: State, aims: Sequence[Aim], crew: Crew) -> _Stretch | None:
-        """Return the steps by which a crew achieves the last of some aims and keeps the goals; None if they aren't found."""
+        """Return the steps by which a crew achieves the last of several aims and keeps the goals among the other aims.
+
+        Return None if no such steps are found.
+        """
         early, aim = frozenset(one for one in aims[:-1] if not isinstance(one, Symbol)), aims[-1]
         key = frozenset(state.items()), frozenset(aims), aim, crew
         if key not in self.stretches:
@@ -356,11 +374,11 @@ class _Search:
         return self.stretches[key]
 
     def wanted(self, aims: Sequence[Aim]) -> State:
-        """Return the goals among some aims, and those that the plan doesn't change, with their values."""
+        """Return the goals among the given aims, and the goals that the plan doesn't change, with their values."""
         return {s: v for s, v in self.problem.goal.items() if s in aims or s not in self._open}
 
     def asked(self, aim: Aim) -> State:
-        """Return the values that a step of an aim requires of symbols of its arguments."""
+        """Return the values that the step of an aim requires for symbols of its arguments."""
         if isinstance(aim, Symbol):
             return {}
         behavior = self.problem.domain.behaviors[aim[0]]
@@ -374,7 +392,7 @@ class _Search:
         return found
 
     def after(self, state: State, steps: tuple[Step, ...]) -> State:
-        """Return the state after steps."""
+        """Return the state after the given steps."""
         facts = Facts(self.problem, state, self.rules)
         for step in Plan(steps).primitives:
             for change in self.rules.changes(self.problem.domain.behaviors[step.behavior], step.arguments, facts) or ():
@@ -382,7 +400,10 @@ class _Search:
         return facts.state()
 
     def planned(self, problem: Problem, crew: Crew, aim: Aim) -> tuple[Step, ...] | None:
-        """Return steps of a crew that the default planner finds for a problem, with the step of an aim in the end."""
+        """Return the steps of a crew that the default planner finds for a problem.
+
+        If the aim is a step, this step comes last. Return None if no such steps are found.
+        """
         if crew not in self.compiled:
             allowed = with_crew(self.problem, crew) if crew != Crew() else self.problem
             self.compiled[crew] = allowed, compiled(allowed)
@@ -402,7 +423,10 @@ class _Search:
         return found
 
     def with_last(self, problem: Problem, call: Call, aim: Aim) -> tuple[Step, ...] | None:
-        """Return the steps of a call, with the step of an aim in the end; None if that step isn't possible."""
+        """Return the steps of a call, followed by the step of the aim if the aim is a step.
+
+        Return None if the step of the aim isn't possible.
+        """
         if not isinstance(aim, Symbol):
             last = call.refiner.do(problem.domain.behaviors[aim[0]].level, *aim)
             if last is None:
@@ -412,7 +436,7 @@ class _Search:
         return None if not isinstance(aim, Symbol) and validate(problem, Plan(steps)) else steps
 
     def spend(self, work: int) -> None:
-        """Count work; raise `LimitError` if too much is done, or the time is over."""
+        """Count work; raise `LimitError` at the limit of work or at the time limit."""
         self.work += work
         if self.work > self.most:
             raise LimitError(f"{self.most} states times operators")
@@ -424,7 +448,7 @@ class _Search:
         return frozenset(self.goals)
 
     def scheduled(self, tasks: list[Task], stretches: list[_Stretch]) -> _Sequence | None:
-        """Return tasks with the earliest schedule of their steps in this order."""
+        """Return the sequence of tasks with the earliest schedule of their steps in the given order."""
         plan = Plan(renumbered(step for one in stretches for step in one.steps))
         steps = plan.primitives
         self.spend(SCHEDULING * len(steps))
