@@ -1,4 +1,4 @@
-"""Derivation of the defined situation types (derived predicates) that a query names, in a scene's initial state."""
+"""Derivation of the defined situation types (derived predicates), sums and counts that a query names, in the initial state."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ASK {
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write the initial facts of each defined situation type that a query names into the named graph `DERIVED`."""
+    """Write the initial facts of each defined situation type, sum or count that a query names into the named graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):
@@ -38,15 +38,19 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
     reading = read()
     problem, properties = reading.problem, value_properties(graph)
     classes: dict[str, list[str]] = {}
-    for situation in problem.domain.rules:
+    totals = [name for name, one in problem.domain.aggregates.items() if one.kept]
+    for situation in (*problem.domain.rules, *totals):
         iri = reading.names.iri(situation)
         of = list(reading.schema.nodes[iri].get(CORE + "holdsOf", ()))
         words = (local_name(one) for one in (iri, properties.get(iri, iri), *of))
         if any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", sparql) for word in words):
             classes[situation] = of
-    for count, symbol in enumerate(_following(problem, classes)):
-        prop = properties.get(reading.names.iri(symbol.situation))
-        triples = list(said(reading, Fact(symbol, TRUE), prop, ox.BlankNode(f"follows{count}")))
+    facts = [Fact(symbol, TRUE) for symbol in _following(problem, [name for name in classes if name not in totals])]
+    amounts = sorted(symbol for symbol in problem.initial if symbol.situation in totals and symbol.situation in classes)
+    facts += [Fact(symbol, problem.initial[symbol]) for symbol in amounts]
+    for count, fact in enumerate(facts):
+        symbol, prop = fact.symbol, properties.get(reading.names.iri(fact.symbol.situation))
+        triples = list(said(reading, fact, prop, ox.BlankNode(f"follows{count}")))
         about = ox.NamedNode(reading.names.iri(symbol.arguments[0]))
         triples += [ox.Triple(about, ox.NamedNode(TYPE), ox.NamedNode(kind)) for kind in classes[symbol.situation]]
         graph.store.extend(ox.Quad(one.subject, one.predicate, one.object, name) for one in triples)

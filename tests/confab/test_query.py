@@ -200,3 +200,10 @@ def test_working_out_what_follows_keeps_to_the_time_of_the_query() -> None:
         list(_following(problem, ["INSIDE"]))
     with pytest.raises(LimitError):
         confab.load("packing-small").query(INSIDE, QueryLimits(seconds=0.0))
+
+
+def test_a_query_finds_the_sums_and_counts_that_it_names() -> None:
+    carts = confab.load("carts-small")
+    assert carts.query("SELECT ?cart ?load WHERE { ?cart d:load ?load }").values() == [("cart", 0)]
+    stock = carts.query("SELECT ?rack ?stock WHERE { ?rack d:stock ?stock } ORDER BY ?rack").values()
+    assert stock == [("shop", 0), ("store", 3)]
