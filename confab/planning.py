@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from confab.why import Account, Because, WhyNot
 
 OURS = 0.6
-"""Share of the time limit for Confab's own search if an installed engine is tried after the search."""
+"""Share of the time limit for Confab's own search if an installed engine is tried, or the plan is scheduled, after the search."""
 OURS_WORK = 10_000_000
 """Work limit of Confab's own search (number of states times operators) if an engine is tried and there is no time limit.
 
@@ -195,11 +195,10 @@ def _plan(
             return certified(problem, plan_by_engine(problem, engine, options.level, deadline.left))
         others, seconds = options.leave_levels and engine != NO_ENGINE, deadline.left
         if seconds is not None:
-            seconds *= share
-        if others and seconds is not None:
             from confab.engines import some_installed
 
-            seconds *= OURS if some_installed(problem) else 1.0
+            more = asks_for_times(problem, options.minimise) or (others and some_installed(problem))
+            seconds *= share * (OURS if more else 1.0)
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
         request = Request(alike, mode, Limits(seconds=seconds), advisor, links, grounds, options.leave_levels)
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib.util import find_spec
@@ -26,6 +27,7 @@ from confab.planner.timed.schedules import (
 )
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Cell, validate
+from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
@@ -62,14 +64,19 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     def left(parts: int) -> float | None:
         return None if until is None else max(until - perf_counter(), 0.0) / parts
 
-    first = in_time(problem, plan, left(3))
+    try:
+        first = in_time(problem, plan, left(3))
+    except LimitError as limit:
+        return Timed(reason=Reason(str(limit)))
     if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.work, first.plan.makespan)):
         return first
     half = left(2)
     other = shared(problem, plan, None if half is None else perf_counter() + half, shorten)
     if other is None:
         return first
-    found = in_time(problem, other, left(1))
+    found = Timed()
+    with suppress(LimitError):
+        found = in_time(problem, other, left(1))
     if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):
         return first
     return found

@@ -17,9 +17,11 @@ from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.limits import within
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, Symbol, Times
 from confab.reasoner.timing import only_during
+from confab.timing import scheduled
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
 
@@ -124,6 +126,15 @@ def test_a_deadline_bounds_the_begin_of_a_step_that_achieves_its_goal_at_the_sta
     _, timed = planned(problem_of(world))
     assert timed is not None
     assert timed.plan is not None
+
+
+def test_a_schedule_for_which_no_time_is_left_is_given_up_by_name() -> None:
+    outcome = plan(serving())
+    with within(0.0) as deadline:
+        told, timed = scheduled(serving(), outcome, deadline, shorten=True)
+    assert (told.status, timed) == (Status.GAVE_UP, None)
+    assert told.reason is not None
+    assert "while finding the order" in told.reason.text
 
 
 def test_a_plan_that_leaves_a_level_keeps_its_stretches_in_time(tmp_path: Path) -> None:
