@@ -22,19 +22,21 @@ from benchmarks.mutants import ROOT, Instead, faults, meaning
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import RandomWorld, drawn
 
-PARTS: dict[str, tuple[tuple[str, ...], str]] = {
-    "recognition": (("reasoner/reading/relevance.py",), "guarded"),
-    "proofs": (("planner/hierarchical/unsolvability.py", "planner/certifying.py"), "guarded"),
-    "checker of plans": (
-        ("planner/validation.py", *sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))),
-        "checker",
+CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
+PARTS: dict[str, dict[str, str]] = {
+    "recognition": {"reasoner/reading/relevance.py": "guarded"},
+    "proofs": {"planner/hierarchical/unsolvability.py": "guarded", "planner/certifying.py": "proofs"},
+    "checker of plans": dict.fromkeys(("planner/validation.py", *CHECKERS), "checker"),
+    "checker of certificates": dict.fromkeys(
+        ("planner/certificate_checks.py", "planner/possibilities.py"), "certificates"
     ),
-    "checker of certificates": (("planner/certificate_checks.py", "planner/possibilities.py"), "certificates"),
 }
-"""The modules of each part, and the mode in which worlds are judged.
+"""The modules of each part, each with the mode in which worlds are judged.
 
-Proofs are judged in worlds without a plan. A planner that gives up in a world without a plan counts as a fault of a proof.
+A planner that gives up in a world without a plan counts as a fault of a proof.
 """
+WITHOUT_PLANS = ("proofs", "checker of certificates")
+"""Parts whose faults are mostly detected by worlds without a plan, which are judged first."""
 FIRST, WORLDS, SECONDS, WAITING = 8_000_000, 150, 60, 600.0
 """First seed and number of worlds, CPU seconds for all worlds, and seconds by the clock for a call on a busy machine."""
 Drawn = tuple[RandomWorld, Interpreter]
@@ -47,17 +49,16 @@ def kills(many: int, into: Path) -> None:
     known: dict[str, dict[str, str]] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
     worlds = [drawn(seed) for seed in range(FIRST, FIRST + WORLDS)]
     print("| part | module | faults tried | noticed | share |\n|---|---|---|---|---|")
-    for part, (files, mode) in PARTS.items():
-        present = [file for file in files if (ROOT / file).is_file()]
-        useful = [one for one in worlds if part != "proofs" or hopeless(one[1])]
+    for part, files in PARTS.items():
+        useful = sorted(worlds, key=lambda one: hopeless(one[1]) is not (part in WITHOUT_PLANS))
         total = [0, 0]
-        for file in present:
+        for file, mode in files.items():
             source = (ROOT / file).read_text("utf-8")
             its = known.setdefault(f"{file} {hashlib.sha256(meaning(source).encode()).hexdigest()[:12]}", {})
             before = complained(file, source, useful, mode, set())
             if not isinstance(before, set):
                 raise SystemExit(f"{file}: the worlds can't be judged without any fault")
-            share = -(-many // len(present))
+            share = -(-many // len(files))
             for (name, number), text in islice(faults(source, Random(file)), share):
                 key = f"{name.removeprefix('core/')}:{number}"
                 if key not in its:

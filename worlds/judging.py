@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 
 from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
+from confab.planner.certificates import Certificate
 from confab.planner.plan import Outcome, Plan, Status
 from confab.planner.validation import validate
 from confab.planning import plan
@@ -44,6 +45,8 @@ OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3,
 """Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
 LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
+FEW_STATES = 100
+"""Maximum number of states of a world whose certificate of all states takes little work."""
 MOST_ACTIONS = 1_500
 """Maximum number of grounded behaviours of an imported problem for the exhaustive search."""
 T = TypeVar("T")
@@ -191,7 +194,9 @@ class Judge:
             modes["optimal"] = {"mode": "optimal"}
         if len(self.world.problem.domain.levels) > 1 and self.sampled(STRICT, "strict", "strict"):
             modes["strict levels"] = {"leave_levels": False}
-        if self.only and "/" not in self.only:
+        if self.only == "proofs":
+            modes = {}
+        elif self.only and "/" not in self.only:
             first = self.only if self.only in modes else "guarded"
             modes = {first: modes[first]}
         results = {mode: self.outcome(read, mode, **options) for mode, options in modes.items()}
@@ -209,6 +214,8 @@ class Judge:
             self.call("checker", lambda: self.checker(read, plans))
         if self.sampled(CERTIFICATES, "certificates", "certificates"):
             self.call("certificates", lambda: self.false_certificates(read))
+        if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
+            self.call("proofs", lambda: self.proofs(read))
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
@@ -263,6 +270,10 @@ class Judge:
         if certificate is None:
             self.complain("uncertified", mode, outcome.reason.text if outcome.reason else "")
             return
+        self.claims(mode, certificate)
+
+    def claims(self, mode: str, certificate: Certificate) -> None:
+        """Compare the claims of a certificate with all reachable states."""
         for fact in certificate.never:
             if any(self.meant.meets(state, fact.symbol, fact.value) for state in self.reached):
                 self.complain("a false certificate", mode, f"{fact} can come to hold")
@@ -285,6 +296,30 @@ class Judge:
                 text = "; ".join(f"{step.path} {step.behavior} {' '.join(step.arguments)}" for step in steps.walk())
                 self.complain(what, "checker", f"{meant[:1]} {[one.text for one in said[:1]]}: {text}")
                 return
+
+    def proofs(self, read: Scene) -> None:
+        """Certify the task without a search, and judge the certificate without the planner.
+
+        The planner hides a wrong certificate, since it gives up if the checker rejects the certificate.
+        """
+        from confab.planner.certificate_checks import refusal
+        from confab.planner.certifying import certify
+
+        problem = read.reading.problem
+        for few_states in (False, True):
+            mode = f"proofs {'of all states' if few_states else 'by facts'}"
+            found = certify(problem, CERTIFYING, few_states)
+            if found is None:
+                if self.found.known and self.found.least is None:
+                    self.found.remarks.append(Complaint("no certificate", mode, ""))
+                continue
+            if self.found.least is not None and self.surely is not None:
+                self.complain("a certificate although there is a plan", mode, found)
+            if said := refusal(problem, found):
+                self.complain("a certificate that its checker rejects", mode, f"{said}: {found}")
+            if few_states and self.found.known and self.found.states <= FEW_STATES and (found.never or found.always):
+                self.found.remarks.append(Complaint("another proof than by few states", mode, str(found)[:400]))
+            self.claims(mode, found)
 
     def false_certificates(self, read: Scene) -> None:
         """Test the certificate checker with certificates of tasks that lack one behaviour.
