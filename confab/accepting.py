@@ -135,6 +135,11 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
         raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")
 
 
+def shipped_queries() -> dict[str, Path]:
+    """Return the files of the shipped queries by name."""
+    return {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+
+
 def sparql_of(given: str | Path) -> str:
     """Return the text of a SPARQL query, which is given as text, as a file, or by the name of a shipped query.
 
@@ -161,9 +166,9 @@ def sparql_of(given: str | Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     if path.suffix or "/" in given:
         raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
-    ready = {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+    ready = shipped_queries()
     if given in ready:
         return ready[given].read_text(encoding="utf-8")
-    if given.replace("-", "").isalpha() and " " not in given:
+    if given.replace("-", "").isalpha() or "-".join(given.split()) in ready:
         raise KnowledgeError(f"no shipped query '{given}'{nearest(given, ready)} (shipped: {', '.join(ready)})")
     return given

@@ -12,7 +12,7 @@ MODULE = {
     "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
     "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
     "from_graph from_string from_text loads load_domain load_problem Domain Robot Task get_scene get_problem "
-    "import_scene open_scene gym Kitchen reader OWLReader Model Dataset Store",
+    "import_scene open_scene make gym Kitchen reader OWLReader Model Dataset Store",
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
     "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
     "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner "
@@ -32,7 +32,7 @@ MODULE = {
     "confab.validate(FILE)": "check lint verify_file validate_scene shacl Validator is_valid consistent "
     "is_consistent sync_reasoner reasoner check_scene validate_file validate_ontology pyshacl check_consistency",
     "confab.generate(FAMILY, …)": "make_scene random_scene generate_scene Generator random synthetic families",
-    "confab.new_domain(NAME)": "new_ontology create_domain init new create make make_domain scaffold template "
+    "confab.new_domain(NAME)": "new_ontology create_domain init new create make_domain scaffold template "
     "new_scene create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator "
     "InstantaneousAction DurativeAction define UserType Variable add_action Situation build",
     "confab.load(SCENE).read_plan(FILE)": "load_plan read_plan parse_plan open_plan plan_from_file from_plan",
@@ -117,8 +117,8 @@ SCENE = {
     "valid_actions action_mask get_legal_actions get_applicable_actions successors can can_do is_applicable "
     "possible feasible_actions applicable_operators",
     "owl": "owlready ontology onto world get_ontology to_owl owlready2 default_world load_owl",
-    "embodiment": "robot robots arms body urdf hands gripper joints geometry kinematics meshes poses get_robot "
-    "workspace links arm robot_model agents",
+    "embodiment.robots": "robot robots get_robot robot_model",
+    "embodiment": "arms body urdf hands gripper joints geometry kinematics meshes poses workspace links arm agents",
     "iri": "name uri base_iri namespace identifier namespaces prefixes ns base url id title label",
     "knowledge.path": "path file filename source location folder",
     "serve": "endpoint server start_server web api host http app rest open_page browser",
@@ -200,7 +200,7 @@ RESULT = {
     "faults(PLAN)": "errors problems violations check_faults",
 }
 PLAN = {
-    "steps": "subplans actions action_list sequence get_steps children nodes items values step action_names "
+    "steps": "plan subplans actions action_list sequence get_steps children nodes items values step action_names "
     "top_level roots to_list list as_list root first",
     "primitives": "leaves low_level atoms primitive_actions flat flatten lowest leaf_steps commands motions atomic "
     "flattened ground_actions linear bottom",
@@ -345,7 +345,7 @@ MEMORY = {
     "merge(OTHER)": "combine join union extend add_memory update_from plus merge_with concat share sync",
     "table()": "counts stats statistics dataframe to_dataframe show links_table entries episodes rows list print "
     "to_pandas df items all size len length num_episodes n_episodes records num_rules summary describe info data "
-    "count to_json to_dict json",
+    "count to_json to_dict json probability probabilities likelihood confidence cogency",
     "advice()": "rules advise suggest suggestions recommend preferences weights learned what_learned insights "
     "predict policy best model get_rules parameters coefficients",
     "confab.Memory.of(SCENE) (a new memory)": "clear reset forget wipe delete erase remove empty_out unlearn drop",

@@ -17,7 +17,7 @@ from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
 from confab.reasoner.names import GUESSING, Named, Names, RightNames, nearest, right_names
-from confab.reasoner.reading.goals import parse_fact
+from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.reading.problem import Reading, read, read_names
 from confab.reasoner.symbols import Behavior, Fact, Problem
 from confab.table import Table
@@ -407,7 +407,9 @@ class Known(metaclass=RightNames):
 
         known = self.problem.individuals
         if of not in (None, "all", *known):
-            raise KnowledgeError(f"unknown object '{of}'{nearest(str(of), known)}")
+            raise KnowledgeError(
+                f"unknown object '{of}'{nearest(str(of), known, f'known: {some_of([*self.objects])}')}"
+            )
         found = affordances(self.knowledge, self.reading)
         return Table(
             ("object", "behavior", "arguments", "situation", "effect"),

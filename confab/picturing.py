@@ -233,7 +233,9 @@ def _table(scene: Known, path: Path) -> Path:
     from confab.sim.world import PhysicsWorld
 
     if not scene.embodiment.places:
-        raise KnowledgeError(f"{scene.iri} has no places with coordinates, so there is no table to show")
+        raise KnowledgeError(
+            f"{scene.iri} has no places with coordinates, so there is no table to show; the classes or a behaviour can be drawn"
+        )
     scene = with_reach(scene)
     reached = scene.problem.relations.get(local_name(reach_relation(scene.knowledge)), frozenset())
     try:

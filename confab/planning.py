@@ -9,7 +9,7 @@ from functools import cached_property, partial
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, TypeAlias, cast, overload
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
@@ -124,8 +124,11 @@ def plan(
         The time limit passed before the search began. If the limit passes during the search, the status of the outcome is "gave
         up".
     """
+    facts = [*several(goals), *several(goal)]
+    for word in (fact for fact in facts if " " not in fact.strip()):
+        raise KnowledgeError(f"the goal '{word}' is no fact; wanted one text, 'object SITUATION value'")
     options = PlanOptions(memory, mode, time_limit, optimal, observed, engine, level, leave_levels, minimise)
-    return plan_by(scene, [*several(goals), *several(goal)], options)
+    return plan_by(scene, facts, options)
 
 
 def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
@@ -466,11 +469,21 @@ class Result(metaclass=RightNames):
         whole = with_goals(self.scene.problem, self.goals)
         return replace(self, problem=whole.only(self.outcome.unmet), part=None)
 
-    def explain(self) -> Account:
-        """Return why each step is in the plan; without a plan, return the reason why there is no plan."""
+    @overload
+    def explain(self) -> Account: ...
+    @overload
+    def explain(self, step: AnyStep) -> Because: ...
+
+    def explain(self, step: AnyStep | None = None) -> Account | Because:
+        """Return why each step is in the plan; without a plan, return the reason why there is no plan.
+
+        With `step`, return why this step is in the plan, like `why`.
+        """
         from confab.show import summary
         from confab.why import Account, account, proved
 
+        if step is not None:
+            return self.why(step)
         headline = summary(self.outcome)
         if self.solved:
             return account(self.plan, self.purposes, self.labels, headline)

@@ -115,7 +115,7 @@ def summary(outcome: Outcome) -> str:
     expanded = sum(counts.expanded for counts in outcome.search.values())
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"
-        return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
+        return f"{outcome.status.value}: {reason} ({expanded} expansion{'s' * (expanded != 1)}, {outcome.seconds * 1000:.0f} ms)"
     unmet = [f"leaves a soft goal unmet: {one}" for one in outcome.forgone]
     if not outcome.plan.steps:
         goals = "all goals that must be met" if unmet else "all goals"
@@ -128,7 +128,7 @@ def summary(outcome: Outcome) -> str:
         if not counts or min(counts) == 1
         else f" on level{'s' * (len(counts) > 1)} {' / '.join(map(str, counts))}"
     )
-    effort = f"{expanded} expansions in all"
+    effort = f"{expanded} expansion{'s' * (expanded != 1)} in all"
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
     breaks = [broken.text for left in outcome.left for broken in left.broken]

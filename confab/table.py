@@ -7,7 +7,7 @@ import html
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, SupportsIndex, TypeAlias, overload
+from typing import TYPE_CHECKING, NoReturn, SupportsIndex, TypeAlias, overload
 
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest, right_names
@@ -37,6 +37,14 @@ class Row(tuple[str | None, ...]):
     def __getnewargs__(self) -> tuple[tuple[str | None, ...], tuple[str, ...]]:
         """Return the arguments of `__new__` for copying and pickling."""
         return tuple(self), self._fields
+
+    if not TYPE_CHECKING:  # type checkers report wrong names by themselves
+
+        def __getattr__(self, name: str) -> NoReturn:
+            """Raise `AttributeError`: cells aren't attributes."""
+            columns = () if name.startswith("_") else self._fields
+            hint = f"; use row['{name}']" if name in columns else f" (columns: {', '.join(columns)})"
+            raise AttributeError(f"a row has no '{name}'{hint}")
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str | None: ...

@@ -18,7 +18,7 @@ from confab.planner.plan_costs import cost_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import check
 from confab.reasoner.names import nearest
-from confab.reasoner.reading.goals import parse_fact
+from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 
 MOST_TOLD = 12
@@ -298,7 +298,8 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
         shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in alike[:6])
         raise KnowledgeError(f"'{asked}' names {len(alike)} steps: {shown}; give one")
     known = [text for step in steps for text in (labels.step(step), str(step))]
-    raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, 'confab explain SCENE lists its steps')}")
+    hint = f"steps: {some_of([labels.step(step) for step in steps])}"
+    raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, hint)}")
 
 
 def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels) -> Because:
@@ -423,9 +424,10 @@ def why_not(
         )
     by = BY.search(asked)
     fact = BY.sub("", asked.strip())
-    if len(fact.split()) < 2 or fact.split()[1] not in problem.domain.situations:
+    words = [*fact.split(), "", ""]
+    if words[1] not in problem.domain.situations and (not words[2] or first not in problem.individuals):
         known = [*problem.domain.behaviors, *problem.domain.situations]
-        hint = nearest(first, problem.domain.behaviors) or nearest([*fact.split(), "", ""][1], known)
+        hint = nearest(first, problem.domain.behaviors) or nearest(words[1], known)
         raise KnowledgeError(
             f"'{asked}' is neither a fact (cup2 LOCATION location8, maybe with 'by left_hand') nor a behaviour{hint}"
         )

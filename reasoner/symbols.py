@@ -91,6 +91,7 @@ class SituationType:
     - `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
     - With a `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
     - `perceived` states how the values are perceived in physics; None for values that aren't perceived.
+    - `properties` are the names of the value properties.
     """
 
     name: str
@@ -102,6 +103,7 @@ class SituationType:
     boolean: bool = False
     quantity: Quantity | None = None
     perceived: Perceived | None = None
+    properties: tuple[str, ...] = field(default=(), compare=False)
 
 
 # ---------------------------------------------------------------------------------------------------------- conditions

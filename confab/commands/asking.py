@@ -148,7 +148,12 @@ def query(
             print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
             return
         if sparql is None and affords is None:
-            raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
+            from confab.accepting import shipped_queries
+
+            shipped = ", ".join(shipped_queries())
+            raise KnowledgeError(
+                f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --show BEHAVIOR or --affords OBJECT"
+            )
         if out is not None and out.suffix.lower() == ".ttl":
             if sparql is None:
                 raise KnowledgeError("-o FILE.ttl needs the triples of a CONSTRUCT query; also give the query")

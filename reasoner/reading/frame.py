@@ -422,6 +422,7 @@ def _situations(
                 boolean=boolean,
                 quantity=quantity,
                 perceived=_perceived(schema, iri, iri in read.exclusive),
+                properties=tuple(map(schema.names.short, value_property)),
             )
         )
         if quantity and (amount := schema.decimal(iri, "defaultAmount")) is not None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 
 from confab.reasoner.aggregates.extrema import with_extrema
 from confab.reasoner.amounts import (
@@ -26,6 +27,7 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     Domain,
+    Fact,
     Parameter,
     Problem,
     Rule,
@@ -73,23 +75,19 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         A word is unknown; the message suggests the most similar known name.
     """
     words = fact.split()
-    individuals = problem.individuals
-    if len(words) < 2:
-        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
-    about, name, *rest = words
-    if name not in problem.domain.situations and (len(words) == 2 or about not in individuals):
-        raise KnowledgeError(
-            f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'"
-            f"{nearest(name, problem.domain.situations) if len(words) > 2 else ''}"
-        )
+    individuals, known = problem.individuals, problem.domain.situations
+    about, name, *rest = words if len(words) > 1 else ("", "")
+    if name not in known and (len(words) < 3 or about not in individuals):
+        example = next((f", e.g. '{Fact(*one)}'" for one in chain(problem.goal.items(), problem.initial.items())), "")
+        meant = nearest(name, known) if len(words) > 2 else ""
+        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value'{example}{meant}")
     if about not in individuals:
         raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
-    if name not in problem.domain.situations:
-        known = problem.domain.situations
-        raise KnowledgeError(
-            f"unknown situation type '{name}' in '{fact}'{nearest(name, known)} (known: {', '.join(known)})"
-        )
-    situation = problem.domain.situations[name]
+    if name not in known:
+        meant = next((each for each, situation in known.items() if name in situation.properties), "")
+        hint = f"; it is the value property of {meant}" if meant else nearest(name, known)
+        raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(known)})")
+    situation = known[name]
     if situation.boolean and len(rest) == len(situation.arguments) - 1:
         rest.append(TRUE)
     if len(rest) != len(situation.arguments):

@@ -235,3 +235,52 @@ def test_a_negative_time_limit_and_a_word_as_an_index_are_refused(scene: confab.
         scene.plan(time_limit=-1)
     with pytest.raises(TypeError, match=r"plan\[0\]"):
         result.plan["B1_MOVE"]  # type: ignore[call-overload]
+
+
+def test_three_words_of_a_goal_as_three_arguments_say_that_a_goal_is_one_text(scene: confab.Scene) -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"the goal 'cup2' is no fact; wanted one text"):
+        scene.plan("cup2", "LOCATION", "location8")  # type: ignore[arg-type]
+
+
+def test_a_value_property_in_a_fact_names_its_situation_type(scene: confab.Scene, result: confab.Result) -> None:
+    for call in (scene.plan, scene.with_fact, result.why_not):
+        with pytest.raises(confab.KnowledgeError, match="it is the value property of BEVERAGE"):
+            call("cup1 beverage beverage1")
+
+
+def test_an_incomplete_fact_gets_an_example_of_its_own_scene(scene: confab.Scene) -> None:
+    with pytest.raises(
+        confab.KnowledgeError, match=r"is no fact; wanted 'object SITUATION value', e\.g\. '.+'"
+    ) as told:
+        scene.with_fact("cup1")
+    assert str(told.value).rpartition("e.g. ")[2].strip("'") in scene.goals
+
+
+def test_a_step_is_explained_like_why_and_an_unknown_one_gets_the_steps(result: confab.Result) -> None:
+    step = result.plan[0]
+    assert result.explain(step) == result.why(step)
+    with pytest.raises(confab.KnowledgeError, match=re.escape(result.labels.step(step))):
+        result.why("xyzzy")
+
+
+def test_a_row_asked_for_an_attribute_names_the_index_or_the_columns(scene: confab.Scene) -> None:
+    row = scene.query("SELECT ?object ?place { ?object k:location ?place }")[0]
+    with pytest.raises(AttributeError, match=r"use row\['object'\]"):
+        getattr(row, "object")  # noqa: B009
+    with pytest.raises(AttributeError, match=r"columns: object, place"):
+        getattr(row, "subject")  # noqa: B009
+    assert copy.deepcopy(row) == pickle.loads(pickle.dumps(row)) == row
+
+
+def test_a_part_of_a_scene_s_name_names_the_scenes_that_contain_it() -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"\(beverage-serving-moved, beverage-serving\)"):
+        confab.load("beverage")
+    with pytest.raises(confab.KnowledgeError, match=r"no scene 'nosuch\.ttl': there is no such file$"):
+        confab.load("nosuch.ttl")
+
+
+def test_a_query_in_words_and_a_call_without_a_query_name_the_shipped_queries(scene: confab.Scene) -> None:
+    with pytest.raises(confab.KnowledgeError, match="did you mean 'what-is-wanted'"):
+        scene.query("what is wanted")
+    line = [sys.executable, "-m", "confab", "query", "beverage-serving-moved"]
+    assert "what-is-wanted" in subprocess.run(line, capture_output=True, text=True, check=False).stderr
