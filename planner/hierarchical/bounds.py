@@ -59,9 +59,11 @@ def plan(
     """
     begin = perf_counter()
     deadline = limits.end(SEARCHING)
-    using = using or compiled(problem)
+    with suppress(LimitError):
+        using = using or compiled(problem)
     best = hierarchical_plan(problem, limits=limits.until(deadline), using=using)
-    best = _shortened(problem, best, limits, using, deadline)
+    if using is not None:
+        best = _shortened(problem, best, limits, using, deadline)
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)

@@ -100,7 +100,10 @@ def _plan(
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED and deadline is None:
             return flat
-    call = Call(problem, using or compiled(problem), deadline, limits.expansions)
+    try:
+        call = Call(problem, using or compiled(problem), deadline, limits.expansions)
+    except LimitError as limit:
+        return flat or Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
     call.space.most_work = limits.work
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
