@@ -237,11 +237,15 @@ class Cases:
                 self.fault = f"there is no {symbol}"
                 return None
             if lowest.quantity(symbol.situation) is not None and certificate.told_apart.get(symbol):
-                self.fault = f"amounts of {symbol} are told apart one by one only"
+                self.fault = (
+                    f"the certificate lists amounts of {symbol}; it may only distinguish all amounts of a symbol"
+                )
                 return None
         for fact in certificate.never:
             if lowest.quantity(fact.symbol.situation) is not None:
-                self.fault = f"{fact}: of an amount bounds have to be told that always hold"
+                self.fault = (
+                    f"{fact}: the certificate must claim bounds that always hold for an amount, not single amounts"
+                )
                 return None
             if lowest.initial(fact.symbol) == fact.value:
                 self.fault = f"{fact} holds in the beginning"

@@ -31,9 +31,9 @@ class Certificate:
     always : mapping of Symbol to value
         Symbols that keep their initial value; for an amount, the bounds within which it stays.
     told_apart : mapping of Symbol to values
-        Symbols with the values that are distinguished from each other and from all others; without values, all are distinguished.
+        Symbols with the values that are distinguished from each other and from all other values; an empty tuple means all values.
     cases : int
-        Number of reachable combinations of these values; in each of them the goal doesn't hold.
+        Number of reachable combinations of distinguished values; the goal holds in none of these combinations.
     unmet : tuple of Fact
         Goals of which at least one doesn't hold in each case.
     """

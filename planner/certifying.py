@@ -164,7 +164,7 @@ class Relaxed:
         return self._ask((LEAVES, symbol, value))
 
     def between(self, symbol: Symbol) -> Range:
-        """Return the amounts that a symbol can get; a derived amount can get all that its definition allows."""
+        """Return the range of the amounts that a symbol can get; the definition of a derived amount determines its range."""
         if symbol.situation in self.problem.domain.aggregates:
             return self.lowest.allowed(symbol)
         first = self.lowest.initial(symbol)

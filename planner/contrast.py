@@ -155,7 +155,7 @@ def _beyond(
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
-    """Return a behaviour that changes a symbol only with an individual in one of its suitable roles, if any."""
+    """Return a behaviour that changes a symbol only with an individual in a suitable role, if it has a suitable role."""
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip

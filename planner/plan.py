@@ -213,7 +213,7 @@ class Reason:
     states: int = 0
 
 
-OUT_OF_MEMORY = Reason("there isn't enough memory to go on")
+OUT_OF_MEMORY = Reason("there isn't enough memory to continue planning")
 
 
 @dataclass(frozen=True)

@@ -189,7 +189,11 @@ class _Check:
         changes = self.rules.changes(behavior, step.arguments, self.facts)
         if changes is None:
             beyond = self.rules.beyond(behavior, step.arguments, self.facts)
-            why = f"{beyond[1]} would be out of bounds" if beyond else "its preconditions don't hold where it is done"
+            why = (
+                f"{beyond[1]} would be out of bounds"
+                if beyond
+                else "its preconditions don't hold in the state before it"
+            )
             self.fault(step.path, f"{step}: {why}")
             return False
         mark = len(self.facts.log)
@@ -197,7 +201,7 @@ class _Check:
             for situation, arguments, value in changes:
                 self.facts.put(situation, arguments, value)
             if behavior.level < self.depth and self.facts.since(mark):
-                self.fault(step.path, f"{step}: it isn't refined, and other steps are")
+                self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
             return self.within_bounds(step)
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
         if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):

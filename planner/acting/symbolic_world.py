@@ -175,7 +175,7 @@ def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual
 
 
 def _is_whereabouts(problem: Problem, situation: str) -> bool:
-    """Return whether a situation type shares values with another one, so that a change of place changes both."""
+    """Return whether a situation type shares values with another situation type, so that a change of place changes both."""
     own = set(problem.classes.get(problem.domain.situations[situation].range, ()))
     return any(
         own & set(problem.classes.get(other.range, ()))

@@ -23,11 +23,12 @@ Path: TypeAlias = "tuple[int, list[int]]"
 def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
     """Return a function that executes a relaxed plan from a state as far as possible.
 
-    The function returns the final state and the executed operators. If no operator of the plan is applicable, the function replaces
-    an operator by an applicable operator that sets the same bit for a later operator or the goal. For example, a truck that has
-    moved north starts from its new place. If there is no replacement, the function inserts an operator that sets the only missing
-    bit of other operators. For example, the truck drives back, and the next parcel can be loaded. Among several operators to
-    insert, the function selects the operator after which the rest of the plan achieves the most goals.
+    The function returns the final state and the executed operators. If no operator of the plan is applicable, the function
+    replaces an operator by an applicable operator that sets the same bit for a later operator or the goal. For example, a truck
+    that has moved north starts from its new place. If there is no replacement, the function inserts an operator that sets the
+    only missing bit of other operators. For example, a truck is moved back to the place where the next parcel can be loaded.
+    Among several operators to insert, the function selects the operator after which the rest of the plan achieves the most
+    goals.
     """
 
     @cache

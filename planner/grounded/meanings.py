@@ -117,7 +117,7 @@ def _meaning(
 ) -> None:
     """Enter the meaning of a bit into `means`.
 
-    The meaning of a bit with a single alternative is the bits of this alternative. The meaning of any other bit is the bit.
+    The meaning of a bit with a single alternative is the bits of this alternative. Every other bit means itself.
     """
     waiting = [bit]
     while waiting:

@@ -161,7 +161,9 @@ class _Course:
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
         if seconds is None:
-            raise InapplicableError(f"{step} has no duration there: its calculation gives no number of 0 or more")
+            raise InapplicableError(
+                f"{step} has no duration in its state: the calculation gives no number of 0 or more"
+            )
         self.seconds[number] = seconds
         self.made[number]["begin"] = self.done(step, pieces.begin, terms, True)
         self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
@@ -182,7 +184,7 @@ class _Course:
         reads = facts.noted()
         if changes is None:
             raise InapplicableError(
-                f"{step}: its conditions ({piece.name.rsplit('@')[-1]}) don't hold where it is done"
+                f"{step}: its conditions ({piece.name.rsplit('@')[-1]}) don't hold in the state before it"
             )
         before = {(name, key): Facts.value(facts, name, key) or "" for name, key, _ in changes}
         writes = {(name, key): (before[name, key], value) for name, key, value in changes}

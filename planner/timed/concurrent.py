@@ -80,7 +80,9 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
         return Outcome(Status.GAVE_UP, reason=said, seconds=perf_counter() - began), Timed(reason=said)
 
     if len(problem.domain.levels) > 1:
-        return ended("steps that need others meanwhile are planned on scenes with one level only; this one has more")
+        return ended(
+            "steps that need concurrent steps can be planned only on scenes with one level; this scene has more"
+        )
     deadline = limits.end()
     some, every = only_during(problem), frozenset(name for name, b in problem.domain.behaviors.items() if b.timing)
     counts = Counts()
@@ -103,7 +105,7 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
         return ended(str(error))
     except MemoryError:
         return ended(OUT_OF_MEMORY.text)
-    return ended("no plan was found whose steps fit into one another in time")
+    return ended("no plan was found whose concurrent steps have a schedule")
 
 
 @dataclass(frozen=True)
@@ -320,7 +322,7 @@ class _Finder:
         number = 0
         queue: list[tuple[int, int, int, _Node, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
         while queue and len(came_from) < MOST_STATES:
-            check("searching for steps that fit into one another", 0.0)
+            check("searching for concurrent steps", 0.0)
             if self.deadline is not None and perf_counter() > self.deadline:
                 return
             h, tries, _, node, operators = heapq.heappop(queue)

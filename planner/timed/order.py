@@ -245,8 +245,8 @@ def _chained(
                 if same and other.written is None:
                     continue
                 raise InapplicableError(
-                    f"{activities[record.activity].step} is done while {activities[other.activity].step} needs "
-                    "what it changes, or changes what it needs"
+                    f"{activities[record.activity].step} overlaps with {activities[other.activity].step}, and one of them "
+                    "changes a fact that the other needs or changes"
                 )
             yield other.activity, other.high, record.activity, record.low
         if record.written is None:
@@ -274,7 +274,7 @@ def _touching(
                     continue
                 one, other = (touch, look) if touch.position < look.position else (look, touch)
                 if one.high == END and ends[one.activity] > other.position:
-                    raise InapplicableError("a step looks for what another one that isn't over changes")
+                    raise InapplicableError("a step reads a value that another step is still changing")
                 yield one.activity, one.high, other.activity, other.low
 
 

@@ -306,8 +306,9 @@ class _Search:
     def changed(self, now: _Sequence, random: Random) -> list[Task]:
         """Return the tasks of a sequence after one random change.
 
-        One task gets another crew, two exchange their crews, an actor or a step of one is barred, or one gets another position. If
-        a step is late, it may become a task of its own that is done early, or such a task is dropped.
+        The change assigns another crew to a task, exchanges the crews of two tasks, bars an actor or a step of a task, or moves a
+        task to another position. If the schedule is late, the change may also add a late step as an early task, or drop an early
+        task.
         """
         tasks = list(now.tasks)
         i, step, actors, above = random.choice(now.critical)

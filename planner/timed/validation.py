@@ -182,7 +182,7 @@ class _Clock:
         facts.clear()
         making = self.rules.changes(pieces.middle, terms, facts)
         if making is None:
-            yield Fault(step.path, f"{step}: what it asks throughout doesn't hold at its begin ({time} s)")
+            yield Fault(step.path, f"{step}: a condition throughout the step doesn't hold at its begin ({time} s)")
             return
         yield from self.foreign(one, [(name, key) for name, key, _ in making], time)
         one.making = making
@@ -199,7 +199,9 @@ class _Clock:
             wanted = dict(self.sequence[0][number])
             if self.made[number] != wanted:
                 cells = sorted({c for c, _ in self.made[number].items() ^ wanted.items()})
-                yield Fault(one.slot.step.path, f"{one.slot.step}: it changes {cells[0][0]} otherwise than in sequence")
+                yield Fault(
+                    one.slot.step.path, f"{one.slot.step}: it changes {cells[0][0]} in another way than in sequence"
+                )
 
     def done(self, one: _Running, piece: Behavior, time: Fraction) -> Iterator[Fault]:
         """Execute the begin or the end of a step; yield its faults."""
@@ -209,7 +211,7 @@ class _Clock:
         changes = self.rules.changes(piece, one.terms, self.facts)
         if changes is None:
             what = piece.name.rsplit("@")[-1]
-            yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks ({what}) doesn't hold at {time} s")
+            yield Fault(one.slot.step.path, f"{one.slot.step}: a condition ({what}) doesn't hold at {time} s")
             return
         yield from self.foreign(one, [(name, key) for name, key, _ in changes], time)
         for name, key, value in changes:
@@ -258,7 +260,7 @@ class _Clock:
         if one.pieces.middle.preconditions:
             self.facts.clear()
             if self.rules.changes(one.pieces.middle, one.terms, self.facts) is None:
-                yield Fault(one.slot.step.path, f"{one.slot.step}: what it asks throughout ceases to hold")
+                yield Fault(one.slot.step.path, f"{one.slot.step}: a condition throughout the step ceases to hold")
 
     def in_the_end(self) -> Iterator[Fault]:
         """Yield a fault for each goal that isn't reached in time.

@@ -206,7 +206,7 @@ def test_a_plan_is_told_each_thing_that_is_wrong_with_it() -> None:
     problem = shelves(has("FULL", "?c", FALSE))
     assert validate(problem, Plan((step(1),))) == []
     said = [fault.text for fault in validate(problem, Plan((step(1), step(1))))]
-    assert said == ["0 DO cup1: its preconditions don't hold where it is done"]
+    assert said == ["0 DO cup1: its preconditions don't hold in the state before it"]
     said = [fault.text for fault in validate(problem, Plan((step(1, "DO", "cup3", id=5),)))]
     assert said == ["5 DO cup3: its ID by the numbering of level 1 is 2"]
     for wrong in (step(1, "DONE"), step(1, "DO", "low"), step(1, "DO", "cup1", "cup2")):

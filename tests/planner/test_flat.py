@@ -316,7 +316,7 @@ def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monke
     monkeypatch.setattr("confab.planner.grounded.exploring.MOST_BYTES", 0)
     outcome = plan_level(carrier(40))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
-    assert outcome.reason.text == "there isn't enough memory to go on"
+    assert outcome.reason.text == "there isn't enough memory to continue planning"
 
 
 def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -106,7 +106,9 @@ def test_the_next_step_begins_where_the_refinement_of_the_one_before_ended() -> 
 
 def test_a_step_without_refinement_among_refined_ones_is_found() -> None:
     first, *others = solved(van())
-    assert "it isn't refined, and other steps are" in faults(van().problem, (replace(first, steps=()), *others))
+    assert "it has no refinement, but other steps have one" in faults(
+        van().problem, (replace(first, steps=()), *others)
+    )
 
 
 def test_a_refinement_that_changes_more_than_its_step_says_is_found() -> None:
