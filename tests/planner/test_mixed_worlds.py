@@ -182,7 +182,6 @@ def test_a_total_counts_individuals_that_the_task_does_not_need(seed: int, tmp_p
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
-@pytest.mark.usefixtures("patiently")
 def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_level(tmp_path: Path) -> None:
     """The default leaves the level; modes that keep all levels give up and name the step."""
     its = Judge(mixed(340_007_688), tmp_path, every=True).judged()
