@@ -1,12 +1,11 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the
-previous value, the later step would be inapplicable or lose a required effect. This test finds causal links for any
-kind of condition ("no object stands there", "the hand holds it"). The checker (`confab.planner.validation`) rejects a
-plan without one of these earlier steps. Each level has its own sequence of steps; where the plan leaves a level,
-lower-level steps take their place. The facts that a step reads are recorded, and only these facts are reset to their
-previous values. So the effort grows with the number of facts that the steps read, and not with the square of the plan's
-length.
+A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the previous
+value, the later step would be inapplicable or lose a required effect. The test with the previous value finds causal links for
+any kind of condition, for example "no object stands on the shelf". The checker (`confab.planner.validation`) rejects a plan
+without a needed step. Each level has a separate sequence of steps; where the plan leaves a level, lower-level steps take their
+place. The facts that a step reads are recorded, and only these facts are reset to their previous values. Therefore the effort
+grows with the number of facts that the steps read, and not with the square of the plan's length.
 """
 
 from __future__ import annotations
@@ -303,7 +302,7 @@ class _Course:
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the steps that make the facts true from which a defined goal follows.
 
-        These are the facts that the derivation of the goal read and without which the goal wouldn't hold.
+        Only facts count that the derivation of the goal read and without which the goal wouldn't hold.
         """
         if cell[0] not in self.problem.domain.rules:
             return

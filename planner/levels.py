@@ -202,7 +202,7 @@ def failing_conditions(
     def gives(number: int) -> bool:
         """Return whether a condition determines a variable.
 
-        Such a condition is removed last, because the other conditions could otherwise hold for nonexistent values.
+        Conditions that determine variables are removed last, because other conditions could hold for nonexistent values.
         """
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms

@@ -140,7 +140,7 @@ def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
 def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
     """Return the static facts that a primitive relied on.
 
-    If there are none, those of the nearest ancestor that relied on some.
+    If the primitive relied on no static fact, return the static facts of its nearest ancestor that relied on static facts.
     """
     for step in reversed(chain):
         behavior = problem.domain.behaviors[step.behavior]

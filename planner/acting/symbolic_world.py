@@ -161,7 +161,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Replace an individual as the value of other symbols: by its former place, or else by the rest value."""
+    """Replace an individual as the value of other symbols by its former place, or otherwise by the rest value."""
     own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:

@@ -114,9 +114,9 @@ class Memory:
         return RulePolicy(call, [*rules, *also], self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
-        """Return the compiled problem.
+        """Return the compiled problem, extended by methods of the experience.
 
-        Its methods that succeeded more often than they failed are the first refinements to be tried.
+        The added methods have succeeded at least as often as they have failed. The shortest method of a behaviour comes first.
         """
         methods = {name: list(known) for name, known in using.methods.items()}
         for name, one in sorted(self.experience.said.items()):
@@ -131,7 +131,7 @@ class Memory:
     def _fits(self, method: Method, using: Compiled) -> bool:
         """Return whether a domain has all behaviours, classes and situation types of a method, with the same numbers of arguments.
 
-        The parameters and variables of the method's own behaviour together are as many as the roles of the method.
+        The number of parameters and variables of the method's behaviour must be the number of the method's roles.
         """
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)

@@ -145,7 +145,7 @@ class Scorer:
     def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
         """Return the summand of each counted fact in the cogency of a rule, in ln odds.
 
-        The rule's own is always included.
+        The summand of the rule itself is always included.
         """
         found = self._weights.get(rule.name)
         if found is None:

@@ -96,7 +96,7 @@ class Workspace:
     def exists(self, situation: str, key: object) -> bool:
         """Return whether a symbol without a value exists.
 
-        Such a symbol exists if its situation type is boolean and its arguments belong to the right classes.
+        The symbol exists if its situation type is boolean and its arguments belong to the right classes.
         """
         kind = self.program.domain.situations[situation]
         return kind.boolean and all(

@@ -173,7 +173,7 @@ class Target:
     """The goal of a sequence of steps of one level.
 
     `values` are the required values at the end of the sequence. `restless` contains the symbols that aren't at rest in the
-    beginning, each with its rest value. Such a symbol must stay unchanged or end at rest.
+    beginning, each with its rest value. Each restless symbol must stay unchanged or end at rest.
     """
 
     values: Goal
