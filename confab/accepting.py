@@ -6,12 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
-from typing import Protocol, SupportsIndex, TypeAlias, overload
+from typing import TYPE_CHECKING, NoReturn, Protocol, SupportsIndex, TypeAlias, overload
 
 from confab import ontology
 from confab.interchange import read_plan
 from confab.planner.plan import Plan
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import ImpossibleStateError
 from confab.reasoner.symbols import FALSE, TRUE, Problem
@@ -27,27 +28,50 @@ class HasPlan(Protocol):
 
 AnyPlan: TypeAlias = "Plan | HasPlan | str | Path"
 """A plan, an object with a plan, or the path of a file that ``confab plan --json`` wrote."""
-Facts: TypeAlias = "str | Iterable[str] | Mapping[str, str]"
+Facts: TypeAlias = "str | Iterable[str | tuple[str, ...]] | Mapping[str, str] | Mapping[tuple[str, str], str] | None"
 """One or several facts: a text like ``cup2 LOCATION location8``, several texts, the words of a fact, or a mapping of symbols to
 values."""
 
 
 class Stated(list[str]):
-    """A list of facts as texts. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
+    """A list of facts as texts that can't be edited. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...
     @overload
     def __getitem__(self, index: slice) -> list[str]: ...
 
-    def __getitem__(self, index: SupportsIndex | str | slice) -> str | list[str]:
+    @overload
+    def __getitem__(self, index: tuple[str, ...]) -> str: ...
+
+    def __getitem__(self, index: SupportsIndex | str | slice | tuple[str, ...]) -> str | list[str]:
         """Return the fact at an index, the facts of a slice, or the value of a symbol."""
+        if isinstance(index, tuple):
+            index = " ".join(index)
         if not isinstance(index, str):
             return super().__getitem__(index)
         values = dict(fact.rsplit(" ", 1) for fact in self)
         if index not in values:
-            raise KeyError(f"no fact about '{index}'{nearest(index, values)}")
+            about = [symbol for symbol in values if index in symbol.split()]
+            raise KeyError(f"no fact about '{index}'{nearest(index, about or values, ', '.join(about))}")
         return values[index]
+
+    def __call__(self) -> Stated:
+        """Return the list itself, since other libraries have methods in place of such properties."""
+        return self
+
+    def __reduce__(self) -> tuple[type[Stated], tuple[list[str]]]:
+        """Return the reduced form for copying and pickling."""
+        return type(self), ([*self],)
+
+    if not TYPE_CHECKING:
+
+        def _edited(self, *_: object) -> NoReturn:
+            raise TypeError(
+                "this list is a copy; scene.with_fact(FACT) and scene.with_goal(FACT) return a changed scene"
+            )
+
+        append = extend = insert = remove = pop = clear = __setitem__ = __delitem__ = __iadd__ = _edited
 
 
 def plan_of(given: AnyPlan, problem: Problem) -> Plan:
@@ -107,12 +131,18 @@ def several(given: Facts) -> list[str]:
     --------
     >>> several("cup2 LOCATION = location8"), several(("cup2", "LOCATION", "location8"))
     (['cup2 LOCATION location8'], ['cup2 LOCATION location8'])
+    >>> several(None), several([("cup2", "LOCATION", "location8")]), several({("cup2", "LOCATION"): "location8"})
+    ([], ['cup2 LOCATION location8'], ['cup2 LOCATION location8'])
     >>> several({"cup2 LOCATION": "location8"}), several(["cup2 LOCATION location8", "cup1 LOCATION location7"])
     (['cup2 LOCATION location8'], ['cup2 LOCATION location8', 'cup1 LOCATION location7'])
     """
+    if given is None:
+        return []
     if isinstance(given, Mapping):
-        given = [f"{symbol} {value}" for symbol, value in given.items()]
-    texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+        symbols = [(symbol,) if isinstance(symbol, str) else symbol for symbol in given]
+        given = [(*symbol, value) for symbol, value in zip(symbols, given.values(), strict=True)]
+    parts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    texts = [" ".join(map(str, part)) if isinstance(part, tuple | list) else part for part in parts]
     for text in texts:
         if not isinstance(text, str):
             raise KnowledgeError(f"wanted a text like 'cup2 LOCATION location8', or several; got {text!r}")
@@ -138,6 +168,22 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 def shipped_queries() -> dict[str, Path]:
     """Return the files of the shipped queries by name."""
     return {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+
+
+def check_seconds(name: str, given: object) -> None:
+    """Raise `KnowledgeError` if a time limit is neither a positive number of seconds nor a `Deadline` nor None.
+
+    Examples
+    --------
+    >>> check_seconds("time_limit", -1)
+    Traceback (most recent call last):
+    confab.reasoner.graph.knowledge.KnowledgeError: time_limit=-1; wanted more than 0 seconds
+    """
+    if isinstance(given, Deadline):
+        return
+    number(name, given, "seconds as a number, e.g. 5")
+    if isinstance(given, Real) and not float(given) > 0:
+        raise KnowledgeError(f"{name}={given}; wanted more than 0 seconds")
 
 
 def sparql_of(given: str | Path) -> str:

@@ -16,7 +16,7 @@ from confab import ontology
 from confab.memory import Memory
 from confab.planner.paper.transitions import ground
 from confab.planner.solve import Mode
-from confab.reasoner.files import STDOUT, alone, write_whole
+from confab.reasoner.files import STDOUT, alone, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.memory.experience_file import Lines
 from confab.reasoner.names import local_name, nearest
@@ -75,6 +75,7 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
     for file in files:
         if file.exists():
             raise KnowledgeError(f"{file} exists already; give another name or folder")
+    made_folder(folder)
     for file, text in files.items():
         write_whole(file, text)
     return list(files)

@@ -173,7 +173,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
     if engine is not None and engine not in factory.engines:
         known = ", ".join(name for name in factory.engines if factory.engine(name).is_oneshot_planner()) or "none"
         raise KnowledgeError(
-            f"no engine '{engine}' is installed{nearest(engine, KNOWN)} (installed: {known}); "
+            f"no engine '{engine}' is installed{'' if engine in KNOWN else nearest(engine, KNOWN)} (installed: {known}); "
             + (f"pip install {KNOWN[engine]} brings it" if engine in KNOWN else "unified-planning lists its engines")
         )
     first = engine or next((name for name in factory.preference_list if name in factory.engines), None)

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
+from confab.accepting import AnyPlan, Facts, check_goal, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
 from confab.interchange import step_json
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
@@ -446,7 +446,7 @@ def carry_out(
         planner = partial(plan_with, memory=memory.advisor, mode=mode)
     number("seed", seed, "an integer")
     texts = several(interventions)
-    number("time_limit", time_limit, "seconds as a number, e.g. 5")
+    check_seconds("time_limit", time_limit)
     with within(time_limit), spectator(watch, observer) as heard:
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 

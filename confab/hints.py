@@ -34,7 +34,7 @@ MODULE = {
     "confab.generate(FAMILY, …)": "make_scene random_scene generate_scene Generator random synthetic families",
     "confab.new_domain(NAME)": "new_ontology create_domain init new create make_domain scaffold template "
     "new_scene create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator "
-    "InstantaneousAction DurativeAction define UserType Variable add_action Situation build",
+    "InstantaneousAction DurativeAction define UserType add_action Situation build",
     "confab.load(SCENE).read_plan(FILE)": "load_plan read_plan parse_plan open_plan plan_from_file from_plan",
     "confab.load(SCENE).read_episode(FILE)": "load_episode read_episode load_execution open_episode",
     "confab.load(SCENE).read_report(FILE, PLAN)": "load_report read_report load_verdicts load_verification",

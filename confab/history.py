@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from confab.reasoner.files import write_whole
+from confab.reasoner.files import made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
 from confab.table import Table
@@ -60,7 +60,7 @@ def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str)
 
 def new_folder(runs: Path) -> Path:
     """Create a folder for the next run in `runs` (001, or the greatest number plus one), and return its path."""
-    runs.mkdir(parents=True, exist_ok=True)
+    made_folder(runs)
     last = max((int(one.name) for one in runs.iterdir() if one.name.isdecimal() and one.name.isascii()), default=0)
     while True:
         last += 1

@@ -12,7 +12,7 @@ from confab.planner.grounded.plan_windows import regrouped, shortened
 from confab.planner.grounded.task import Task
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step, UngroundableError
-from confab.reasoner.files import check_replaceable, write_whole
+from confab.reasoner.files import check_replaceable, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from confab.reasoner.limits import OutOfTimeError
@@ -88,6 +88,7 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     found = exported(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"
     files = tuple(zip(paths, (DOMAIN, PROBLEM), (found.domain, found.problem), strict=True))
+    made_folder(folder)
     for path, kind, _ in files:
         check_replaceable(path, kind)
     for path, kind, text in files:

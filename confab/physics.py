@@ -9,10 +9,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from confab.accepting import number
+from confab.accepting import check_seconds, number
 from confab.labels import Labels, labels_of
 from confab.planner.plan import Plan
 from confab.progress import progress
+from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.names import RightNames, right_names
@@ -262,7 +263,7 @@ def verify(
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
     number("noise", noise, "metres, e.g. 0.002")
-    number("time_limit", time_limit, "seconds as a number, e.g. 5")
+    check_seconds("time_limit", time_limit)
     if rollouts < 1:
         raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")
     video = None if video is None else Path(video)
@@ -351,7 +352,7 @@ def _shown(
     from confab.sim.film import Film
 
     titles = {step.path: f"{step.id} {labels.step(step)}" for step in plan.walk()}
-    video.parent.mkdir(parents=True, exist_ok=True)
+    check_folder(video)
     with Film(video, plan.primitives, titles, stills=video.with_suffix(""), names=labels.words) as film:
         watching.append(film)
         return trial.run(seed, watch, progress, gui)

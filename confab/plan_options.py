@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from confab.accepting import number
+from confab.accepting import check_seconds
 from confab.planner.solve import DEFAULT_MODE, MODES, Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
@@ -74,10 +74,7 @@ class PlanOptions:
         if self.strategy == "optimal" and not self.leave_levels:
             what = "compares plans of the lowest level, so it may leave the others"
             raise KnowledgeError(f"the optimal search {what}; leave one option out")
-        if not isinstance(self.time_limit, Deadline):
-            number("time_limit", self.time_limit, "seconds as a number, e.g. 5")
-            if self.time_limit is not None and self.time_limit < 0:
-                raise KnowledgeError(f"time_limit={self.time_limit}; wanted 0 or more seconds")
+        check_seconds("time_limit", self.time_limit)
         if self.mode not in MODES:
             raise KnowledgeError(f"unknown mode '{self.mode}'; wanted one of {', '.join(MODES)}")
 

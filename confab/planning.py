@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
@@ -11,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias, cast, overload
 
-from confab.accepting import Facts, check_goal, number, several
+from confab.accepting import Facts, check_goal, check_seconds, several
 from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
+    from confab.planner.acting.episode import Event
+    from confab.planner.acting.world import World
     from confab.planner.causal_links import Purpose
     from confab.planner.certificates import Certificate
     from confab.planner.timed.plan import TimedPlan
@@ -338,9 +340,11 @@ class Result(metaclass=RightNames):
         """Return the number of steps of the plan's first level."""
         return len(self.plan)
 
-    def __getitem__(self, index: int) -> Step:
-        """Return a step of the plan's first level."""
-        return self.plan[index]
+    def __getitem__(self, index: AnyStep) -> Step:
+        """Return a step of the plan in one of the notations of `why`. A negative number counts from the end."""
+        from confab.why import find_step
+
+        return self.plan[index] if isinstance(index, int) else find_step(self.plan, index, self.labels)
 
     def in_order(self, *ids: int) -> Plan:
         """Return the plan with its first-level steps in another order, for example the order of a demonstration.
@@ -376,11 +380,24 @@ class Result(metaclass=RightNames):
         options.setdefault("goal", self.problem.goal)
         return verify(self.scene, self.plan, rollouts, seed, **options)
 
-    def execute(self, interventions: Facts = (), **options: Unpack[execution.Options]) -> Execution:
+    def execute(
+        self,
+        interventions: Facts = (),
+        world: str | World = "symbolic",
+        memory: Memory | Links | str | Path | None = None,
+        mode: Mode = DEFAULT_MODE,
+        seed: int = 0,
+        observer: Callable[[Event], None] | None = None,
+        watch: bool = False,
+        time_limit: float | None = None,
+        **options: Unpack[execution.Options],
+    ) -> Execution:
         """Execute the task in a closed loop, beginning with this plan (`Scene.execute`)."""
         from confab.execution import carry_out
 
-        return carry_out(self.scene, self, interventions, **options)
+        return carry_out(
+            self.scene, self, interventions, world, (), memory, mode, seed, observer, watch, time_limit, **options
+        )
 
     @cached_property
     def labels(self) -> Labels:
@@ -439,7 +456,7 @@ class Result(metaclass=RightNames):
         """
         from confab.why import BY, find_step, why_not
 
-        number("seconds", seconds, "seconds as a number, e.g. 5")
+        check_seconds("seconds", seconds)
 
         def ask(problem: Problem) -> Outcome:
             return solve(Request(problem, DEFAULT_MODE))

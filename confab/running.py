@@ -18,7 +18,7 @@ from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, unreached, with_reach
-from confab.reasoner.files import check_replaceable, has_content, write_whole
+from confab.reasoner.files import check_replaceable, has_content, made_folder, write_whole
 from confab.reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, RUN, VERDICTS
 from confab.reasoner.reading.observed import assert_observed, save_observed
 from confab.reasoner.validation.findings import listing
@@ -153,7 +153,7 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
 def verified(scene: Scene, result: Result, job: Job) -> Report:
     """Verify a plan in physics, show the progress on stderr, and return the report."""
     steps = result.plan.primitives
-    video = job.out / "run.mp4" if job.film else None
+    video = made_folder(job.out) / "run.mp4" if job.film else None
     tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
     with progress("carrying out", len(steps)) as advance:
 
@@ -174,7 +174,7 @@ def written(scene: Scene, result: Result, report: Report | None, learned: Memory
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 
-    out, paths = job.out, {}
+    out, paths = made_folder(job.out), {}
     if result.outcome.plan is not None:
         paths["plan"] = result.save(out / "plan.json")
     data = page_data(scene, result, report, learned=learned, again=job.command)

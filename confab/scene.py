@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, overload
 
 from confab import ontology, planning
-from confab.accepting import AnyPlan, Facts, number, plan_of, several
+from confab.accepting import AnyPlan, Facts, check_seconds, plan_of, several
 from confab.known import Known
 from confab.planner.plan import Plan
 from confab.planner.solve import DEFAULT_MODE, Mode
@@ -18,7 +18,7 @@ from confab.planning import Result
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.graph.knowledge import load as load_graph
-from confab.reasoner.limits import Deadline, within
+from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
@@ -255,8 +255,7 @@ class Scene(Known):
             The time limit for planning and explaining is over before the explanation is complete.
         """
         limit = options.get("time_limit")
-        if not isinstance(limit, Deadline):
-            number("time_limit", limit, "seconds as a number, e.g. 5")
+        check_seconds("time_limit", limit)
         with within(limit) as deadline:
             if limit is not None:
                 options["time_limit"] = deadline

@@ -7,7 +7,7 @@ import html
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NoReturn, SupportsIndex, TypeAlias, overload
+from typing import TYPE_CHECKING, SupportsIndex, TypeAlias, overload
 
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest, right_names
@@ -38,14 +38,6 @@ class Row(tuple[str | None, ...]):
         """Return the arguments of `__new__` for copying and pickling."""
         return tuple(self), self._fields
 
-    if not TYPE_CHECKING:  # type checkers report wrong names by themselves
-
-        def __getattr__(self, name: str) -> NoReturn:
-            """Raise `AttributeError`: cells aren't attributes."""
-            columns = () if name.startswith("_") else self._fields
-            hint = f"; use row['{name}']" if name in columns else f" (columns: {', '.join(columns)})"
-            raise AttributeError(f"a row has no '{name}'{hint}")
-
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str | None: ...
     @overload
@@ -54,6 +46,15 @@ class Row(tuple[str | None, ...]):
     def __getitem__(self, index: SupportsIndex | str | slice) -> str | tuple[str | None, ...] | None:
         """Return the cell at a position, the cell of a column, or the cells of a slice."""
         return super().__getitem__(column(self._fields, index) if isinstance(index, str) else index)
+
+    def __getattr__(self, name: str) -> str | None:
+        """Return the cell of a column, as in rows of rdflib: ``row.cup``."""
+        if name.startswith("_"):
+            raise AttributeError(f"a row has no '{name}'")
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from error
 
 
 def column(names: tuple[str, ...], name: str) -> int:

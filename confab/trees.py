@@ -15,7 +15,7 @@ from confab.planner.acting.world import World
 from confab.planner.behavior_tree import All, Do, First, Holds, Mark, Marked, Node, Situation, Subtree, Together
 from confab.planner.behavior_tree import behavior_tree as tree_of
 from confab.planner.plan import Plan, Step
-from confab.reasoner.files import check_replaceable, write_whole
+from confab.reasoner.files import check_replaceable, made_folder, write_whole
 from confab.reasoner.kinds import TREE, stamped
 from confab.reasoner.limits import check
 from confab.reasoner.sentences import said
@@ -96,7 +96,7 @@ def behavior_tree(problem: Problem, plan: Plan) -> Tree:
 def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path]:
     """Write the behaviour tree of a plan into a folder as ``tree.xml`` and ``tree.py``, and return both paths."""
     tree = behavior_tree(problem, plan)
-    folder.mkdir(parents=True, exist_ok=True)
+    made_folder(folder)
     paths = folder / "tree.xml", folder / "tree.py"
     for path in paths:
         check_replaceable(path, TREE)

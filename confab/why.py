@@ -12,6 +12,8 @@ from confab.labels import Labels
 from confab.page.markup import Markup, styled, tag
 from confab.planner.causal_links import FactChange, Kind, Need, Purpose
 from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
+from confab.planner.finding import Place, UnknownStepError, find
+from confab.planner.finding import numbers as numbered
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
@@ -222,84 +224,27 @@ class Account:
 # ------------------------------------------------------------------------------------------------------------------ why
 
 
-def number_of(plan: Plan, step: Step) -> str:
-    """Return the number of a step, such as ``L2#3``: its level and its position on the level, counted from 0."""
-    return f"L{step.level}#{[other.path for other in plan.at_level(step.level)].index(step.path)}"
-
-
 def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
     """Return the numbers of all steps by path."""
-    seen: dict[int, int] = {}
-    found = {}
-    for step in plan.walk():
-        seen[step.level] = seen.get(step.level, -1) + 1
-        found[step.path] = f"L{step.level}#{seen[step.level]}"
-    return found
+    return numbered(Place(step.path, step.level, step.id, ()) for step in plan.walk())
 
 
 def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels: Labels) -> Step:
-    """Return the step that an argument names.
-
-    Parameters
-    ----------
-    plan : Plan
-    asked : Step, int, str or path
-        The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12 of
-        level 3, counted from 0; a path like ``0.1.2``; or words of the printed step or of its label.
-    labels : Labels
+    """Return the step that an argument names, also by words of its label (`confab.planner.finding.find_step`).
 
     Raises
     ------
     KnowledgeError
         No step matches, or several steps match.
     """
-    steps = list(plan.walk())
-    if isinstance(asked, Step):
-        asked = asked.path
-    if not isinstance(asked, int | str) and any(isinstance(word, str) for word in asked):
-        asked = " ".join(map(str, asked))  # the tuple is a behaviour with its arguments
-    if isinstance(asked, int):
-        if not 0 <= asked < len(plan.steps):
-            named = [number_of(plan, step) for step in steps if step.id == asked]
-            hint = f"; {asked} is the ID of {', '.join(named[:6])}" if named else ""
-            raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0{hint}")
-        return plan.steps[asked]
-    if not isinstance(asked, str):
-        found = [step for step in steps if step.path == tuple(asked)]
-        if not found:
-            raise KnowledgeError(f"no step at {'.'.join(map(str, asked))} in the tree of the plan")
-        return found[0]
-    text = asked.strip()
-    if re.fullmatch(r"[lL]\d+#\d+", text):
-        level, at = map(int, text[1:].split("#"))
-        on = plan.at_level(level)
-        if at >= len(on):
-            raise KnowledgeError(f"no step {text}: level {level} has {len(on)}, counted from 0")
-        return on[at]
-    if re.fullmatch(r"\d+(\.\d+)*", text):
-        return find_step(plan, [int(part) for part in text.split(".")], labels)
-    words = " ".join(text.lower().split())
-    names = {step.path: (str(step).lower(), labels.step(step).lower()) for step in steps}
-    for fits in (
-        lambda name: words == name or f" {words}" == name[name.find(" ") :],
-        lambda name: words in name,
-    ):
-        found = [step for step in steps if any(fits(name) for name in names[step.path])]
-        tops = [step for step in found if not any(step.path[: len(o.path)] == o.path for o in found if o is not step)]
-        if len(tops) == 1:
-            return tops[0]
-        if tops:
-            shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in tops[:6])
-            raise KnowledgeError(
-                f"'{asked}' names {len(tops)} steps: {shown}; give one, e.g. {number_of(plan, tops[0])}"
-            )
-    alike = [step for step in steps if words == labels.name(step.behavior).lower()]
-    if alike:
-        shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in alike[:6])
-        raise KnowledgeError(f"'{asked}' names {len(alike)} steps: {shown}; give one")
-    known = [text for step in steps for text in (labels.step(step), str(step))]
-    hint = f"steps: {some_of([labels.step(step) for step in steps])}"
-    raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, hint)}")
+    steps = {step.path: step for step in plan.walk()}
+    texts = {path: (str(step), labels.name(step.behavior), labels.step(step)) for path, step in steps.items()}
+    places = [Place(path, step.level, step.id, texts[path]) for path, step in steps.items()]
+    hint = f"steps: {some_of([text for *_, text in texts.values()])}"
+    try:
+        return steps[find(places, asked.path if isinstance(asked, Step) else asked, hint)]
+    except UnknownStepError as error:
+        raise KnowledgeError(str(error)) from error
 
 
 def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels) -> Because:
@@ -459,7 +404,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
     what = labels.behavior(behavior, {t: v for t, v in terms.items() if not v.startswith("?")})
     assert found.instead is not None
     place = (
-        f"“{labels.step(found.instead)}” ({number_of(plan, found.instead)})"
+        f"“{labels.step(found.instead)}” ({numbers(plan)[found.instead.path]})"
         if found.instead in list(plan.walk())
         else labels.step(found.instead)
     )

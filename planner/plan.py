@@ -96,16 +96,29 @@ class Plan(Sequence[Step], metaclass=RightNames):
         return True
 
     @overload
-    def __getitem__(self, index: int) -> Step: ...
+    def __getitem__(self, index: int | str | tuple[int, ...]) -> Step: ...
 
     @overload
     def __getitem__(self, index: slice) -> tuple[Step, ...]: ...
 
-    def __getitem__(self, index: int | slice) -> Step | tuple[Step, ...]:
-        """Return one step of the first level, or a slice of these steps."""
-        if isinstance(index, str):
-            why = f"result.why({index!r}) explains a step with these words"
-            raise TypeError(f"steps are numbered from 0, e.g. plan[0]; plan.walk() yields all steps, and {why}")
+    def __getitem__(self, index: int | str | tuple[int, ...] | slice) -> Step | tuple[Step, ...]:
+        """Return a step of the first level or a slice of these steps, or any step by its number, its path or its words.
+
+        Raises
+        ------
+        IndexError
+            The first level has no step with the number.
+        confab.planner.finding.UnknownStepError
+            No step, or more than one step, has the path or the words.
+        """
+        if isinstance(index, str | tuple):
+            from confab.planner.finding import Place, find
+
+            steps = {step.path: step for step in self.walk()}
+            places = [Place(path, step.level, step.id, (str(step),)) for path, step in steps.items()]
+            return steps[find(places, index, "walk() yields all steps")]
+        if isinstance(index, int) and not -len(self.steps) <= index < len(self.steps):
+            raise IndexError(f"no step {index}: the first level has {len(self.steps)}, counted from 0")
         return self.steps[index]
 
     def __repr__(self) -> str:

@@ -72,7 +72,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
     part = target.parent / f".confab-{uuid4().hex}.part{suffix}"
     try:
         old = _replaceable(target)
-        target.parent.mkdir(parents=True, exist_ok=True)
+        check_folder(path)
         yield part
         if old is not None:
             _same_kind(target, kind_of(part, target.suffix))
@@ -113,6 +113,22 @@ def check_replaceable(path: Path, kind: str) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+def check_folder(path: Path) -> None:
+    """Raise `FileNotFoundError` if the folder of a file to be written doesn't exist; its name may be a typing error."""
+    try:
+        _behind(path).parent.stat()
+    except FileNotFoundError:
+        said = f"there is no folder '{path.parent}'; create it, or give another name"
+        raise FileNotFoundError(errno.ENOENT, said, str(path)) from None
+
+
+def made_folder(path: str | Path) -> Path:
+    """Create a folder in an existing folder unless it exists, and return its path. Errors as in `check_folder`."""
+    check_folder(Path(path))
+    Path(path).mkdir(exist_ok=True)
+    return Path(path)
+
+
 def has_content(path: Path) -> bool:
     """Return whether a file exists and isn't empty."""
     return path.is_file() and path.stat().st_size > 0
@@ -150,12 +166,12 @@ def alone(path: Path) -> Iterator[None]:
     Raises
     ------
     OSError
-        The folder doesn't exist and can't be created.
+        The folder doesn't exist.
     LimitError
         Another process has locked the folder for `PATIENCE` seconds.
     """
+    check_folder(path)
     folder = _behind(path).parent
-    folder.mkdir(parents=True, exist_ok=True)
     opened = os.open(folder, os.O_RDONLY)
     begin, told = monotonic(), False
     try:

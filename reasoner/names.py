@@ -62,7 +62,7 @@ class Names:
 
 
 class Named(dict[str, V]):
-    """A mapping whose `KeyError` for a missing name suggests the most similar name."""
+    """A mapping that can't be edited. Its `KeyError` for a missing name suggests the most similar name."""
 
     def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:
         super().__init__(content)
@@ -76,6 +76,17 @@ class Named(dict[str, V]):
         """Raise `AttributeError`; for a key, the message shows how its value is accessed."""
         hint = f"; use [{name!r}]" if name in self else ""
         raise AttributeError(f"a mapping of names has no attribute {name!r}{hint}")
+
+    def __call__(self) -> Named[V]:
+        """Return the mapping itself, since other libraries have methods in place of such properties."""
+        return self
+
+    if not TYPE_CHECKING:
+
+        def _edited(self, *_: object, **__: object) -> NoReturn:
+            raise TypeError(f"this mapping of each {self.kind} is a copy, so that a change of it has no effect")
+
+        __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _edited
 
     def __reduce__(self) -> tuple[type[dict[str, V]], tuple[dict[str, V]]]:
         """Return the reduced form for copying and pickling: a plain dictionary."""
@@ -136,14 +147,28 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
             raise WrongNameError(kind, name, type(self))
 
         type.__setattr__(cls, "_kind", kind)
+
+        def settable(self: object, name: str, value: object) -> None:
+            place = getattr_static(cls, name, None)
+            unknown = (
+                place is None and not name.startswith("_") and name not in getattr(cls, "__dataclass_fields__", ())
+            )
+            if unknown or (isinstance(place, property) and place.fset is None):
+                raise WrongNameError(kind, name, type(self), "set")
+            object.__setattr__(self, name, value)
+
+        if getattr_static(cls, "__setattr__") is object.__setattr__:  # not frozen
+            type.__setattr__(cls, "__setattr__", settable)
         type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
         if made:
             begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class
 
             @wraps(begin)
             def made_by(self: object, *given: object, **named: object) -> None:
-                if not given and not named:
-                    raise TypeError(f"{kind} isn't made without arguments; use {made}")
+                try:
+                    signature(begin).bind(self, *given, **named)
+                except TypeError as error:
+                    raise TypeError(f"{kind} isn't made like this ({error}); use {made}") from error
                 begin(self, *given, **named)
 
             type.__setattr__(cls, "__init__", made_by)
@@ -170,8 +195,10 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
     parameters = [*signature(function).parameters.values()][bound:]
     own = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
     further = next((str(each.annotation) for each in parameters if each.kind is each.VAR_KEYWORD), "")
-    if not own or (further and not further.startswith("Unpack[")):
+    if further and not further.startswith("Unpack["):
         return function
+    several = [f"*{each.name}" for each in parameters if each.kind is each.VAR_POSITIONAL]
+    most = None if several else sum(each.kind is each.POSITIONAL_OR_KEYWORD for each in parameters)
 
     @wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
@@ -179,8 +206,15 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
         for name in named:
             if name not in takes:
                 meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
-                hint = f"; did you mean '{meant}'?" if meant else f"; it takes {', '.join(takes)}"
+                all_of_them = ", ".join((*several, *takes)) or "no arguments"
+                hint = f"; did you mean '{meant}'?" if meant else f"; it takes {all_of_them}"
                 raise TypeError(f"{function.__name__}() takes no '{name}'{hint}")
+        if most is not None and len(given) > bound + most:
+            named_only = ", ".join(f"{each}=" for each in own[most:])
+            raise TypeError(
+                f"{function.__name__}() takes {', '.join(own[:most]) or 'nothing'} without a name; "
+                f"got {len(given) - bound} values{f' (by name: {named_only})' if named_only else ''}"
+            )
         return function(*given, **named)
 
     return checked
@@ -207,21 +241,24 @@ class WrongNameError(AttributeError):
     name : str
     there : object
         The object or its class; its public names are determined by `dir`.
+    verb : str
+        Empty for reading an attribute, ``set`` for setting it.
     """
 
-    def __init__(self, kind: str, name: str, there: object) -> None:
+    def __init__(self, kind: str, name: str, there: object, verb: str = "") -> None:
         super().__init__(f"{kind} has no '{name}'")
-        self._wrong, self._there = (kind, name), there
+        self._wrong, self._there, self._verb = (kind, name), there, verb
 
     def __str__(self) -> str:
         """Return the message with the suggested name."""
         (kind, name), there = self._wrong, self._there
-        text = f"{kind} has no '{name}'"
+        text = f"{kind} has no '{name}'" + (f" that can be {self._verb}" if self._verb else "")
         if name.startswith("_"):
             return text
         every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
         known = sorted(each for each in every if not each.startswith("_"))
-        meant = next((import_module(each).guessed(kind.split()[-1], name, known) for each in GUESSING), "")
+        asked = "_".join(filter(None, (self._verb, name)))
+        meant = next((import_module(each).guessed(kind.split()[-1], asked, known) for each in GUESSING), "")
         if meant:
             return f"{text}; use {meant}"
         return text + nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")

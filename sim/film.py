@@ -16,7 +16,7 @@ import pybullet
 from PIL import Image, ImageDraw, ImageFont
 from PIL.PngImagePlugin import PngInfo
 
-from confab.reasoner.files import write_whole, written_whole
+from confab.reasoner.files import made_folder, write_whole, written_whole
 from confab.reasoner.kinds import MAKER
 from confab.sim.bodies import outline
 from confab.sim.engine import NEAR_PLACE, Engine
@@ -104,7 +104,7 @@ class Film:
         self._chosen = camera is not None
         self._views: list[Camera] = []
         self.width, self.height, self.names = width, height, names or {}
-        self.stills = None if stills is None else Path(stills)
+        self.stills = None if stills is None else made_folder(stills)
         self._part = self.path
         self._file = ExitStack()
         self._writer: Any = None

@@ -57,8 +57,10 @@ class Output(click.Path):
         if path == STDOUT and self.kind not in TEXTS:
             self.fail(f"{self.kind or 'this'} can't be written to stdout; wanted the name of a file", param, ctx)
         if self.kind and ctx is not None and not ctx.resilient_parsing:
-            from confab.reasoner.files import check_replaceable
+            from confab.reasoner.files import check_folder, check_replaceable
 
+            if path != STDOUT:
+                check_folder(path)
             check_replaceable(path, self.kind)
         return path
 
@@ -191,7 +193,7 @@ LONGEST = 1e9
 """Maximum time limit in seconds."""
 TIME_LIMIT = click.option(
     "--time-limit",
-    type=Seconds(min=0.0),
+    type=Seconds(min=0.0, min_open=True),
     metavar="S",
     help="Time limit in seconds (exit 3).",
 )
@@ -217,7 +219,7 @@ OUT = click.option(
 )
 QUERY_SECONDS = click.option(
     "--time-limit",
-    type=Seconds(min=0.0),
+    type=Seconds(min=0.0, min_open=True),
     default=60.0,
     metavar="S",
     help="Time limit of a query in seconds (exit 3).",

@@ -33,6 +33,7 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.planner.solve import Mode
 from confab.progress import progress
+from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
@@ -179,6 +180,7 @@ def run(
     from confab.running import run as run_all
 
     with limited(time_limit):
+        check_folder(out)
         folder = new_folder(out) if keep else out
         raise Exit(run_all(Job(scene, folder, goal, memory, mode, seed, noise, not no_video, gui)))
 

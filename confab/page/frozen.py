@@ -10,6 +10,7 @@ from string import Template
 
 from confab.page.markup import asset, script
 from confab.page.schema import PageData
+from confab.reasoner.graph.knowledge import KnowledgeError
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
@@ -21,8 +22,16 @@ def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
 
 
 def write_page(path: str | Path, data: PageData) -> Path:
-    """Write the page with embedded data into a file atomically, and return the path."""
+    """Write the page with embedded data into a file atomically, and return the path.
+
+    Raises
+    ------
+    KnowledgeError
+        The name of the file ends in the suffix of another format.
+    """
     from confab.reasoner.files import write_whole
 
+    if Path(path).suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
+        raise KnowledgeError(f"{path}: a page is HTML; wanted a name that ends in .html")
     write_whole(Path(path), page_html(data, data["title"]))
     return Path(path)

@@ -210,3 +210,61 @@ def test_of_sixty_wrong_names_all_but_five_at_most_name_what_does_it(
             if right not in str(told.value).partition("'; ")[2]:
                 missed.append((kind, name, str(told.value)))
     assert len(missed) <= 5, missed
+
+
+def test_a_step_is_selected_by_its_number_its_path_and_its_words(result: confab.Result) -> None:
+    plan = result.plan
+    first = plan[0]
+    assert plan["L1#0"] == plan[(0,)] == plan[str(first)] == result["pour bottle 2"] == first
+    assert plan["L2#1"] == plan[0, 1] == first.steps[1]
+    with pytest.raises(LookupError, match=r"'B2_' names 3 steps: L2#0 .*; give one, e.g. L2#0"):
+        plan["B2_"]
+    with pytest.raises(IndexError, match="the first level has 1, counted from 0"):
+        plan[99]
+
+
+@pytest.mark.parametrize("seconds", [0, -1])
+def test_a_time_limit_is_more_than_nothing(scene: confab.Scene, result: confab.Result, seconds: float) -> None:
+    for call in (scene.plan, scene.execute, scene.explain, result.verify, result.execute):
+        with pytest.raises(KnowledgeError, match=f"time_limit={seconds}; wanted more than 0 seconds"):
+            call(time_limit=seconds)
+
+
+def test_no_folder_is_made_for_a_file(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
+    missing = tmp_path / "typo" / "plan"
+    for write, name in (
+        (result.save, "p.json"), (result.report, "p.html"), (scene.picture, "p.png"), (scene.execute(result).save, "e.ttl"),
+        (confab.Memory.of(scene).save, "m.ttl"),
+    ):  # fmt: skip
+        with pytest.raises(OSError, match=r"there is no folder '.*plan'; create it, or give another name"):
+            write(missing / name)
+    assert not missing.parent.exists()
+    with pytest.raises(KnowledgeError, match=r"a page is HTML; wanted a name that ends in \.html"):
+        result.report(tmp_path / "p.pdf")
+
+
+def test_what_has_no_effect_is_refused_with_what_has_one(scene: confab.Scene, result: confab.Result) -> None:
+    refused: dict[str, Callable[[], object]] = {
+        "scene.with_fact": lambda: scene.facts.append("cup1 LOCATION location7"),
+        "is a copy": lambda: scene.objects.update(cup9="Cup"),
+        "use with_goal": lambda: setattr(scene, "goals", [GOAL]),
+        "that can be set; use with_goal": lambda: setattr(scene, "goal", GOAL),
+        "that can be set; use with_fact": lambda: setattr(scene, "state", GOAL),
+        r"\*facts": lambda: scene.with_fact(cup1="location7"),  # type: ignore[call-arg]
+        "takes source without a name; got 2 values": lambda: confab.load(SCENE, SCENE),  # type: ignore[call-arg]
+        "use confab.Memory.of": lambda: confab.Memory(scene),  # type: ignore[call-arg, arg-type]
+    }
+    for said, call in refused.items():
+        with pytest.raises((TypeError, AttributeError), match=said):
+            call()
+
+
+def test_facts_are_accepted_in_every_usual_form(scene: confab.Scene) -> None:
+    words = ("cup1", "LOCATION", "location7")
+    for given in (words, [words], {("cup1", "LOCATION"): "location7"}, {"cup1 LOCATION": "location7"}):
+        assert scene.with_goal(given).goals["cup1", "LOCATION"] == "location7"
+    assert scene.with_goal(None).goals() == scene.goals
+    with pytest.raises(KeyError, match="cup1 BEVERAGE, cup1 LOCATION"):
+        scene.facts["cup1"]
+    row = scene.query("where-is-everything")[0]
+    assert row.object == row["object"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from confab.reasoner import files
-from confab.reasoner.files import alone, as_iri_part, write_whole
+from confab.reasoner.files import alone, as_iri_part, made_folder, write_whole
 from confab.reasoner.limits import LimitError
 
 ROWS = "thing\n"
@@ -21,7 +21,7 @@ def left(folder: Path) -> list[str]:
 
 
 def test_texts_bytes_and_pieces_are_written_as_they_are(tmp_path: Path) -> None:
-    folder = tmp_path / "new" / "folder"
+    folder = made_folder(tmp_path / "new")
     contents: tuple[tuple[str | bytes | Iterator[str], bytes], ...] = (
         ("häß", "häß".encode()),
         (b"\xff\x00", b"\xff\x00"),
@@ -128,7 +128,7 @@ def test_one_writes_after_the_other_and_who_waits_says_so_once(
     waiting.join()
     assert order == ["first", "second"]
     assert caplog.text.count("waiting for another process that writes in") == 1
-    with alone(tmp_path / "b" / "c.txt"):  # nobody waits for what lies elsewhere
+    with alone(made_folder(tmp_path / "b") / "c.txt"):  # nobody waits for what lies elsewhere
         assert (tmp_path / "b").is_dir()
 
 
