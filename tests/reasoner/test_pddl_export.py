@@ -62,7 +62,7 @@ def round_trip(problem: Problem, level: int | None = None) -> Problem:
     return imported(parse(exported.domain, exported.problem)).problem
 
 
-@pytest.mark.parametrize("seed", range(7_000_000, 7_000_008))
+@pytest.mark.parametrize("seed", range(7_000_001, 7_000_009))
 def test_a_random_world_costs_the_same_behind_its_export_on_every_level(seed: int) -> None:
     meant = mixed(seed).problem
     aggregates = {name: unfolded(one, meant.domain.rules) for name, one in meant.domain.aggregates.items()}
