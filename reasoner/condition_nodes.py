@@ -318,7 +318,7 @@ class NodeReader:
         """Return the value of a property that must have exactly one value."""
         found = self.values(iri, name)
         if len(found) != 1:
-            raise self.error(f"<{iri}>: wanted one :{name}, found {len(found)}; state it once")
+            raise self.error(f"<{iri}>: wanted one c:{name}, found {len(found)}; state it once")
         return found[0]
 
     def is_a(self, iri: str, *kinds: str) -> bool:
@@ -330,7 +330,7 @@ class NodeReader:
         """Return the value of a property, which must be one of the words in `known`."""
         said = self.one(iri, name)
         if said not in known:
-            raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
+            raise self.error(f"<{iri}>: c:{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
         return said
 
     def decimal(self, iri: str, name: str) -> Fraction | None:
@@ -339,14 +339,14 @@ class NodeReader:
             return None
         said = self.one(iri, name)
         if (found := exact(said)) is None:
-            raise self.error(f"<{iri}>: :{name} is '{said[:40]}'; wanted a number, like 2 or 1.5")
+            raise self.error(f"<{iri}>: c:{name} is '{said[:40]}'; wanted a number, like 2 or 1.5")
         return found
 
     def flag(self, iri: str, name: str) -> bool:
         """Return whether the value of a boolean property is true."""
         said = set(self.values(iri, name))
         if said - {"true", "false", "1", "0"} or len(said) > 1:
-            raise self.error(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
+            raise self.error(f"<{iri}>: c:{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
         return bool(said & {"true", "1"})
 
     def arguments(self, iri: str) -> tuple[str, ...]:
@@ -422,7 +422,7 @@ class NodeReader:
         if self.is_a(iri, "Comparison"):
             sign = self.word(iri, "sign", tuple(COMPARING))
             return Comparison(self.left(iri), sign, self.right(iri), negated)
-        raise self.error(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+        raise self.error(f"<{iri}>: a condition of no known kind; give it one of the subclasses of c:Condition")
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
         """Return the conditions that are the values of a node's property."""
@@ -445,7 +445,7 @@ class NodeReader:
             return self.expression(self.one(iri, "right"))
         number = self.decimal(iri, "amount")
         if number is None:
-            raise self.error(f"<{iri}> has neither :amount nor :right; state a number or its terms")
+            raise self.error(f"<{iri}> has neither c:amount nor c:right; state a number or its terms")
         return number
 
     def measured(self, iri: str) -> Amount | Measure:

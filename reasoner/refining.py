@@ -44,7 +44,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
                 yield (
                     behavior,
                     f"{behavior.name} of level {behavior.level} can be in no plan: {why}, where it rests; add a behaviour of level "
-                    f"{first} that does, or remove :restValue if {situation} may keep any value",
+                    f"{first} that does, or remove c:restValue if {situation} may keep any value",
                 )
 
 

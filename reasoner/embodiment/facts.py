@@ -80,7 +80,7 @@ class BodyFacts:
         """Return the text of an attribute, or `default`; raise `EmbodimentError` if both are missing."""
         value = self.attributes.get(node, {}).get(name, default)
         if value is None:
-            raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)", node)
+            raise EmbodimentError(f"{node} has no e:{camel(name)} (see ontology/embodiment.ttl)", node)
         return value
 
     def number(self, node: str, name: str, default: float | None = None) -> float:
@@ -93,7 +93,7 @@ class BodyFacts:
         try:
             return tuple(float(word) for word in value.split())
         except ValueError:
-            raise EmbodimentError(f"{node} has :{camel(name)} '{value}'; wanted numbers", node) from None
+            raise EmbodimentError(f"{node} has e:{camel(name)} '{value}'; wanted numbers", node) from None
 
     def position(self, node: str, default: str | None = None) -> Vector:
         """Return the coordinates x, y and z of a node, in metres."""
@@ -108,7 +108,7 @@ class BodyFacts:
         """Return the colour of a node: red, green, blue and opacity."""
         numbers = self.numbers(node, "color", default)
         if len(numbers) != 4:
-            raise EmbodimentError(f"{node} has :color {numbers}; wanted red, green, blue and opacity", node)
+            raise EmbodimentError(f"{node} has e:color {numbers}; wanted red, green, blue and opacity", node)
         return (numbers[0], numbers[1], numbers[2], numbers[3])
 
     def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
@@ -119,7 +119,7 @@ class BodyFacts:
             if (folder / file).is_file():
                 return str(folder / file)
         raise EmbodimentError(
-            f"{node} has :{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}",
+            f"{node} has e:{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}",
             node,
         )
 

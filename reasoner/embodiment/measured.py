@@ -49,7 +49,7 @@ def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alon
     found = guards(situation, facts.text(situation, "holds_if"))
     known = SINGLE if alone else (*PAIRED, *SINGLE)
     if not found:
-        raise EmbodimentError(f"{situation} has an empty :holdsIf; wanted bounds like beside <= 0.02", situation)
+        raise EmbodimentError(f"{situation} has an empty e:holdsIf; wanted bounds like beside <= 0.02", situation)
     for guard in found:
         if guard.quantity not in known:
             whose = "one individual" if alone else "an individual and a value"

@@ -49,10 +49,10 @@ def _no_mechanism(above: Sequence[str], parents: Sequence[str]) -> str:
     if not parents:
         why = f"{above[-1]} is neither an e:Mechanism nor part of one"
     elif len(parents) > 1:
-        why = f"{above[-1]} has {len(parents)} values of :partOf: {', '.join(parents)}"
+        why = f"{above[-1]} has {len(parents)} values of e:partOf: {', '.join(parents)}"
     else:
-        why = f"{above[-1]} is :partOf {parents[0]} in turn" if len(above) > 1 else "it is :partOf itself"
-    return f"{above[0]} is part of no mechanism: {why}; state one :partOf, a mechanism or a link of one"
+        why = f"{above[-1]} is e:partOf {parents[0]} in turn" if len(above) > 1 else "it is e:partOf itself"
+    return f"{above[0]} is part of no mechanism: {why}; state one e:partOf, a mechanism or a link of one"
 
 
 def _links(facts: BodyFacts, mechanism: str) -> list[str]:
@@ -70,10 +70,10 @@ def _links(facts: BodyFacts, mechanism: str) -> list[str]:
 def _link(facts: BodyFacts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
     kind, parent = facts.text(node, "joint", "fixed"), facts.linked(node, "part_of")[0]
     if kind not in JOINTS:
-        raise EmbodimentError(f"{node} has :joint '{kind}'; wanted one of {', '.join(JOINTS)}", node)
+        raise EmbodimentError(f"{node} has e:joint '{kind}'; wanted one of {', '.join(JOINTS)}", node)
     axis = facts.numbers(node, "axis", "0 0 1")
     if len(axis) != 3 or not any(axis):
-        raise EmbodimentError(f"{node} has :axis {axis}; wanted the three coordinates of a direction", node)
+        raise EmbodimentError(f"{node} has e:axis {axis}; wanted the three coordinates of a direction", node)
     upper = facts.number(node, "upper", 0.0)
     return Link(
         names(node),
@@ -105,7 +105,7 @@ def _parts(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Se
 def _part(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Part:
     kind = facts.text(node, "kind")
     if kind not in KINDS and kind != "mesh":
-        raise EmbodimentError(f"{node} has :kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}", node)
+        raise EmbodimentError(f"{node} has e:kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}", node)
     x, y, z = (facts.number(node, name) * (2 if name == "radius" else 1) for name in KINDS.get(kind, KINDS["box"]))
     file = facts.file(node, "mesh", folders) if kind == "mesh" else ""
     place = facts.position(node, "0")

@@ -26,7 +26,7 @@ def reach_relation(graph: KnowledgeGraph) -> str:
     """
     found = [row[0].value for row in graph.select(RELATIONS) if isinstance(row[0], ox.NamedNode)]
     if len(found) != 1:
-        raise KnowledgeError(f"wanted one relation that is a :ReachRelation, found {len(found)}: {', '.join(found)}")
+        raise KnowledgeError(f"wanted one relation that is a c:ReachRelation, found {len(found)}: {', '.join(found)}")
     return found[0]
 
 

@@ -185,10 +185,10 @@ def _robot(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Se
 def _hand(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Hand:
     arm, home = tuple(facts.text(node, "arm_joints").split()), facts.numbers(node, "home_posture")
     if len(arm) != len(home):
-        raise EmbodimentError(f"{node} has {len(arm)} :armJoints and {len(home)} angles in :homePosture", node)
+        raise EmbodimentError(f"{node} has {len(arm)} e:armJoints and {len(home)} angles in e:homePosture", node)
     flange, mounting = facts.text(node, "flange", ""), facts.numbers(node, "mounting", "0 0 0 0 0 0")
     if len(mounting) != 6:
-        raise EmbodimentError(f"{node} has {len(mounting)} numbers in :mounting; wanted x y z roll pitch yaw", node)
+        raise EmbodimentError(f"{node} has {len(mounting)} numbers in e:mounting; wanted x y z roll pitch yaw", node)
     prefix = f"{names(node)}." if flange else ""
     return Hand(
         names(node),

@@ -65,7 +65,7 @@ def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
                 phase.iri,
                 f"phase {phase.name} names the role {role}, which no term of {use.behavior} plays",
                 f"the skill {use.skill} needs an individual in that role",
-                f"state e:role e:{role} of one of its parameters or variables, and :asksFor e:{role} of the skill",
+                f"state e:role e:{role} of one of its parameters or variables, and e:asksFor e:{role} of the skill",
             )
 
 

@@ -93,7 +93,7 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
 
     offset = sum_of("offset", "0 0 0").split()
     if len(offset) != 3:
-        raise EmbodimentError(f"{node} has :offset '{text('offset')}'; wanted three numbers or settings: x y z", node)
+        raise EmbodimentError(f"{node} has e:offset '{text('offset')}'; wanted three numbers or settings: x y z", node)
     found = Phase(
         local_name(node),
         text("motion"),

@@ -216,7 +216,7 @@ class Definitions:
             return (ClassCondition(term, self.names.short(iri), negated),)
         if iri in self.recursive - self.concluded.keys():
             raise KnowledgeError(
-                f"{local_name(iri)} is defined by itself; let a situation type hold of it (:holdsOf {local_name(iri)}), so that "
+                f"{local_name(iri)} is defined by itself; let a situation type hold of it (c:holdsOf {local_name(iri)}), so that "
                 "who is in it follows step by step, or take it out of its definition",
                 iri,
             )
@@ -311,7 +311,7 @@ class Definitions:
         if len(kinds) != 2:
             raise KnowledgeError(
                 f"{situation} follows from axioms about its value property, so that it is about two individuals; "
-                "say by :hasSituationType which class has it"
+                "say by c:hasSituationType which class has it"
             )
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
@@ -323,7 +323,7 @@ class Definitions:
                 return kind
         raise KnowledgeError(
             f"the chain of {local_name(self._named(one)[0])} and {local_name(self._named(other)[0])} leads over individuals of "
-            "which nothing says the class; write it as a :Rule with a :Witness"
+            "which nothing says the class; write it as a c:Rule with a c:Witness"
         )
 
     # -------------------------------------------------------------------------------------------------- class expressions
@@ -486,7 +486,7 @@ class Definitions:
             if iri not in self.kinds:
                 raise KnowledgeError(
                     f"{local_name(iri)} stands in a definition, but is neither a value property nor a relation; "
-                    "declare it as a :Relation, or correct the name"
+                    "declare it as a c:Relation, or correct the name"
                 )
             return RelationCondition(self.names.short(iri), (one, other))
         situation, functional = self.situations[iri]

@@ -116,7 +116,7 @@ def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
     """Raise `KnowledgeError` if a relation has two numbers for the same individuals, or a number for only some individuals."""
     for row in bare:
-        raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its :amount")
+        raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its c:amount")
     found: dict[tuple[str, ...], str] = {}
     for *individuals, value in sorted(rows):
         if (old := found.setdefault(tuple(individuals), value)) != value:

@@ -190,7 +190,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
                 )
             if not situations[name].boolean:
                 mend = (
-                    "state the :aggregate of the rule"
+                    "state the c:aggregate of the rule"
                     if situations[name].quantity
                     else "make its value property not functional"
                 )
@@ -202,7 +202,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
         if said and len(kinds) != 1:
             raise KnowledgeError(
                 f"<{iri}> holds for the members of a class, so it has one argument, and {len(kinds)} are stated; "
-                "state by :hasSituationType which class has it"
+                "state by c:hasSituationType which class has it"
             )
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
@@ -291,7 +291,7 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
             raise KnowledgeError(f"<{iri}> is never and always true; keep one of them", iri)
         if said and not known[name].boolean:
             raise KnowledgeError(
-                f"<{iri}>: :{said[0]} constrains situation types that are true or false; {name} has other values. "
+                f"<{iri}>: c:{said[0]} constrains situation types that are true or false; {name} has other values. "
                 "Define a situation type by a rule about these values, and constrain that",
                 iri,
             )
@@ -386,7 +386,7 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
         if situation.level > behavior.level:
             raise KnowledgeError(
                 f"{behavior.name} on level {behavior.level} speaks of {part.situation}, which exists from level "
-                f"{situation.level} on; correct the behaviour's :level or the situation type's :fromLevel"
+                f"{situation.level} on; correct the behaviour's c:level or the situation type's c:fromLevel"
             )
 
 

@@ -58,7 +58,7 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
         aggregate = problem.domain.aggregates.get(symbol.situation)
         if aggregate is not None and not aggregate.kept:
             raise KnowledgeError(
-                f"'{fact}': {symbol.situation} is a {aggregate.function}; state such a goal in the scene, as a :Comparison"
+                f"'{fact}': {symbol.situation} is a {aggregate.function}; state such a goal in the scene, as a c:Comparison"
             )
         if given.setdefault(symbol, value) != value:
             raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
@@ -138,7 +138,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                 symbol, value = _bounds(iri, wanted)
                 if symbol in goal and weights.get(symbol) != weight:
                     raise KnowledgeError(
-                        f"<{iri}>: {symbol} has another goal with another weight; give both the same :weight"
+                        f"<{iri}>: {symbol} has another goal with another weight; give both the same c:weight"
                     )
                 value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
                 goal[symbol] = value
@@ -169,7 +169,7 @@ def _weight(parts: Parts, iri: str) -> Fraction | None:
     weight = parts.decimal(iri, "weight")
     if weight is not None and weight <= 0:
         raise KnowledgeError(
-            f"<{iri}>: the :weight is {written(weight)}; wanted the cost of leaving the goal unmet, above 0", iri
+            f"<{iri}>: the c:weight is {written(weight)}; wanted the cost of leaving the goal unmet, above 0", iri
         )
     return weight
 
@@ -224,7 +224,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
     if len(left) != 1:
         raise KnowledgeError(
             f"<{iri}>: the goal excludes a value of {wanted.situation}, and leaves {some_of(left) or 'none'}; state the wanted "
-            "value, or several of them as alternatives (:AnyOf)"
+            "value, or several of them as alternatives (c:AnyOf)"
         )
     return left[0]
 

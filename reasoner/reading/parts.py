@@ -62,7 +62,7 @@ class Parts(NodeReader):
         found = self.values(iri, name)
         if not found and default is not None:
             return default
-        return whole_number(self.one(iri, name), f"<{iri}>: :{name}", least, most)
+        return whole_number(self.one(iri, name), f"<{iri}>: c:{name}", least, most)
 
     def level(self, iri: str) -> int:
         """Return the level of a behaviour."""
@@ -73,7 +73,7 @@ class Parts(NodeReader):
         if not self.values(iri, "price"):
             return None
         if self.values(iri, "cost"):
-            raise KnowledgeError(f"<{iri}> has a :cost and a :price; keep one of them")
+            raise KnowledgeError(f"<{iri}> has a c:cost and a c:price; keep one of them")
         return self.expression(self.one(iri, "price"))
 
     def cost(self, iri: str) -> float:
@@ -86,7 +86,7 @@ class Parts(NodeReader):
         except ValueError:
             cost = -1.0
         if not 0 <= cost <= HIGHEST_COST:  # NaN fails both comparisons
-            raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
+            raise KnowledgeError(f"<{iri}>: c:cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
         return cost
 
     def term(self, iri: str) -> str:
@@ -132,7 +132,7 @@ class Parts(NodeReader):
         if self.is_a(situation, "Amount"):
             raise KnowledgeError(
                 f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
-                "use a :Comparison or an :AmountEffect"
+                "use a c:Comparison or a c:AmountEffect"
             )
         arguments = self.arguments(iri)
         value = [self.term(v) for v in self.values(iri, "value")]
@@ -157,7 +157,7 @@ class Parts(NodeReader):
         if isinstance(found, Amount) and not self.is_a(situation := self.situation(iri), "Amount"):
             raise KnowledgeError(
                 f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
-                "declare it as :Amount, or use a value condition or effect"
+                "declare it as c:Amount, or use a value condition or effect"
             )
         return found
 
@@ -168,13 +168,13 @@ class Parts(NodeReader):
         if twice := [kind for kind in found if found.count(kind) > 1]:
             raise KnowledgeError(
                 f"<{iri}> names the class {local_name(twice[0])} twice, so that it can't be told whether the same individual is "
-                "meant; use a :Witness with a variable for one of them"
+                "meant; use a c:Witness with a variable for one of them"
             )
         situation = self.values(iri, "situationType")[:1]
         if found and found[-1:] == [*self.values(iri, "value")] and situation and situation[0] not in self.pairs:
             raise KnowledgeError(
                 f"<{iri}> wants every {local_name(found[-1])} as the one value of {local_name(situation[0])}; name an individual, "
-                "or seek some one by a :Witness"
+                "or seek some one by a c:Witness"
             )
         return found
 
@@ -228,7 +228,7 @@ class Parts(NodeReader):
         """Return the effect of a node that changes an amount."""
         changed = self.measured(iri)
         if not isinstance(changed, Amount):
-            raise KnowledgeError(f"<{iri}>: a static relation can't be changed; make it an :Amount")
+            raise KnowledgeError(f"<{iri}>: a static relation can't be changed; make it a c:Amount")
         operation = self.word(iri, "change", OPERATIONS)
         when = self.conditions(iri, "when")
         return AmountEffect(changed.situation, changed.arguments, operation, self.right(iri), when)
@@ -270,14 +270,14 @@ class Parts(NodeReader):
         said = self.one(iri, "during")
         found = next((span for span in Span if CORE + span.value == said), None)
         if found is None:
-            raise KnowledgeError(f"<{iri}>: :during is <{said}>; wanted :atStart, :throughout or :atEnd")
+            raise KnowledgeError(f"<{iri}>: c:during is <{said}>; wanted c:atStart, c:throughout or c:atEnd")
         return found
 
     def duration(self, iri: str) -> Expression | None:
         """Return the duration of a behaviour in seconds; return None if no duration is stated."""
         if self.values(iri, "calculatedDuration"):
             if self.values(iri, "duration"):
-                raise KnowledgeError(f"<{iri}> has a :duration and a :calculatedDuration; keep one of them")
+                raise KnowledgeError(f"<{iri}> has a c:duration and a c:calculatedDuration; keep one of them")
             return self.expression(self.one(iri, "calculatedDuration"))
         return self.seconds(iri, "duration")
 
@@ -289,7 +289,7 @@ class Parts(NodeReader):
         if found is None:
             said = self.one(iri, name)[:40]
             raise KnowledgeError(
-                f"<{iri}>: :{name} is '{said}'; wanted an xsd:dayTimeDuration that isn't negative, like PT2.5S"
+                f"<{iri}>: c:{name} is '{said}'; wanted an xsd:dayTimeDuration that isn't negative, like PT2.5S"
             )
         return found
 
@@ -305,7 +305,7 @@ class Parts(NodeReader):
         """Return the rule of a derived amount whose arguments have the given classes."""
         function, derived = self.word(iri, "aggregate", AGGREGATES), self.measured(iri)
         if not isinstance(derived, Amount):
-            raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it an :Amount")
+            raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it a c:Amount")
         if function == "count" and (self.values(iri, "right") or self.values(iri, "amount")):
             raise KnowledgeError(
                 f"<{iri}> counts, and names a number besides; drop it, or aggregate by sum, max or min"
@@ -317,7 +317,7 @@ class Parts(NodeReader):
         counted = tuple(one for one in variables if one.name in over)
         if not counted:
             raise KnowledgeError(
-                f"<{iri}> aggregates over nothing; let :over name the variable that it counts or adds up"
+                f"<{iri}> aggregates over nothing; let c:over name the variable that it counts or adds up"
             )
         bound = frozenset(one.name for one in (*parameters, *counted))
         asked = closed(conditions, bound, {one.name: one.kind for one in (*parameters, *variables)})

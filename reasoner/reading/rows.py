@@ -180,7 +180,7 @@ def index_of(iri: str, index: str) -> int:
     """Return the position of a node in the declared order; a node without an index comes last."""
     if not index:
         return FIRST_INDEX_OF_NONE
-    return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
+    return whole_number(index, f"<{iri}>: c:index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
 
 
 def whole_number(text: str, what: str, least: int, most: int) -> int:

@@ -81,7 +81,8 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         - {situation for situation, _, kind in parts["node"] if kind == CORE + "Amount"},
         whole=frozenset(situation for situation, _, kind in parts["range"] if kind.endswith("integer")),
         from_levels={
-            value: whole_number(level, f"<{value}>: :fromLevel", 0, HIGHEST_LEVEL) for value, _, level in parts["level"]
+            value: whole_number(level, f"<{value}>: c:fromLevel", 0, HIGHEST_LEVEL)
+            for value, _, level in parts["level"]
         },
         facts=nodes_of(parts["fact"]),
         tuples=bool(parts["tuples"]),

@@ -67,6 +67,6 @@ def happenings(parts: Parts, schema: Schema) -> dict[str, Fraction]:
         if at is None:
             continue
         if parts.values(iri, "parameter"):
-            raise KnowledgeError(f"{local_name(iri)} happens at a time (:happensAt), so it can't have parameters")
+            raise KnowledgeError(f"{local_name(iri)} happens at a time (c:happensAt), so it can't have parameters")
         found[parts.names.short(iri)] = at
     return found

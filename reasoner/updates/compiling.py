@@ -118,7 +118,7 @@ def _compile(
         done.faults.append(Fault(Place(behavior, 1, 1), what, remedy))
         return
     if len(set(sources)) < len(sources):
-        done.faults.append(Fault(Place(behavior, 1, 1), "it extends itself", "take out one :extends"))
+        done.faults.append(Fault(Place(behavior, 1, 1), "it extends itself", "take out one c:extends"))
         return
     terms = {name: ("", *known[1:]) for source in sources for name, known in declared.get(source, {}).items()}
     compiler = UpdateCompiler(behavior, vocabulary, {**terms, **declared.get(behavior, {})})

@@ -96,7 +96,7 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                     yield (
                         case.reading.names.iri(name),
                         f"an effect of {name} on {effect.situation} of a whole class has a condition on all of {kind}",
-                        f"in :when only the effect's own class means the same individual; {kind} means all of its individuals",
+                        f"in c:when only the effect's own class means the same individual; {kind} means all of its individuals",
                         f"name the effect's class in the condition, and add a class condition for {kind}",
                     )
 

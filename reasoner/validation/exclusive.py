@@ -96,8 +96,8 @@ class _Exclusive:
             yield (
                 behavior,
                 f"after {behavior.name}, two individuals of {self.kind} can have the same {self.situation} ({value})",
-                f"add a precondition that no {self.kind} has it before: an :AbsenceCondition with :ofClass {self.kind}, "
-                f":situationType {self.situation} and :value {value}",
+                f"add a precondition that no {self.kind} has it before: a c:AbsenceCondition with c:ofClass {self.kind}, "
+                f"c:situationType {self.situation} and c:value {value}",
             )
 
     def given(self, behavior: Behavior) -> Iterator[ValueEffect]:

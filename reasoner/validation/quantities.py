@@ -70,7 +70,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
             reading.names.iri(first),
             f"{first} {done[first]} ({named}){more}".replace(f"{first} increases", f"{first} adds up", first in totals),
             "numbers of different units can't be combined",
-            "name amounts of one unit, correct a :unit, or multiply by a number that leads from one unit to the other",
+            "name amounts of one unit, correct a c:unit, or multiply by a number that leads from one unit to the other",
         )
 
 

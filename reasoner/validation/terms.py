@@ -32,12 +32,12 @@ PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Ann
 
 def undeclared_terms(case: Case) -> Iterator[Fault]:
     """Find undeclared properties and classes, and individuals without a type."""
-    seen = set()
+    seen, shipped = set(), ontology.shipped()
     for subject, iri, wanted, kinds in _undeclared(case):
         if iri in seen:
             continue
         seen.add(iri)
-        name = local_name(iri)
+        name, home = local_name(iri), iri.partition("#")[0]
         known = {other: local_name(other) for other, types in case.types.items() if not kinds or kinds & types}
         elsewhere = sorted(other for other, called in known.items() if called == name and other != iri)
         hint = f"; did you mean <{elsewhere[0]}>?" if elsewhere else nearest(name, [*known.values()])
@@ -45,7 +45,9 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
             subject.value if isinstance(subject, ox.NamedNode) else iri,
             f"{name} is used as {wanted}, but isn't declared as one{hint}",
             "an unknown name is read as a new one without a warning, and the intended statement is lost",
-            f"correct the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
+            f"import <{home}>: no file does"
+            if home in shipped and home not in case.types
+            else f"correct the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )
 
 

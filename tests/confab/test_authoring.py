@@ -54,7 +54,7 @@ def test_what_hands_reach_is_computed_when_it_is_missing_or_old(tmp_path: Path) 
     bodies.write_text(bodies.read_text().replace("e:graspHeight 0.045 ;", ""))
     os.utime(bodies, (reach.stat().st_mtime + 5,) * 2)
     assert with_current_reach(confab.load(scene), said.append).plan(mode="paper").solved
-    assert "has no :graspHeight" in said[-1]
+    assert "has no e:graspHeight" in said[-1]
 
 
 def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -> None:

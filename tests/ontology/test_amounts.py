@@ -34,7 +34,7 @@ def canteen(tmp_path: Path) -> Callable[[str, str], Path]:
         (':battery ; c:fromLevel 2 ; c:unit "Wh"', ':battery ; c:fromLevel 2 ; c:unit "min"', "min and Wh ("),
         (':BATTERY ; c:sign "<"', ':TROLLEY_AT ; c:sign "<"', "TROLLEY_AT is no amount, so that no number compares with it"),
         ('c:change "assign"', 'c:change "set"', "has no change, two, or an invalid one"),
-        ('c:sign "<" ; c:amount 20.0', 'c:sign "<"', "L2_CHARGE.notFull> has neither :amount nor :right"),
+        ('c:sign "<" ; c:amount 20.0', 'c:sign "<"', "L2_CHARGE.notFull> has neither c:amount nor c:right"),
         ("owl:NamedIndividual, c:SituationType, c:Amount", "owl:NamedIndividual, c:SituationType", "isn't declared as an amount"),
     ],
 )  # fmt: skip
@@ -53,7 +53,7 @@ def test_a_fault_in_amounts_is_found_with_its_node_and_its_mend(
         (
             "c:argument2 d:dock ; c:amount 2.0 .",
             "c:argument2 d:dock ; c:amount 2.0, 9.0 .",
-            "wanted one :amount, found 2",
+            "wanted one c:amount, found 2",
         ),
         (
             "c:argument2 d:dock ; c:amount 2.0 .",

@@ -106,7 +106,7 @@ def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wante
     [
         ("true as a text where the individual is wanted", "task.clean", "write c:true"),
         ("a text where an individual is wanted", "plate2", "name an individual"),
-        ("an amount of at least more than at most", "WEIGHT", "correct :leastAmount or :mostAmount"),
+        ("an amount of at least more than at most", "WEIGHT", "correct c:leastAmount or c:mostAmount"),
     ],
 )
 def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remedy: str, tmp_path: Path) -> None:
@@ -173,6 +173,14 @@ def test_an_undeclared_term_comes_first_and_hides_what_follows_from_it(tmp_path:
     first, *others = validate([scene])
     assert first.what.startswith("Can is used as a class, but isn't declared as one")
     assert [finding.rule for finding in others] == ["place-in-the-air"] * 2
+
+
+def test_a_term_of_a_shipped_ontology_that_no_file_imports_names_the_import(tmp_path: Path) -> None:
+    scene, domain = skeleton(tmp_path), tmp_path / "washing.ttl"
+    text = domain.read_text(encoding="utf-8")
+    domain.write_text(text.replace("  owl:imports <https://w3id.org/confab/core> ;\n", ""), encoding="utf-8")
+    told = {finding.remedy for finding in validate([scene]) if finding.what.startswith("Task is used as a class")}
+    assert told == {"import <https://w3id.org/confab/core>: no file does"}
 
 
 def test_findings_come_as_json_with_exit_code_1(tmp_path: Path) -> None:

@@ -127,8 +127,8 @@ def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
     [
         (r":memoryFormat \d+", ":memoryFormat 0", "memory of format 0, wanted"),
         (r":memoryFormat \d+", ":memoryFormat 99", "memory of format 99, wanted"),
-        (r":does ", ":did ", "wanted one :does, found 0"),
-        (r":does ", ":does :CIRCLE, ", "wanted one :does, found 2"),
+        (r":does ", ":did ", "wanted one c:does, found 0"),
+        (r":does ", ":does :CIRCLE, ", "wanted one c:does, found 2"),
         (r":index 1", ':index "some"', "broken memory"),
         (r":ValueCondition", ":ClassCondition ; :ofClass :Cup", "its :forGoal is no :ValueCondition"),
         (r":RelationCondition", ":Condition", "a condition of no known kind"),
