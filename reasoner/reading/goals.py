@@ -79,13 +79,17 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     about, name, *rest = words if len(words) > 1 else ("", "")
     if name not in known and (len(words) < 3 or about not in individuals):
         example = next((f", e.g. '{Fact(*one)}'" for one in chain(problem.goal.items(), problem.initial.items())), "")
-        meant = nearest(name, known) if len(words) > 2 else ""
+        meant = _with_situation(problem, words) or (nearest(name, known) if len(words) > 2 else "")
         raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value'{example}{meant}")
     if about not in individuals:
         raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
     if name not in known:
         meant = next((each for each, situation in known.items() if name in situation.properties), "")
-        hint = f"; it is the value property of {meant}" if meant else nearest(name, known)
+        hint = (
+            f"; it is the value property of {meant}"
+            if meant
+            else nearest(name, known) or _with_situation(problem, words)
+        )
         raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(known)})")
     situation = known[name]
     if situation.boolean and len(rest) == len(situation.arguments) - 1:
@@ -114,6 +118,19 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if about not in problem.members(situation.arguments[0]):
         raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
     return symbol, rest[-1]
+
+
+def _with_situation(problem: Problem, words: Sequence[str]) -> str:
+    """Return a hint to the fact whose object and value are the first and the last word; empty if there isn't exactly one."""
+    about, value = (words[0], words[-1]) if words else ("", "")
+    found = [
+        each.name
+        for each in problem.domain.situations.values()
+        if len(each.arguments) == 1
+        and about in problem.members(each.arguments[0])
+        and value in problem.members(each.range)
+    ]
+    return f"; did you mean '{about} {found[0]} {value}'?" if len(found) == 1 else ""
 
 
 def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:

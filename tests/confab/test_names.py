@@ -276,3 +276,9 @@ def test_a_query_in_words_and_a_call_without_a_query_name_the_shipped_queries(sc
         scene.query("what is wanted")
     line = [sys.executable, "-m", "confab", "query", "beverage-serving-moved"]
     assert "what-is-wanted" in subprocess.run(line, capture_output=True, text=True, check=False).stderr
+
+
+@pytest.mark.parametrize("fact", ["cup2 location8", "cup2 at location8", "cup2 is in location8"])
+def test_an_object_and_a_value_name_the_fact_if_one_situation_type_has_both(scene: confab.Scene, fact: str) -> None:
+    with pytest.raises(confab.KnowledgeError, match="did you mean 'cup2 LOCATION location8'"):
+        scene.with_fact(fact)
