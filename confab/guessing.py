@@ -140,7 +140,7 @@ OF_ANY = frozenset({"plan", "planning", "search"})
 """Words that are ignored if a name has other words."""
 OF_MODULE = frozenset({"scene", "ontology", "file"})
 """Words that are ignored in names of the module `confab` if a name has other words."""
-ENOUGH, FAR = 0.5, 0.1
+ENOUGH, FAR = 0.7, 0.1
 """Minimum score of a suggested name, and reduction of the score for each attribute or call that leads to the name."""
 MOST, NEAR = 3, 0.3
 """Maximum number of suggested names, and maximum difference of their scores from the best score."""
@@ -307,9 +307,7 @@ def _described_as(kind: str, name: str) -> str:
 def chosen(name: str, known: Iterable[str]) -> str:
     """Return the known parameter or option that a wrong name most likely means, or an empty text.
 
-    The values of a mapping are descriptions.
-
-    >>> chosen("timeout", ["goals", "time_limit"]), chosen("--timeout", {"--goal": "", "--time-limit": ""})
+    >>> chosen("timeout", ["goals", "time_limit"]), chosen("--timeout", ["--goal", "--time-limit"])
     ('time_limit', '--time-limit')
     >>> chosen("seed", ["goals", "time_limit"])
     ''
@@ -320,7 +318,7 @@ def chosen(name: str, known: Iterable[str]) -> str:
         there = [right for right in rights.split() if right in plain]
         if there and asked in (*rights.split(), *others.split()):
             return plain[there[0]]
-    worth = {each: score(words_of(name), each, known[each] if isinstance(known, Mapping) else "") for each in known}
+    worth = {each: score(words_of(name), each, "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
     return best if worth.get(best, 0.0) >= ENOUGH else ""
 

@@ -12,12 +12,13 @@ MODULE = {
     "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
     "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
     "from_graph from_string from_text loads load_domain load_problem Domain Robot Task get_scene get_problem "
-    "import_scene open_scene make gym Kitchen reader OWLReader Model Dataset Store",
+    "import_scene open_scene make gym Kitchen reader OWLReader Model Dataset Store kb infer knowledge_base "
+    "PlanningProblem new_problem from_name SceneGraph import_ontology",
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
     "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
     "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner "
     "planning SequentialPlanner AnytimePlanner astar bfs Solver solver Plan SequentialPlan policy Search heuristic "
-    "TaskPlanner plan_scene compute_plan solve_problem replan Replanner",
+    "TaskPlanner plan_scene compute_plan solve_problem replan Replanner Step Steps Result PlanResult TaskNetwork",
     "confab.load(SCENE).query(TEXT)": "query ask sparql select SparqlQuery run_query execute_query question "
     "prepareQuery",
     "confab.load(SCENE).verify()": "verify simulate simulation Simulator PlanValidator SequentialPlanValidator "
@@ -26,21 +27,23 @@ MODULE = {
     "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop",
     "confab.load(SCENE).explain()": "explain why explanation justify why_not Explainer reasons",
     "confab.load(SCENE).picture()": "draw show plot render image picture visualise visualize view display viz Viewer "
-    "Renderer",
-    "confab.load(SCENE).plan().report(FILE)": "report html page to_html write_report dashboard save_report",
+    "Renderer plot_scene draw_scene",
+    "confab.load(SCENE).plan().report(FILE)": "report html page to_html write_report dashboard save_report plot_plan "
+    "show_plan visualize_plan visualise_plan gantt",
     "confab.load(SCENE).serve()": "serve server endpoint Server start_server web app api rest",
     "confab.validate(FILE)": "check lint verify_file validate_scene shacl Validator is_valid consistent "
     "is_consistent sync_reasoner reasoner check_scene validate_file validate_ontology pyshacl check_consistency",
     "confab.generate(FAMILY, …)": "make_scene random_scene generate_scene Generator random synthetic families",
-    "confab.new_domain(NAME)": "new_ontology create_domain init new create make_domain scaffold template "
-    "new_scene create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator "
-    "InstantaneousAction DurativeAction define UserType add_action Situation build",
+    "confab.new_domain(NAME)": "new_ontology create_domain init new create make_domain scaffold template new_scene "
+    "create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator InstantaneousAction "
+    "DurativeAction define UserType add_action Situation build Pose Location Place Cup Bottle ObjectType Hand "
+    "Gripper Class ObjectProperty Thing",
     "confab.load(SCENE).read_plan(FILE)": "load_plan read_plan parse_plan open_plan plan_from_file from_plan",
     "confab.load(SCENE).read_episode(FILE)": "load_episode read_episode load_execution open_episode",
     "confab.load(SCENE).read_report(FILE, PLAN)": "load_report read_report load_verdicts load_verification",
     "confab.Memory.load(FILE)": "load_memory read_memory open_memory Experience memory experience load_experience",
     "confab.Memory.of(SCENE).learn(SCENE, PLAN)": "learn learning remember train fit Learner learn_from demonstrate "
-    "teach Trainer",
+    "teach Trainer learn_from_demo learn_from_demonstration demo_learn demo",
     "from confab.history import runs, compared": "runs history compare diff compare_runs compare_plans load_run "
     "read_runs list_runs log experiments",
     "confab.within(SECONDS)": "timeout time_limit set_time_limit limit deadline set_timeout Timeout budget TimeLimit",
@@ -50,50 +53,69 @@ MODULE = {
     "load_pddl parse_pddl convert pddl parse_problem import_",
     "confab.KnowledgeError": "Error ConfabError PlanningError ParseError exceptions errors SceneError NotFoundError "
     "exception",
-    "confab.load(SCENE).with_fact(FACT)": "Fact add_fact with_fact set_fact State add update assert_fact set",
+    "confab.load(SCENE).with_fact(FACT)": "Fact add_fact with_fact set_fact add update assert_fact set",
     "confab.load(SCENE).with_goal(FACT)": "Goal add_goal with_goal set_goal goals goal",
     "confab.load(SCENE).objects": "objects individuals Individual instances",
     "confab.load(SCENE).graph": "graph rdf triples to_graph ConjunctiveGraph",
     "confab.load(SCENE).owl": "owl onto_path owlready2 default_world",
     "confab.load(SCENE).board()": "board widget gui edit editor ui",
     "__version__": "version VERSION get_version",
+    "help(confab)": "help info docs doc man usage about describe",
+    "confab.load(SCENE).verify(seed=SEED)": "seed set_seed random_seed rng",
+    "confab.load(SCENE).plan().save(FILE)": "save dump write save_plan export_plan store to_json to_file",
+    "confab.practise(…)": "benchmark evaluate curve practice improve",
+    "confab mcp (in a shell)": "mcp tools agents llm",
+    "confab --help (in a shell)": "main cli command_line commands",
+    "confab fetch URL (in a shell)": "fetch download pull",
+    "confab.load(SCENE).facts": "facts State state initial_state",
 }
 COPY = "copy clone duplicate deepcopy fork snapshot"
 COMPARE = "diff compare difference compare_to equals is_equal same_as delta"
-SHOW = "print show display pretty pretty_print to_string str string format text pprint dump_text print_plan print_steps"
+SHOW = (
+    "print show display pretty pretty_print to_string str string format text pprint dump_text print_plan print_steps describe "
+    "description summary info repr signature as_string as_text to_text"
+)
 SCENE = {
-    "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch where question queries "
+    "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch question queries "
     "get_results",
     "with_fact": "add_fact set_fact set add assert_fact update change tell put set_value set_initial_value "
     "remove_fact retract insert delete remove assume modify set_init set_state assign replace with_facts "
     "set_property edit add_facts set_initial del_fact update_fact add_init observe_fact set_initial_state move "
-    "fluent_value with_init without patch apply_fact",
+    "fluent_value with_init without patch apply_fact set_location place_object put_on move_to set_position teleport "
+    "put_object move_object",
     "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
-    "clear_goals delete_goal del_goal update_goal new_goal add_task",
+    "clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
+    "achieve_goal",
     "graph.add(TRIPLE)": "add_triple add_object add_individual new_individual add_instance insert_object "
     "create_object add_node remove_object remove_triple delete_object destroy_entity add_edge remove_individual "
-    "add_objects add_class add_behavior add_action spawn add_fluent add_robot remove_node add_statement",
+    "add_objects add_class add_behavior add_action spawn add_fluent remove_node add_statement add_rule add_axiom "
+    "add_constraint add_location add_robot add_type add_property parse_into extend",
     "graph": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise save write dump to_ttl to_turtle "
     "subjects predicates_of to_owl_file store to_json json to_dict save_as write_ttl to_json_ld to_file turtle ttl "
     "bind namespace_manager value_of triples_of statements quads to_networkx nodes edges networkx to_string "
-    "export_ttl n3 as_dict subject_objects predicate_objects knowledge_graph",
+    "export_ttl n3 as_dict subject_objects predicate_objects knowledge_graph inferred inferred_graph axioms "
+    "neighbors neighbours labels comments annotations export_owl to_owl_xml dataset namespaces_graph "
+    "property_values",
     "plan": "solve find_plan search make_plan planner plan_to run_planner get_plan replan compute_plan plan_for "
-    "solve_for astar policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal",
+    "solve_for astar policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal plans "
+    "plan_all possible_plans all_plans plan_with plan_tree",
     "verify": "simulate simulation check check_plan validate_plan physics rollout verify_plan rollouts test "
     "monte_carlo is_valid_plan sim simulate_plan evaluate test_plan run_simulation check_physics",
     "execute": "run act apply step dispatch perform tick execute_plan run_plan do play replay rollout_plan start "
     "loop tick_once spin go act_on monitor run_episode progress do_action apply_action send control perform_action "
     "simulate_action transition",
-    "explain": "why why_not justify explanation reasons explain_plan because whynot why_unsolvable diagnose",
+    "explain": "why why_not justify explanation reasons explain_plan because whynot why_unsolvable diagnose "
+    "why_no_plan explain_unsolvable",
     "objects": "individuals all_objects instances things entities get_objects instances_of objects_of_type "
     "nodes_of_type members subjects_of items object user_objects get_instances names_of_objects constants "
-    "list_objects bodies search_objects",
-    "facts": "state initial initial_state init current_state get_state observe values initial_values "
-    "explicit_initial_values initial_value observation get_value initial_facts get_fact holds true_facts "
-    "world_state fact value get_initial belief is_true check_fact fluent_values get_facts current_facts init_state "
-    "atoms initial_defaults literals static_facts obs get_obs get_property predicate_values",
+    "list_objects bodies search_objects get_individual get_object find_object object_names names_of",
+    "facts": "state initial initial_state init get_state observe values initial_values explicit_initial_values "
+    "initial_value observation get_value initial_facts get_fact holds true_facts world_state fact value get_initial "
+    "belief is_true check_fact fluent_values get_facts current_facts init_state atoms initial_defaults literals "
+    "static_facts obs get_obs get_property predicate_values has_fact where get_location location_of position_of "
+    "state_of current_state is_holding current has",
     "goals": "goal_state get_goals task tasks goal get_goal goal_facts objective targets desired wanted "
-    "goal_conditions is_goal goal_reached target goal_description",
+    "goal_conditions target goal_description current_goal current_goals goal_list list_goals",
     "picture": "draw show plot render image visualise visualize to_png view display map draw_scene screenshot "
     "thumbnail diagram show_scene viewer figure svg print_map visualization",
     "behaviors": "behaviours actions operators skills get_actions action action_space behavior behaviour operator "
@@ -103,7 +125,8 @@ SCENE = {
     "object_properties data_properties situation observation_space attributes state_variables features",
     "problem.relations": "relations static relation",
     "problem.classes": "classes types sorts user_types hierarchy taxonomy class_tree type_hierarchy subclasses "
-    "type_of object_types get_class kinds is_a class_hierarchy get_types list_classes",
+    "type_of object_types get_class kinds is_a class_hierarchy get_types list_classes classes_of locations places "
+    "cups rooms tables surfaces bottles containers get_types_of",
     "problem.domain": "domain domain_name",
     "problem": "up_problem planning_problem as_problem task_definition ground grounded problem_kind",
     "to_pddl()": "pddl as_pddl get_pddl domain_pddl problem_pddl to_domain",
@@ -115,18 +138,20 @@ SCENE = {
     "with_episodes(FILE)": "add_episode add_episodes load_history history episodes log",
     "affordances": "afforded afford possible_actions applicable applicable_actions legal_actions available_actions "
     "valid_actions action_mask get_legal_actions get_applicable_actions successors can can_do is_applicable "
-    "possible feasible_actions applicable_operators",
+    "possible feasible_actions applicable_operators reachable is_reachable get_affordances affords what_can_i_do "
+    "actions_for options",
     "owl": "owlready ontology onto world get_ontology to_owl owlready2 default_world load_owl",
     "embodiment.robots": "robot robots get_robot robot_model",
-    "embodiment": "arms body urdf hands gripper joints geometry kinematics meshes poses workspace links arm agents",
+    "embodiment": "arms body urdf gripper joints geometry kinematics meshes poses workspace links arm agents camera "
+    "cameras shapes hands sensors table",
     "iri": "name uri base_iri namespace identifier namespaces prefixes ns base url id title label",
     "knowledge.path": "path file filename source location folder",
     "serve": "endpoint server start_server web api host http app rest open_page browser",
     "board": "widget editor interactive gui ui dashboard notebook",
-    "construct": "constructs describe",
+    "construct": "constructs",
     "confab.load(SOURCE)": "load open read parse from_file load_scene from_string from_graph load_file from_rdf "
     "reload loads import_file from_pddl from_ttl read_file from_json from_dict from_path from_url include reset "
-    "restore imports undo",
+    "restore undo from_name create make build new from_scene from_yaml from_owl from_text",
     "confab.validate(FILE)": "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
     "reason sync_reasoner infer warnings check_scene inconsistent_classes validation problems consistency reasoner "
     "run_reasoner",
@@ -135,19 +160,31 @@ SCENE = {
     "plan().report(FILE)": "report html page to_html write_report save_report",
     "plan().save(FILE)": "save_plan write_plan",
     "plan().cost": "cost plan_cost quality_metrics",
-    "plan().solved": "is_solvable solvable solved is_solved has_plan unsolvable is_reachable feasible",
+    "plan().solved": "is_solvable solvable solved is_solved has_plan unsolvable feasible",
     "execute().reached": "done success succeeded terminated truncated reward",
     "with_fact(FACT) (returns a changed copy), or copy.deepcopy(scene)": COPY,
     "facts == other.facts (confab plan SCENE --diff OLD says what changed in the plan)": COMPARE,
     "export --bt (in a shell)": "behavior_tree behaviortree bt to_bt tree to_behavior_tree btcpp py_trees xml",
     "applicable_query(BEHAVIOR)": "show_query get_query precondition_query",
     "plan(time_limit=SECONDS)": "timeout time_limit set_time_limit set_timeout deadline",
+    "print(scene)": "print pretty describe info summary display_text to_text repr stats statistics",
+    "[goal for goal in scene.goals if goal not in scene.facts]": "unsatisfied_goals unmet_goals open_goals "
+    "is_goal_satisfied check_goal check_goals goals_met satisfied is_goal goal_reached goals_reached is_done "
+    "goal_satisfied remaining_goals",
+    "knowledge.files": "imports imported files owl_imports sources imported_ontologies",
+    "plan(memory=FILE)": "use_memory set_memory with_memory load_memory",
+    "verify(seed=SEED)": "seed set_seed random_seed rng",
+    "problem.domain.levels": "levels level n_levels depth num_levels abstraction_levels",
+    "problem.domain.rules": "rules swrl horn_rules derived axioms_rules derived_predicates",
+    "problem.domain.constraints": "constraints",
+    "verify(video=FILE)": "video film movie record animate animation save_video gif",
+    "confab.practise(…)": "benchmark evaluate_memory curve",
 }
 RESULT = {
     "plan.steps": "steps actions action_list sequence get_steps action_names step list_actions action_sequence "
-    "solution actions_sequence step_names top_level first abstract_plan",
+    "solution actions_sequence step_names top_level first abstract_plan to_plan first_step actions_list next_action",
     "plan.primitives": "primitives leaves low_level flat flatten primitive_actions commands motions atomic "
-    "lowest_level ground_actions",
+    "lowest_level ground_actions leaf_actions primitive_steps leaf_steps leafs bottom",
     "plan.length": "length levels plan_length num_steps n_steps number_of_steps len count size num_actions depth "
     "number",
     "plan.at_level(LEVEL)": "level at_level steps_at_level by_level level_steps",
@@ -155,10 +192,10 @@ RESULT = {
     "is_success reached is_feasible found_plan finished is_sat",
     "outcome.status": "status state result code outcome_status planning_status exit_code result_status",
     "outcome.reason": "reason failure error message why_failed unsolvable why_unsolvable error_message "
-    "unsolvable_reason diagnosis failure_reason explain_failure",
+    "unsolvable_reason diagnosis failure_reason explain_failure failed",
     "cost": "metric value price total_cost plan_cost quality score objective reward metric_value g_value total_reward",
     "outcome.bound": "bound lower_bound gap is_optimal optimal proved_optimal optimality optimality_gap upper_bound "
-    "best_bound",
+    "best_bound optimal_cost best_cost",
     "seconds": "time duration runtime elapsed planning_time total_time solve_time search_time wall_time cpu_time "
     "timing timings elapsed_time metrics_time planning_seconds time_taken",
     "json()": "to_json to_dict as_dict dict dumps serialize serialise data raw as_json asdict model_dump to_yaml",
@@ -168,15 +205,17 @@ RESULT = {
     "plan.to_dot()": "to_dot dot graphviz to_graphviz",
     "plan.to_dataframe()": "to_dataframe dataframe to_pandas df to_csv table to_table pandas csv",
     "plan.to_records()": "records rows to_records to_list list as_list",
-    "why": "why_step reasons justify explain_step because explain_action reason_for why_action justification causes",
+    "why": "why_step reasons justify explain_step because explain_action reason_for why_action justification causes "
+    "explain_goal reason_of purpose why_step_is_needed",
     "why_not": "whynot contrast alternatives why_isnt counterfactual alternative instead why_not_action other_plans "
-    "what_if",
+    "what_if second_best next_best other alternatives_to compare_with",
     "verify": "simulate check validate physics rollout verify_plan simulation is_valid validate_plan simulate_plan "
     "sim test check_plan rollouts monte_carlo evaluate valid run_simulation in_physics verified",
-    "execute": "run act perform dispatch do play replay tick apply execute_plan run_plan start send deploy execution "
-    "perform_plan",
+    "execute": "run act perform dispatch do play replay tick apply execute_plan run_plan start send execution "
+    "perform_plan to_ros send_to_robot run_on_robot deploy ros publish send_goal",
     "report": "html page to_html render plot view visualise visualize draw write_report open show_plan browse viewer "
-    "plot_plan gantt picture save_report image dashboard write_html save_html to_png figure",
+    "plot_plan gantt picture save_report image dashboard write_html save_html to_png figure animate_plan "
+    "timeline_html",
     "outcome.search": "statistics stats search expansions nodes metrics log_messages expanded generated evaluated "
     "nodes_expanded search_stats num_expanded expanded_nodes n_expanded log logs evaluations search_statistics",
     "verify().video": "animate animation video movie film record gif mp4 save_video",
@@ -184,7 +223,8 @@ RESULT = {
     "start_times critical_path parallel concurrent partial_order_plan",
     "certificate": "proof certify unsolvability_proof proof_of_unsolvability unsat_core",
     "purposes": "causal_links links dependencies causal supports",
-    "labels": "label labelled names words natural_language sentences captions verbalize in_words say",
+    "labels": "label labelled names words natural_language sentences captions verbalize in_words say narrate "
+    "describe_steps in_english",
     "print(result), or report(FILE)": SHOW,
     "result.plan == other.plan": COMPARE,
     "copy.deepcopy(result)": COPY,
@@ -197,16 +237,21 @@ RESULT = {
     "outcome.engine": "planner_name engine planner engine_name solver",
     "outcome.forgone": "forgone soft_goals unmet violated preferences unmet_goals unsatisfied",
     "problem.initial": "initial_state initial facts init state_before start_state",
-    "faults(PLAN)": "errors problems violations check_faults",
+    "faults(PLAN)": "errors problems violations check_faults is_valid_plan check_plan_for",
+    "execute().episode.observed": "final_state end_state states state_after trajectory state_trajectory "
+    "state_sequence goal_state_reached state_history",
+    "plan.walk()": "walk_steps walk all_steps iterate traverse",
+    "goals": "goals_met goal goal_facts tasks",
+    "dearer()": "warnings warning hints suggestions cheaper is_cheapest",
 }
 PLAN = {
     "steps": "plan subplans actions action_list sequence get_steps children nodes items values step action_names "
-    "top_level roots to_list list as_list root first",
+    "top_level roots to_list list as_list root",
     "primitives": "leaves low_level atoms primitive_actions flat flatten lowest leaf_steps commands motions atomic "
     "flattened ground_actions linear bottom",
     "at_level(LEVEL)": "level levels by_level steps_at get_level layer steps_at_level layers",
     "length": "size n_steps count_steps depth num_steps number_of_steps len height plan_length num_actions "
-    "total_steps shape",
+    "total_steps shape n_levels num_levels levels_count step_count",
     "walk()": "iter traverse all_steps visit descendants dfs preorder iterate all_actions flatten_all recursive "
     "every_step iter_steps",
     "to_networkx()": "graph networkx to_graph nx digraph tree edges dag as_graph hierarchy",
@@ -225,7 +270,7 @@ PLAN = {
     "result.report(FILE)": "report html show_page page to_html view browse gantt",
     "result.why(STEP)": "why explain justify reasons because explanation explain_step reason",
     "result.why_not(WHAT)": "why_not whynot contrast alternatives alternative",
-    "result.cost": "cost total_cost metric price quality plan_cost value",
+    "result.cost": "cost total_cost metric price quality plan_cost value cost_per_step step_cost",
     "result.solved": "solved success is_solved found ok status",
     "result.timed": "schedule makespan timed duration timeline timed_actions start_times times total_time durations "
     "temporal parallel partial_order to_schedule end_times",
@@ -235,7 +280,8 @@ PLAN = {
     "result.labels": "labels label words in_words natural_language sentences verbalize",
     "result.problem": "problem domain environment",
     "scene.plan(GOALS) (plans aren't edited)": "append insert remove add pop replace extend delete edit "
-    "replace_action add_step replan repair substitute update set_step change refine splice clear remove_step",
+    "replace_action add_step replan repair substitute update set_step change refine splice clear remove_step concat "
+    "merge join plus add_action map push unshift",
     "print(plan)": SHOW,
     "plan == other": COMPARE,
     "copy.deepcopy(plan)": COPY,
@@ -243,12 +289,21 @@ PLAN = {
     "xml to_xml",
     "scene.to_pddl()": "to_pddl pddl as_pddl",
     "confab.Memory.of(scene).learn(scene, plan)": "learn remember memory teach train",
+    "plan[-1]": "last tail end final last_step",
+    "plan[0]": "first head first_step root_step",
+    "plan[NUMBER]": "at nth item get_step step_at step_number getitem",
+    "[step for step in plan.walk() if …]": "filter where select find_all search steps_of query",
+    "result.execute().episode.observed": "final_state states end_state state_after trajectory state_sequence "
+    "resulting_state outcome_state",
+    "scene.facts": "initial_state initial start_state init",
+    "step in plan": "contains has includes is_in has_step",
 }
 STEP = {
     "behavior": "name action operator action_name behaviour schema skill action_type verb type behavior_name kind "
     "what function_name",
     "arguments": "args parameters params objects actual_parameters operands args_list object target inputs "
-    "param_values argument_names agent location robot hand subject values",
+    "param_values argument_names agent location robot hand subject values grounded grounding ground_arguments "
+    "objects_involved",
     "steps": "children substeps sub_steps refinement actions refinements subplan decomposition sub_plan is_leaf "
     "is_primitive subtasks expand sub_actions has_children primitive leaf body tasks",
     "bindings": "variables binding substitution assignment assignments env free_variables variable_values",
@@ -260,36 +315,41 @@ STEP = {
     "scene.behaviors[step.behavior].preconditions": "preconditions precondition conditions condition requires pre "
     "requirements is_applicable applicable guard precond add_list needs",
     "scene.behaviors[step.behavior].effects": "effects effect adds deletes changes postconditions post add_effects "
-    "del_effects results_in outcomes achieves result postcondition add_effect changed_facts consequences",
+    "del_effects results_in outcomes achieves result postcondition add_effect changed_facts consequences expected "
+    "expected_effects delta_state",
     "scene.behaviors[step.behavior].cost": "cost price metric reward action_cost",
     "result.why(step)": "why explain justify reasons because purpose explanation reason goal causal_links motivation "
-    "rationale",
+    "rationale depends_on enables needed_by supports needs_steps dependencies predecessors_of causes used_by "
+    "expected_by",
     "result.why_not(WHAT)": "why_not whynot contrast alternatives alternative instead other_options",
     "result.timed": "duration start end start_time end_time time seconds makespan begin schedule finish interval "
     "starts ends t0",
-    "result.labels.step(step)": "label labels words sentence description title caption natural_language verbalize "
-    "pretty_name describe display_name human_readable",
+    "result.labels.step(step)": "label labels words sentence title caption natural_language verbalize pretty_name "
+    "display_name human_readable sentence_of",
     "scene.verify(plan)": "verify simulate check is_valid validate success status ok verdict succeeded failed valid",
-    "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor",
+    "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor done "
+    "execute_step completed executed started",
     "print(step)": SHOW,
     "vars(step)": "to_dict as_dict json to_json dict asdict serialize data to_record items keys",
     "step == other": COMPARE,
     "copy.deepcopy(step)": COPY,
     "plan.index(step)": "next previous next_step prev previous_step successors predecessors before after sibling "
     "siblings",
+    "result.problem": "world state domain",
 }
 EXECUTION = {
     "reached": "success succeeded ok solved done is_done finished goal_reached completed complete verified result "
     "terminated is_success achieved passed goals_reached truncated is_finished",
     "plan": "steps actions executed done_plan trace executed_steps performed path action_history executed_plan "
-    "primitives",
+    "primitives final_plan new_plan current_plan last_plan",
     "episode": "history log trajectory record logs steps_taken rollout transcript",
     "episode.events": "events observations states observed seen messages event_log obs timeline observation "
     "state_history feedback",
     "episode.replans": "replans repairs changes replanning n_replans num_replans replan_count recoveries "
     "number_of_replans repaired plan_changes",
     "episode.failures": "failures errors faults failed problems exceptions failed_steps failed_actions failure error",
-    "episode.interventions": "interventions disturbances perturbations surprises changes_of_the_world interrupts",
+    "episode.interventions": "interventions disturbances perturbations surprises changes_of_the_world interrupts "
+    "was_interrupted interrupted",
     "episode.status": "status state outcome reason return_code final_status",
     "json()": "to_json to_dict as_dict dict dumps serialize serialise data asdict as_json",
     "report": "html show page to_html render plot view visualise visualize video display draw replay write_report "
@@ -297,7 +357,8 @@ EXECUTION = {
     "save": "dump write to_file store export persist save_json save_as write_ttl to_ttl save_episode",
     "summary()": "describe explain message text info stats statistics print pretty to_string metrics string str",
     "scene.read_episode(FILE)": "load from_file open read from_json parse loads",
-    "episode.observed": "final_state end_state last_state state_after current_state final_facts facts final",
+    "episode.observed": "final_state end_state last_state state_after current_state final_facts facts final "
+    "robot_states robot_state state_of final_observations",
     "graph()": "networkx to_networkx to_graph nx tree to_dot dot digraph",
     "scene.execute()": "resume continue_ restart run step again rerun execute repeat reset retry",
     "memory.learn(scene, execution)": "learn remember train memory teach",
@@ -305,6 +366,8 @@ EXECUTION = {
     "episode.seconds": "seconds time duration elapsed runtime total_time wall_time",
     "result.cost": "cost reward total_reward total_cost score return_ returns",
     "plan.length": "length num_steps n_steps size len count",
+    "scene.execute(world=WORLD)": "world simulator env environment backend robot",
+    "episode.reasons": "failure_reason why_failed error_message why",
 }
 REPORT = {
     "verified": "success succeeded ok passed valid is_valid result reached solved status all_passed good_plan is_ok "
@@ -345,26 +408,32 @@ MEMORY = {
     "merge(OTHER)": "combine join union extend add_memory update_from plus merge_with concat share sync",
     "table()": "counts stats statistics dataframe to_dataframe show links_table entries episodes rows list print "
     "to_pandas df items all size len length num_episodes n_episodes records num_rules summary describe info data "
-    "count to_json to_dict json probability probabilities likelihood confidence cogency",
+    "count to_json to_dict json probability probabilities likelihood confidence cogency is_empty scenes entries_of "
+    "links_of print_table",
     "advice()": "rules advise suggest suggestions recommend preferences weights learned what_learned insights "
     "predict policy best model get_rules parameters coefficients",
-    "confab.Memory.of(SCENE) (a new memory)": "clear reset forget wipe delete erase remove empty_out unlearn drop",
+    "confab.Memory.of(SCENE) (a new memory)": "clear reset forget wipe delete erase remove empty_out unlearn drop "
+    "prune forget_all",
     "scene.explain(memory=memory)": "explain why",
     "scene.plan(memory=memory)": "plan solve use apply query search guide rank",
     "page()": "html report visualise visualize plot to_html draw view display dashboard",
     "copy.deepcopy(memory)": COPY,
+    "table().csv()": "export_csv to_csv csv save_csv",
+    "trust(REPLICAS)": "trust_all trusted",
 }
 TABLE = {
-    "dataframe()": "to_dataframe df to_pandas pandas frame as_dataframe",
+    "dataframe()": "to_dataframe df to_pandas pandas frame as_dataframe to_numpy sort filter sort_values groupby "
+    "pivot plot to_excel",
     "csv()": "to_csv save write to_file export dump",
     "records()": "to_dict to_dicts dicts to_records json to_json as_dict to_list dict data bindings asdict",
     "[*table]": "rows list fetchall results all items tolist head fetch tail first values_list fetchone itertuples "
     "iterrows sample one scalar single",
     "len(table)": "length size count num_rows row_count n_rows shape nrows",
-    "columns": "vars variables header headers keys names fields column_names column",
-    "truth": "askAnswer ask answer boolean as_bool",
+    "columns": "vars variables header headers keys names fields column_names column num_columns n_columns",
+    "truth": "askAnswer ask answer boolean as_bool bool yes",
     "print(table)": SHOW,
     "copy.deepcopy(table)": COPY,
+    "dataframe().to_html()": "to_html html",
 }
 PROBLEM = {
     "domain.behaviors": "actions operators behaviors behaviours action schemas action_schemas",
@@ -397,43 +466,53 @@ HINTS: Mapping[str, Mapping[str, str]] = {
 }
 """The tables of wrong names, by kind of object."""
 COMMANDS = {
-    "plan": "solve search find compute think astar replan goal planner",
+    "plan": "solve search find compute think astar replan goal planner make-plan get-plan find-plan find-solution "
+    "compute-plan run-planner",
     "plan --diff OLD_SCENE": "diff plan-diff changes delta what-changed",
     "run": "demo all main pipeline start quickstart example tutorial hello main-job everything launch go bringup",
     "verify": "simulate simulation sim physics rollout check-plan validate-plan test-plan verify-plan rollouts "
     "evaluate eval val test",
-    "execute": "act do run-plan execute-plan play step perform dispatch exec loop robot control monitor tick replay "
-    "bt execute-bt send drive move",
-    "explain": "why why-not whynot reason reasons justify explain-plan because diagnose contrast",
+    "execute": "act do run-plan execute-plan play perform dispatch exec loop control monitor tick replay execute-bt "
+    "send drive resume repair step move react closed-loop recover",
+    "explain": "why why-not whynot reason reasons justify explain-plan because diagnose contrast goals-why why-plan",
     "learn": "train fit teach practise practice learn-from demonstrate demo-learn imitate training",
     "memory": "experience mem rules memories forget knowledge",
     "report": "html page visualize visualise show view render write-report plot display present gantt report-plan "
-    "print",
+    "print show-plan visualise-plan visualize-plan view-plan plan-report view-scene",
     "runs": "history compare log logs experiments results list-runs past show-runs compare-runs diff-runs mlflow "
     "track previous",
-    "query": "ask sparql select search-graph find-facts facts objects triples rdf q state get arq",
+    "query": "ask sparql select search-graph find-facts facts triples rdf q state get arq objects goals list-objects "
+    "list-facts list-goals individuals show-facts locations where",
     "query SCENE --affords all": "affordances applicable affords legal-actions actions possible",
     "query SCENE --show BEHAVIOR": "behaviors behaviours operators skills show-query",
     "serve": "server web ui gui app endpoint start-server dashboard live host http watch browser board open webui "
     "edit interactive rviz viewer api http-server up notebook daemon studio",
     "mcp": "agent agents llm mcp-server tools chat assistant claude",
-    "picture": "draw image map diagram png svg screenshot graph tree picture-of visual dot graphviz classes "
-    "ontology-graph figure hierarchy",
+    "picture": "draw image map diagram png svg screenshot graph picture-of visual dot graphviz classes "
+    "ontology-graph figure hierarchy visual-graph tree",
     "validate": "check lint shacl consistency reasoner doctor check-scene validate-file consistent infer errors "
     "verify-file format fmt hermit test-scene",
     "new": "init create scaffold startproject template begin create-domain new-domain make start-project bootstrap "
-    "add new-scene create-scene setup skeleton new-project",
-    "generate": "gen random make-scene random-scene synth generate-scene sample bench benchmark families build",
+    "add new-scene create-scene setup skeleton new-project create-ontology new-ontology start-domain",
+    "generate": "gen random make-scene synth generate-scene sample bench benchmark build families generate-scenes "
+    "random-scene",
     "convert": "transform translate to-sparql rewrite convert-behaviors",
     "fetch": "download get-ontology pull install clone-ontology wget add-import update imports",
-    "import": "read-pddl from-pddl load import-pddl pddl2owl pddl-import parse ros load-pddl load-world upload",
-    "export": "to-pddl pddl write-pddl save export-pddl behavior-tree behaviortree bt-export trajectory dump write "
-    "to-bt",
+    "import": "read-pddl from-pddl load import-pddl pddl2owl pddl-import parse load-pddl load-world upload",
+    "export": "to-pddl pddl write-pddl save export-pddl trajectory dump write",
     "scenes": "list ls list-scenes examples info describe inspect catalog show-scenes domains available datasets "
     "problems inventory status objects-of stat levels worlds envs samples about",
     "--help": "help usage man manual commands docs ?",
     "--version": "version ver",
     "--completion SHELL": "completion completions install-completion",
+    "plan --optimal": "optimize optimise optimal shortest cheapest best",
+    "verify --video OUT.mp4": "film video record movie animate animation record-video gif",
+    "plan --minimise makespan": "schedule makespan timeline parallel temporal",
+    "export --bt": "bt behavior-tree behaviortree bt-export to-bt behaviour-tree",
+    "execute --intervene": "interrupt disturb intervene perturb inject",
+    "execute --on INTERFACE:ADDRESS": "robot robots connect ros ros2 hardware real",
+    "plan --memory FILE": "use-memory plan-with-memory",
+    "python -c 'import confab'": "shell repl console ipython python interactive-shell",
 }
 """Names of commands, and other words for them."""
 OPTIONS = {
@@ -444,17 +523,18 @@ OPTIONS = {
     "rounds": "epochs iterations episodes repeat n_rounds n passes repeats",
     "seed": "random_seed rng random_state s seeds",
     "format": "fmt output_format csv results type as tsv f",
-    "json": "format fmt json_output as_json output_format machine to_json print_json structured jsonl",
-    "output path folder": "out outfile output_file out_dir save write dest to output_dir directory destination "
-    "out_file file target result_file plan_file save_to dir sas_plan output_folder o outdir output_path filename "
-    "file_name",
-    "report": "html page visualize visualise web show_html view render plot html_report",
+    "json": "format fmt json_output as_json output_format machine to_json print_json structured jsonl pretty indent "
+    "text stdout",
+    "output path folder": "html save_plan out outfile output_file out_dir save write dest to output_dir directory "
+    "destination out_file file target result_file plan_file save_to dir sas_plan output_folder o outdir output_path "
+    "filename file_name",
+    "report": "html page visualize visualise web show_html view render plot html_report show open pretty browser",
     "video": "film movie record record_video mp4 save_video video_file animation gif capture",
     "gui": "render viewer window show display visualise visualize human headless gui_on interactive use_gui "
     "render_mode",
     "goals goal": "target task objective goal_state set_goal targets new_goal want desired goal_facts tasks to_achieve",
     "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights "
-    "learned_from",
+    "learned_from use",
     "no_memory": "without_memory no_learning fresh memoryless",
     "engine": "planner solver backend heuristic search_engine up_engine planner_name fast_downward external "
     "algorithm search use",
@@ -494,13 +574,14 @@ OPTIONS = {
     "watch": "live follow show display render visualize animate",
     "perturbed": "randomised",
     "keep": "history save_run store archive track log_run",
-    "no_video": "skip_video no_film without_video headless fast no_record",
+    "no_video": "skip_video no_film without_video headless fast no_record no_physics quick",
     "learn": "train remember update_memory learning fit",
     "rows": "limit max_rows n head top max_results",
     "diff": "compare changes against_scene delta difference",
     "instead": "step replace at in_place_of",
     "family": "kind type name template scenario",
     "behavior": "action operator skill behaviour name",
+    "from_observed": "initial_state input start",
 }
 """Names of parameters in Python, which are also the names of options without ``--`` and with ``-``, and other words for them.
 

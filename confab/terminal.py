@@ -205,13 +205,7 @@ def _usage(error: Any) -> str:
         sys.exit(MISUSE)
     command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from confab.guessing import chosen
-
-        options = [each for each in error.ctx.command.params if isinstance(each, click.Option)]
-        helps = {one: each.help or "" for each in options for one in each.opts if one.startswith("--")}
-        right = chosen(error.option_name, helps)
-        if right:  # click suggests only options of similar spelling
-            return f"no such option '{error.option_name}'. Did you mean '{right}'? See {command} --help"
+        return f"no such option '{error.option_name}'{_in_place_of(error.option_name, error.ctx)}; see {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 
@@ -233,6 +227,28 @@ def by_options(text: str) -> str:
         "give more time", "give more time (--time-limit)"
     )
     return PARAMETER.sub(option, text)
+
+
+def _in_place_of(option: str, context: click.Context) -> str:
+    """Return what does the work of an unknown option: another option, an argument, or an option of other commands."""
+    from confab.guessing import chosen
+
+    def names(command: click.Command | None) -> list[str]:
+        options = [each for each in command.params if isinstance(each, click.Option)] if command else []
+        return [name for each in options for name in each.opts if name.startswith("--")]
+
+    if meant := chosen(option, names(context.command)):
+        return f"; did you mean '{meant}'?"
+    plain = option.lstrip("-").replace("-", "_").lower()
+    for each in context.command.params:
+        if isinstance(each, click.Argument) and plain in (each.name, *(each.metavar or "").lower().split(".")):
+            return f"; give {each.metavar} without the name of an option"
+    group = context.find_root().command
+    if not isinstance(group, click.Group):
+        return ""
+    commands = {name: names(group.get_command(context, name)) for name in group.list_commands(context)}
+    others = [name for name, known in commands.items() if option in known]
+    return f"; it is an option of {', '.join(others)}" if others else ""
 
 
 def remark(text: str) -> None:
