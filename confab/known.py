@@ -268,7 +268,8 @@ class Known(metaclass=RightNames):
     def query(self, sparql: str | Path, limits: QueryLimits | None = None) -> Table:
         """Return the result of a SPARQL 1.1 query (SELECT, ASK or CONSTRUCT) as a table.
 
-        The query is given as text, as a ``.rq`` file, or by the name of a shipped query (``ontology/questions``).
+        The query is given as text, as a ``.rq`` file, or by the name of a shipped query (``ontology/questions``). The graph
+        has stated and inferred facts; default values are only in `facts`.
 
         A query can use the prefixes of the scene's file and of its imports. If two files declare a prefix, the scene's file has
         precedence. ``:name`` denotes a term of the core ontology if the scene's namespace has no such name. The query runs in a

@@ -43,6 +43,11 @@ def test_every_prefix_means_what_the_scenes_file_says(scene: confab.Scene) -> No
         assert own.items() <= other.knowledge.spoken.items(), name
 
 
+def test_a_default_value_is_a_fact_of_the_scene_and_not_in_its_graph(scene: confab.Scene) -> None:
+    assert "left_hand HOLDS nothing" in scene.facts
+    assert len(scene.query("SELECT ?hand { ?hand k:holds ?what }")) == 0
+
+
 def test_names_of_the_core_need_no_prefix_of_their_own(scene: confab.Scene) -> None:
     rows = scene.query("SELECT ?b WHERE { ?b a :Behavior ; rdfs:label ?text FILTER(?text != ':cup1') } # :cup1")
     assert len(rows) == len(scene.problem.domain.behaviors)
