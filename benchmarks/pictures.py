@@ -75,7 +75,7 @@ def house(studio: Studio) -> None:
 
 
 def failed(studio: Studio) -> None:
-    """Picture a run that fails in physics."""
+    """Draw a run that fails in physics."""
     run(Job(TABLE, studio.work / "failed", noise=NOISE, seed=1))
     studio.take("failed", (studio.work / "failed" / "report.html").as_uri())
 

@@ -293,7 +293,7 @@ class Reading:
     def before(self, symbol: Symbol) -> Range | None:
         """Return the range of an amount before an effect, or None if the symbol doesn't exist.
 
-        The range of a total without bounds is taken from the knowledge, and not calculated by its definition.
+        For a sum or count without bounds, the range isn't calculated from the definition, since no bound forbids an effect.
         """
         quantity = self.lowest.quantity(symbol.situation)
         free = symbol.situation in self.problem.domain.aggregates and quantity is not None and not quantity.bounded

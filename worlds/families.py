@@ -16,7 +16,7 @@ FAMILIES = ("served", "swap", "rotate", "full", "packed", "handover", "blocked")
 
 @lru_cache(maxsize=1)
 def tabletop() -> Problem:
-    """Return the problem of the shipped scene, whose domain and classes the tables share."""
+    """Return the problem of the shipped scene. All tables have the domain and the classes of this scene."""
     return read(load("beverage-serving")).problem
 
 

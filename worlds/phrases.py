@@ -32,7 +32,7 @@ EACH, ANYONE = "?each", "?anyone"
 
 
 MOST_TERMS = 3
-"""Number of terms of a behaviour below which an effect without a fitting term may get a new parameter."""
+"""An effect without a fitting term may get a new parameter only if the behaviour has fewer terms than this number."""
 CONDITIONS = (
     *("value", "value", "value", "binding", "near", "class", "equal", "witness", "absence", "every", "any"),
     *("amount", "amount"),

@@ -167,7 +167,7 @@ def search(
         if deadline is not None and perf_counter() > deadline:
             return gave_up(Reason("the time limit came first"))
     if order.best is None:
-        reason = Reason("none of the reachable states that were searched satisfies the goal")
+        reason = Reason("all reachable states were searched, and none of them satisfies the goal")
         return Flat(Status.UNSOLVABLE, (), reason, counts, total)
     plan: Sequence[int] = path_to(order.reached, order.best)
     if found:

@@ -143,7 +143,7 @@ class InterfaceWorld:
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
-        """Stop the running action. If `execute` no longer waits for the action to cancel it, `stop` cancels the action."""
+        """Stop the running action. `stop` itself cancels the action if no call of `execute` waits for the action."""
         with self.changed:
             self.stopping = self.running is not None
             abandoned = self.stopping and not self.waiting
