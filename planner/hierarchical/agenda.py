@@ -24,6 +24,7 @@ from confab.planner.hierarchical.search_budget import (
     FEW_STEPS,
     MOST_OPERATORS,
     ONE_STEP,
+    PART,
     WHOLE,
     WIDER,
     SearchBudget,
@@ -286,9 +287,11 @@ class Agenda:
             return False
         self._tried[level] = len(call.steps)
         open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
-        if open_ and not self.solvable:
+        if not open_ or call.reach(level, open_, PART):
+            return bool(open_)
+        if not self.solvable:
             self._certify(WHOLE.work)
-        return bool(open_) and call.reach(level, open_, WHOLE)
+        return call.reach(level, open_, WHOLE)
 
     # ------------------------------------------------------------------------------------------------------------ proofs
 

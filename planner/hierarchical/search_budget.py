@@ -41,6 +41,8 @@ ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), Se
 """Budgets for one relevant step towards a goal, for a few relevant steps towards a goal, and for a refinement."""
 SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)
 WIDE, WHOLE = SearchBudget(questions=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
+PART = SearchBudget(work=MUCH // 8)
+"""Budget for a search of a whole level before a proof of unsolvability is tried."""
 
 
 def scopes(size: int) -> tuple[SearchBudget, ...]:

@@ -126,12 +126,13 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     """Return whether a new plan is cheaper than the old plan and violates no more conditions of upper levels.
 
     The new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If
-    primitives replace steps of the most abstract level, the new plan must be cheaper by the factor `KEPT`.
+    primitives replace steps of a plan that consists of steps of the most abstract level, the new plan must be cheaper by the factor
+    `KEPT`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     first, last = problem.domain.levels[0], problem.domain.levels[-1]
     lost = sum(step.level == first for step in old.steps) - sum(step.level == first for step in new.steps)
-    dear = lost > 0 and first != level == last
+    dear = lost > 0 and first != level == last and all(step.level == first for step in old.steps)
     return (
         before > price * (KEPT if dear else 1.0)
         and PER_PRIMITIVE * (before - price) * len(old.primitives) > lost * before
