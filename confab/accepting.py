@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NoReturn, Protocol, SupportsIndex, TypeAlias, 
 from confab import ontology
 from confab.interchange import read_plan
 from confab.planner.plan import Plan
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import Deadline
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import ImpossibleStateError
@@ -165,9 +165,13 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
         raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")
 
 
-def shipped_queries() -> dict[str, Path]:
-    """Return the files of the shipped queries by name."""
-    return {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) -> dict[str, str]:
+    """Return the shipped queries by name, with or without those on episodes; of a graph, those whose prefixes it declares."""
+    from confab.reasoner.graph.query_process import unknown_prefixes
+
+    files = sorted((ontology.ROOT / "questions").glob("**/*.rq" if episodes else "*.rq"))
+    texts = {file.stem: file.read_text(encoding="utf-8") for file in files}
+    return {name: text for name, text in texts.items() if graph is None or not unknown_prefixes(graph, text)}
 
 
 def check_seconds(name: str, given: object) -> None:
@@ -186,13 +190,13 @@ def check_seconds(name: str, given: object) -> None:
         raise KnowledgeError(f"{name}={given}; wanted more than 0 seconds")
 
 
-def sparql_of(given: str | Path) -> str:
+def sparql_of(given: str | Path, graph: KnowledgeGraph | None = None) -> str:
     """Return the text of a SPARQL query, which is given as text, as a file, or by the name of a shipped query.
 
     Raises
     ------
     KnowledgeError
-        The file or the shipped query doesn't exist.
+        The file or the shipped query doesn't exist, or the graph lacks the vocabulary of the shipped query.
 
     Examples
     --------
@@ -212,9 +216,12 @@ def sparql_of(given: str | Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     if path.suffix or "/" in given:
         raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
-    ready = shipped_queries()
+    ready = shipped_queries(graph)
     if given in ready:
-        return ready[given].read_text(encoding="utf-8")
+        return ready[given]
+    if given in shipped_queries():
+        text = f"the shipped query '{given}' uses a vocabulary that this scene doesn't import"
+        raise KnowledgeError(f"{text}; shipped queries for this scene: {', '.join(ready)}")
     if given.replace("-", "").isalpha() or "-".join(given.split()) in ready:
         raise KnowledgeError(f"no shipped query '{given}'{nearest(given, ready)} (shipped: {', '.join(ready)})")
     return given

@@ -294,7 +294,7 @@ class Known(metaclass=RightNames):
         """
         from confab.reasoner.graph.query_process import ask, unheard_of
 
-        sparql = sparql_of(sparql)
+        sparql = sparql_of(sparql, self.knowledge)
         kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
@@ -351,7 +351,7 @@ class Known(metaclass=RightNames):
         KnowledgeError, LimitError
             The query fails as described in `query`, or is no CONSTRUCT query.
         """
-        sparql = sparql_of(sparql)
+        sparql = sparql_of(sparql, self.knowledge)
         if path is not None:
             from confab.reasoner.graph.construct import write_construct
 

@@ -22,7 +22,7 @@ from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
-from confab.reasoner.vocabulary import CORE
+from confab.reasoner.vocabulary import CORE, INDIVIDUAL, OWL
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -387,14 +387,22 @@ def scenes() -> list[str]:
 
 
 def described() -> Table:
-    """Return a table of the shipped scenes: name, title, description, and whether physics can verify plans for the scene."""
+    """Return a table of the shipped scenes: name, levels, individuals of its file, whether physics can verify plans, and title."""
     import pyoxigraph as ox
 
-    terms, rows = "http://purl.org/dc/terms/", []
+    files, read, rows = ontology.shipped(), dict[Path, list[tuple[str, str]]](), []
     for name, file in ontology.scenes().items():
-        said: dict[str, str] = {}
-        for quad in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
-            said.setdefault(quad.predicate.value, getattr(quad.object, "value", ""))
-        physics = "symbols only" if said.get(CORE + "symbolicOnly") == "true" else "physics"
-        rows.append((name, said.get(terms + "title", ""), physics, said.get(terms + "description", "")))
-    return Table(("scene", "title", "verified by", "description"), tuple(rows))
+        waiting, whole = [file], dict[Path, list[tuple[str, str]]]()
+        while waiting:
+            one = waiting.pop()
+            if one not in read:
+                quads = ox.parse(path=str(one), format=ox.RdfFormat.TURTLE)
+                read[one] = [(quad.predicate.value, getattr(quad.object, "value", "")) for quad in quads]
+            whole[one] = read[one]
+            imported = {files.get(value) for predicate, value in read[one] if predicate == f"{OWL}imports"}
+            waiting += [each for each in imported if each is not None and each not in whole]
+        levels = {value for pairs in whole.values() for predicate, value in pairs if predicate == f"{CORE}level"}
+        said, individuals = dict(reversed(read[file])), sum(value == INDIVIDUAL for _, value in read[file])
+        physics = "symbols only" if said.get(f"{CORE}symbolicOnly") == "true" else "physics"
+        rows.append((name, str(len(levels)), str(individuals), physics, said.get("http://purl.org/dc/terms/title", "")))
+    return Table(("scene", "levels", "individuals", "verified by", "title"), tuple(rows))

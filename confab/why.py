@@ -22,6 +22,7 @@ from confab.reasoner.limits import check
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
+from confab.worded import worded_behavior, worded_fact
 
 MOST_TOLD = 12
 """Maximum number of facts of one kind in the text about a certificate."""
@@ -343,7 +344,8 @@ def why_not(
     asked : str
         The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``, which may be followed by
         ``by hand2``, the individual that must take part in its changes. A behaviour has arguments in the order of its
-        parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``.
+        parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of explanations,
+        such as ``pick cup 1 with right hand``, are accepted, too.
     problem, plan
         The problem and its plan.
     labels : Labels
@@ -367,14 +369,21 @@ def why_not(
             labels,
             instead_of(problem, plan, behavior, _given(problem, behavior, rest), ask, instead),
         )
+    if (worded := worded_behavior(problem, labels, asked)) is not None:
+        return _step_told(
+            asked, problem, plan, labels, instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
+        )
     by = BY.search(asked)
     fact = BY.sub("", asked.strip())
+    if (said := worded_fact(problem, labels, fact)) is not None:
+        fact = str(said)
     words = [*fact.split(), "", ""]
     if words[1] not in problem.domain.situations and (not words[2] or first not in problem.individuals):
         known = [*problem.domain.behaviors, *problem.domain.situations]
         hint = nearest(first, problem.domain.behaviors) or nearest(words[1], known)
+        example = next((str(Fact(*goal)) for goal in sorted(problem.goal.items())), "cup2 LOCATION location8")
         raise KnowledgeError(
-            f"'{asked}' is neither a fact (cup2 LOCATION location8, maybe with 'by left_hand') nor a behaviour{hint}"
+            f"'{asked}' is neither a fact ('{example}', maybe with 'by INDIVIDUAL') nor a behaviour with individuals{hint}"
         )
     return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan)
 

@@ -150,7 +150,7 @@ def query(
         if sparql is None and affords is None:
             from confab.accepting import shipped_queries
 
-            shipped = ", ".join(shipped_queries())
+            shipped = ", ".join(shipped_queries(loaded.knowledge))
             raise KnowledgeError(
                 f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --show BEHAVIOR or --affords OBJECT"
             )

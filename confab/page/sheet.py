@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypedDict
 
 from confab import ontology
-from confab.accepting import check_goal, possible
+from confab.accepting import check_goal, possible, shipped_queries
 from confab.known import Known
 from confab.labels import Labels, labels_of
 from confab.page.data import page_data
@@ -209,15 +209,12 @@ def _called(method: str, facts: Sequence[str]) -> str:
 
 def ready_queries(graph: KnowledgeGraph) -> list[ReadyQuery]:
     """Return the shipped queries that apply to a scene, in the order of their names."""
-    from confab.reasoner.graph.query_process import unknown_prefixes
-
     found: list[ReadyQuery] = []
-    for path in sorted((ontology.ROOT / "questions").glob("*.rq")):
-        lines = path.read_text(encoding="utf-8").splitlines()
-        question = next((line.partition(":")[2].strip() for line in lines if line.startswith("# Question:")), path.stem)
+    for name, whole in shipped_queries(graph, episodes=False).items():
+        lines = whole.splitlines()
+        question = next((line.partition(":")[2].strip() for line in lines if line.startswith("# Question:")), name)
         text = "\n".join(line for line in lines if not line.startswith("#"))
-        if not unknown_prefixes(graph, text):
-            found.append({"name": path.stem, "question": question, "text": text.strip()})
+        found.append({"name": name, "question": question, "text": text.strip()})
     return found
 
 

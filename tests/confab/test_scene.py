@@ -8,6 +8,7 @@ import pytest
 import confab
 from confab.interchange import read_plan
 from confab.planner.solve import Mode
+from confab.scene import described
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +87,10 @@ def test_a_memory_learns_saves_and_loads(tmp_path: Path, scene: confab.Scene, re
 def test_an_unknown_name_of_the_package_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match=r"the module confab has no 'plann'"):
         _ = confab.plann
+
+
+def test_the_shipped_scenes_are_listed_with_their_levels_and_individuals() -> None:
+    rows = {row["scene"]: row for row in described()}
+    assert rows.keys() == set(confab.scenes())
+    assert rows["beverage-serving"][1:4] == ("3", "13", "physics")
+    assert rows["towers-small"]["verified by"] == "symbols only"

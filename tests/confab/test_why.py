@@ -200,3 +200,21 @@ def test_an_alternative_that_leaves_the_bounds_of_an_amount_is_not_called_applic
     told = str(confab.load(str(tmp_path / "canteen-small.ttl")).plan().why_not("L2_DRIVE trolley table2", place))
     assert said in told
     assert "could be done" not in told
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("move cup 1 to location 8", "B1_MOVE cup1 location8"),
+        ("pour bottle1 to cup2", "B1_POUR bottle1 cup2"),
+        ("cup 2 is at location 8", "cup2 LOCATION location8"),
+    ],
+)
+def test_an_alternative_is_given_by_names_or_in_the_words_of_an_explanation(words: str, names: str) -> None:
+    result = confab.load("beverage-serving").plan()
+    assert str(result.why_not(words)).partition("\n")[0] == str(result.why_not(names)).partition("\n")[0]
+
+
+def test_a_shipped_query_is_offered_where_its_vocabulary_is_used() -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"a vocabulary that this scene doesn't import; .*what-is-wanted"):
+        confab.load("towers-small").query("where-is-everything")
