@@ -236,8 +236,10 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 
 TYPED = 0.85
 """Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
-KNOWN_WORDS = 0.55
-"""Minimum share of the words of a wrong name that an entry of a table must have, weighted by `weights`."""
+PART = 0.6
+"""Value of a word that an entry of a table has only in longer names."""
+KNOWN_WORDS = 0.4
+"""Minimum share of the words of a wrong name that an entry of a table must have; rare words weigh more."""
 
 
 def whole(table: Mapping[str, str], name: str) -> str:
@@ -249,7 +251,7 @@ def whole(table: Mapping[str, str], name: str) -> str:
     return ""
 
 
-def by_words(table: Mapping[str, str], wanted: tuple[str, ...]) -> str:
+def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = KNOWN_WORDS) -> str:
     """Return the key of a table whose own words and values have the most of some words.
 
     The weight of a word is greater if fewer entries have it. The result is empty if no entry has enough of the words.
@@ -257,19 +259,20 @@ def by_words(table: Mapping[str, str], wanted: tuple[str, ...]) -> str:
     >>> by_words({"with_fact": "add set", "with_goal": "add", "facts": "state"}, ("add", "goal"))
     'with_goal'
     """
-    bags = {
-        right: {
-            stem(word)
-            for name in (re.split(r"[( ]", right)[0].rpartition(".")[2], *others.split())
-            for word in words_of(name)
-        }
-        for right, others in table.items()
-    }
+    bags = dict[str, dict[str, float]]()
+    for right, others in table.items():
+        names = (re.split(r"[( ]", right)[0].rpartition(".")[2], *others.split())
+        bag = bags.setdefault(right, {})
+        for words in map(words_of, names):
+            if {*map(stem, words)} == {*map(stem, wanted)}:
+                return right
+            for word in map(stem, words):
+                bag[word] = max(bag.get(word, 0.0), 1.0 if len(words) == 1 else PART)
     many = Counter(word for bag in bags.values() for word in bag)
-    weights = {word: 1.0 / max(many[word], 1) for word in map(stem, wanted)}
-    worth = {right: sum(weights[word] for word in weights.keys() & bag) for right, bag in bags.items()}
+    weights = {word: 1.0 / max(many[word], 1) ** 0.5 for word in map(stem, wanted)}
+    worth = {right: sum(weights[word] * bag.get(word, 0.0) for word in weights) for right, bag in bags.items()}
     best = max(worth, key=lambda right: worth[right], default="")
-    return best if best and worth[best] >= KNOWN_WORDS * sum(weights.values()) else ""
+    return best if best and worth[best] >= least * sum(weights.values()) else ""
 
 
 def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
@@ -281,7 +284,11 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
     ('seconds', '', '')
     """
     table = HINTS.get(kind, {})
-    if meant := whole(table, name) or whole(table, name.lower()):
+    if (
+        meant := whole(table, name)
+        or whole(table, name.lower())
+        or name.startswith("from_") * whole(table, "from_file")
+    ):
         return meant
     if get_close_matches(name, [*known], n=1, cutoff=TYPED):
         return ""
@@ -314,10 +321,17 @@ def chosen(name: str, known: Iterable[str]) -> str:
     """
     plain = {each.lstrip("-").replace("-", "_"): each for each in known}
     asked = name.lstrip("-").replace("-", "_").lower()
+    rows = dict[str, str]()
     for rights, others in OPTIONS.items():
         there = [right for right in rights.split() if right in plain]
         if there and asked in (*rights.split(), *others.split()):
             return plain[there[0]]
+        if there:
+            rows[there[0]] = f"{rows.get(there[0], '')} {rights} {others}"
+    if (meant := by_words(rows, words_of(asked), 0.1 + PART)) and not get_close_matches(
+        asked, plain, n=1, cutoff=TYPED
+    ):
+        return plain[meant]
     worth = {each: score(words_of(name), each, "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
     return best if worth.get(best, 0.0) >= ENOUGH else ""
@@ -334,4 +348,5 @@ def command(name: str, known: Iterable[str]) -> str:
     meant = whole(COMMANDS, name)
     if meant or get_close_matches(name, [*known], n=1, cutoff=TYPED):
         return meant
-    return by_words(words, words_of(name.replace("-", "_")))
+    wanted = words_of(name.replace("-", "_"))
+    return by_words(words, tuple(word for word in wanted if word not in OF_MODULE) or wanted)

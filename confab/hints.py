@@ -18,13 +18,15 @@ MODULE = {
     "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
     "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner "
     "planning SequentialPlanner AnytimePlanner astar bfs Solver solver Plan SequentialPlan policy Search heuristic "
-    "TaskPlanner plan_scene compute_plan solve_problem replan Replanner Step Steps Result PlanResult TaskNetwork",
+    "TaskPlanner plan_scene compute_plan solve_problem replan Replanner Step Steps Result PlanResult TaskNetwork "
+    "PlannerMode PlanGenerationResult PlanningEngine get_planner",
     "confab.load(SCENE).query(TEXT)": "query ask sparql select SparqlQuery run_query execute_query question "
     "prepareQuery",
     "confab.load(SCENE).verify()": "verify simulate simulation Simulator PlanValidator SequentialPlanValidator "
     "validate_plan check_plan rollout physics Simulation sim pybullet test_plan verify_plan Verifier",
     "confab.load(SCENE).execute()": "execute run act step Executor Agent run_scene execute_plan dispatch perform "
-    "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop",
+    "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop replay PlanExecutor Executive "
+    "Controller Dispatcher",
     "confab.load(SCENE).explain()": "explain why explanation justify why_not Explainer reasons",
     "confab.load(SCENE).picture()": "draw show plot render image picture visualise visualize view display viz Viewer "
     "Renderer plot_scene draw_scene",
@@ -113,7 +115,7 @@ SCENE = {
     "initial_value observation get_value initial_facts get_fact holds true_facts world_state fact value get_initial "
     "belief is_true check_fact fluent_values get_facts current_facts init_state atoms initial_defaults literals "
     "static_facts obs get_obs get_property predicate_values has_fact where get_location location_of position_of "
-    "state_of current_state is_holding current has",
+    "state_of current_state is_holding current has pretty_facts state_dict fact_list",
     "goals": "goal_state get_goals task tasks goal get_goal goal_facts objective targets desired wanted "
     "goal_conditions target goal_description current_goal current_goals goal_list list_goals",
     "picture": "draw show plot render image visualise visualize to_png view display map draw_scene screenshot "
@@ -139,7 +141,7 @@ SCENE = {
     "affordances": "afforded afford possible_actions applicable applicable_actions legal_actions available_actions "
     "valid_actions action_mask get_legal_actions get_applicable_actions successors can can_do is_applicable "
     "possible feasible_actions applicable_operators reachable is_reachable get_affordances affords what_can_i_do "
-    "actions_for options",
+    "actions_for options find_actions",
     "owl": "owlready ontology onto world get_ontology to_owl owlready2 default_world load_owl",
     "embodiment.robots": "robot robots get_robot robot_model",
     "embodiment": "arms body urdf gripper joints geometry kinematics meshes poses workspace links arm agents camera "
@@ -179,6 +181,7 @@ SCENE = {
     "problem.domain.constraints": "constraints",
     "verify(video=FILE)": "video film movie record animate animation save_video gif",
     "confab.practise(…)": "benchmark evaluate_memory curve",
+    "graph.update(TEXT)": "sparql_update update_query execute_update run_update insert_data delete_data",
 }
 RESULT = {
     "plan.steps": "steps actions action_list sequence get_steps action_names step list_actions action_sequence "
@@ -186,7 +189,7 @@ RESULT = {
     "plan.primitives": "primitives leaves low_level flat flatten primitive_actions commands motions atomic "
     "lowest_level ground_actions leaf_actions primitive_steps leaf_steps leafs bottom",
     "plan.length": "length levels plan_length num_steps n_steps number_of_steps len count size num_actions depth "
-    "number",
+    "number num_actions_total",
     "plan.at_level(LEVEL)": "level at_level steps_at_level by_level level_steps",
     "solved": "success succeeded is_solved ok found is_solvable has_plan solvable feasible valid_plan done "
     "is_success reached is_feasible found_plan finished is_sat",
@@ -197,7 +200,7 @@ RESULT = {
     "outcome.bound": "bound lower_bound gap is_optimal optimal proved_optimal optimality optimality_gap upper_bound "
     "best_bound optimal_cost best_cost",
     "seconds": "time duration runtime elapsed planning_time total_time solve_time search_time wall_time cpu_time "
-    "timing timings elapsed_time metrics_time planning_seconds time_taken",
+    "timing timings elapsed_time metrics_time planning_seconds time_taken solver_time total_planning_time cpu",
     "json()": "to_json to_dict as_dict dict dumps serialize serialise data raw as_json asdict model_dump to_yaml",
     "save": "dump write to_file store export save_plan write_plan save_json to_path save_to save_as write_json "
     "persist pickle write_to_file export_plan",
@@ -493,7 +496,8 @@ COMMANDS = {
     "validate": "check lint shacl consistency reasoner doctor check-scene validate-file consistent infer errors "
     "verify-file format fmt hermit test-scene",
     "new": "init create scaffold startproject template begin create-domain new-domain make start-project bootstrap "
-    "add new-scene create-scene setup skeleton new-project create-ontology new-ontology start-domain",
+    "add new-scene create-scene setup skeleton new-project create-ontology new-ontology start-domain "
+    "create-scene-file make-domain",
     "generate": "gen random make-scene synth generate-scene sample bench benchmark build families generate-scenes "
     "random-scene",
     "convert": "transform translate to-sparql rewrite convert-behaviors",

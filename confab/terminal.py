@@ -237,12 +237,12 @@ def _in_place_of(option: str, context: click.Context) -> str:
         options = [each for each in command.params if isinstance(each, click.Option)] if command else []
         return [name for each in options for name in each.opts if name.startswith("--")]
 
-    if meant := chosen(option, names(context.command)):
-        return f"; did you mean '{meant}'?"
     plain = option.lstrip("-").replace("-", "_").lower()
     for each in context.command.params:
         if isinstance(each, click.Argument) and plain in (each.name, *(each.metavar or "").lower().split(".")):
             return f"; give {each.metavar} without the name of an option"
+    if meant := chosen(option, names(context.command)):
+        return f"; did you mean '{meant}'?"
     group = context.find_root().command
     if not isinstance(group, click.Group):
         return ""
