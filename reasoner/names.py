@@ -99,12 +99,17 @@ def local_name(iri: str) -> str:
     return iri[max(iri.rfind("#"), iri.rfind("/"), iri.rfind(":")) + 1 :]
 
 
+SHORT = 4
+"""Maximum length of a word in which two exchanged letters make the similarity less than 0.75."""
+
+
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
     """Return ``; did you mean 'x'?`` with the most similar known word; if no word is similar, return the hint."""
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
+    cutoff = 0.75 if len(word) > SHORT else 0.6
     near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [
-        folded[name] for name in get_close_matches(word.lower(), folded, n=1, cutoff=0.75)
+        folded[name] for name in get_close_matches(word.lower(), folded, n=1, cutoff=cutoff)
     ]
     return f"; did you mean '{near[0]}'?" if near else (f"; {hint}" if hint else "")
 
