@@ -89,6 +89,8 @@ def sources(folder: Path) -> None:
     (folder / "tearoom" / "tearoom-scene.ttl").rename(folder / "tearoom" / "scene.ttl")
     catalog = folder / "tearoom" / "catalog-v001.xml"
     catalog.write_text(catalog.read_text().replace("tearoom-scene.ttl", "scene.ttl"))
+    for domain in ("ferry", "served"):
+        (folder / domain).mkdir()
     ferry = HERE.parent / "docs" / "examples" / "ferry"
     import_pddl(ferry / "domain.pddl", ferry / "problem.pddl", folder / "ferry" / "scene.ttl")
     write_scene(folder / "served" / "scene.ttl", "served", 2, 1, 0, 0)
