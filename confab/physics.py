@@ -353,6 +353,7 @@ def _shown(
 
     titles = {step.path: f"{step.id} {labels.step(step)}" for step in plan.walk()}
     check_folder(video)
+    video.parent.mkdir(exist_ok=True)
     with Film(video, plan.primitives, titles, stills=video.with_suffix(""), names=labels.words) as film:
         watching.append(film)
         return trial.run(seed, watch, progress, gui)

@@ -73,6 +73,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
     try:
         old = _replaceable(target)
         check_folder(path)
+        target.parent.mkdir(exist_ok=True)
         yield part
         if old is not None:
             _same_kind(target, kind_of(part, target.suffix))
@@ -114,17 +115,19 @@ def check_replaceable(path: Path, kind: str) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise `FileNotFoundError` if the folder of a file to be written doesn't exist; its name may be a typing error."""
+    """Raise `FileNotFoundError` if more than the last folder of a path to be written is missing; a name may be a typing error."""
+    above = _behind(path).parent.parent
     try:
-        _behind(path).parent.stat()
+        above.stat()
     except FileNotFoundError:
-        said = f"there is no folder '{path.parent}'; create it, or give another name"
+        said = f"there is no folder '{above}'; create it, or give another name"
         raise FileNotFoundError(errno.ENOENT, said, str(path)) from None
 
 
 def made_folder(path: str | Path) -> Path:
-    """Create a folder in an existing folder unless it exists, and return its path. Errors as in `check_folder`."""
+    """Create a folder, and the folder that contains it, unless they exist; return the path. Errors as in `check_folder`."""
     check_folder(Path(path))
+    Path(path).parent.mkdir(exist_ok=True)
     Path(path).mkdir(exist_ok=True)
     return Path(path)
 
@@ -172,6 +175,7 @@ def alone(path: Path) -> Iterator[None]:
     """
     check_folder(path)
     folder = _behind(path).parent
+    folder.mkdir(exist_ok=True)
     opened = os.open(folder, os.O_RDONLY)
     begin, told = monotonic(), False
     try:

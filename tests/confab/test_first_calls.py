@@ -230,13 +230,13 @@ def test_a_time_limit_is_more_than_nothing(scene: confab.Scene, result: confab.R
             call(time_limit=seconds)
 
 
-def test_no_folder_is_made_for_a_file(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
+def test_for_a_file_at_most_its_own_folder_is_made(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
     missing = tmp_path / "typo" / "plan"
     for write, name in (
         (result.save, "p.json"), (result.report, "p.html"), (scene.picture, "p.png"), (scene.execute(result).save, "e.ttl"),
         (confab.Memory.of(scene).save, "m.ttl"),
     ):  # fmt: skip
-        with pytest.raises(OSError, match=r"there is no folder '.*plan'; create it, or give another name"):
+        with pytest.raises(OSError, match=r"there is no folder '.*typo'; create it, or give another name"):
             write(missing / name)
     assert not missing.parent.exists()
     with pytest.raises(KnowledgeError, match=r"a page is HTML; wanted a name that ends in \.html"):
