@@ -44,7 +44,7 @@ def hierarchy(seed: int) -> Problem:
 
 
 def states(problem: Problem) -> int:
-    """Return the number of states, reachable or not, with a simplified count of what hands hold."""
+    """Return the number of states, reachable or not; each hand counts as if it had one value for each hand."""
     held = len(problem.classes["Hand"])
     return prod(
         2 if problem.domain.situations[s.situation].boolean

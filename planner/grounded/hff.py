@@ -16,7 +16,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from confab.planner.grounded.amounts import Exact, Linear, Vector, pushes
@@ -51,10 +51,7 @@ def heuristic(task: Task) -> Evaluate:
     once = [0 if owner < 0 else 1 for owner in owners]
     missing = [len(bits) for bits in needs]
     always = [o for o, number in enumerate(missing) if not number]
-    needed_by: list[list[int]] = [[] for _ in range(task.size)]
-    for o, bits in enumerate(needs):
-        for bit in bits:
-            needed_by[bit].append(o)
+    needed_by = _needed_by(needs, task.size)
     each = (sum(map(len, needs)) + sum(map(len, adds))) / max(len(needs), 1)
     goal = bits_of(task.goal)
     unreached = [-1] * task.size
@@ -147,10 +144,7 @@ def cost_left(task: Task) -> Callable[[int], float]:
     costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
     missing = [len(bits) for bits in needs]
     always = [o for o, number in enumerate(missing) if not number]
-    needed_by: list[list[int]] = [[] for _ in range(task.size)]
-    for o, bits in enumerate(needs):
-        for bit in bits:
-            needed_by[bit].append(o)
+    needed_by = _needed_by(needs, task.size)
     low, goal = (1 << task.size) - 1, bits_of(task.goal)
 
     def priced(vector: Vector) -> list[float]:
@@ -206,6 +200,15 @@ def cost_left(task: Task) -> Callable[[int], float]:
         return sum(chosen.values())
 
     return left
+
+
+def _needed_by(needs: Sequence[Sequence[int]], size: int) -> list[list[int]]:
+    """Return the relaxed operators that require each bit."""
+    found: list[list[int]] = [[] for _ in range(size)]
+    for o, bits in enumerate(needs):
+        for bit in bits:
+            found[bit].append(o)
+    return found
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:

@@ -128,7 +128,7 @@ def test_one_writes_after_the_other_and_who_waits_says_so_once(
     waiting.join()
     assert order == ["first", "second"]
     assert caplog.text.count("waiting for another process that writes in") == 1
-    with alone(made_folder(tmp_path / "b") / "c.txt"):  # nobody waits for what lies elsewhere
+    with alone(made_folder(tmp_path / "b") / "c.txt"):  # a lock concerns one folder only
         assert (tmp_path / "b").is_dir()
 
 
