@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from importlib.util import find_spec
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias, cast, overload
@@ -22,7 +23,7 @@ from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, pau
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.limits import Deadline, within
+from confab.reasoner.limits import Deadline, LimitError, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
@@ -186,13 +187,25 @@ def _plan(
             return problem, search(problem)
         from confab.planner.preferences import preferred
 
-        if options.strategy != "optimal":
+        seconds = deadline.left
+        if seconds is None:
             return preferred(problem, search)
+
+        def choosing(task: Problem) -> Outcome:
+            if deadline.left is not None and deadline.left < seconds / 2:
+                raise LimitError("half of the time limit, which is for proofs")
+            return search(task, DEFAULT_MODE if mode == "optimal" else mode, rounds=0)
+
+        def proving(task: Problem) -> Outcome:
+            if deadline.left is not None and deadline.left < seconds / 10:
+                raise LimitError("the time limit")
+            return search(task, share=0.5)
+
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
-        task, outcome = preferred(alike, partial(search, mode=DEFAULT_MODE, share=0.5), partial(search, share=0.5))
+        task, outcome = preferred(alike, choosing, proving)
         return replace(problem, goal=task.goal, weights=task.weights), outcome
 
-    def search(problem: Problem, mode: str = mode, share: float = 1.0) -> Outcome:
+    def search(problem: Problem, mode: str = mode, share: float = 1.0, rounds: float = inf) -> Outcome:
         deadline.check("reading the problem")
         if options.by_engine:
             from confab.engines import plan_by_engine
@@ -205,7 +218,9 @@ def _plan(
             more = asks_for_times(problem, options.minimise) or (others and some_installed(problem))
             seconds *= share * (OURS if more else 1.0)
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
-        request = Request(alike, mode, Limits(seconds=seconds), advisor, links, grounds, options.leave_levels)
+        request = Request(
+            alike, mode, Limits(seconds=seconds, rounds=rounds), advisor, links, grounds, options.leave_levels
+        )
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
         outcome = solve(replace(request, limits=Limits(work=OURS_WORK)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:

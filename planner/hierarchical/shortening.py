@@ -66,7 +66,8 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     least = LEAST_ROUNDS if lasting(call) else 1
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    while not rounds or (call.space.deadline is not None and rounds < max(least, 2 * useful)):
+    most = call.space.most_rounds if call.space.deadline is not None else 1
+    while rounds < min(most, max(least, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)
         rounds, work, saved = rounds + 1, 2 * work, before - cost(call)

@@ -61,6 +61,7 @@ class Workspace:
     deadline: float | None = None
     most: int = 200_000
     most_work: float = math.inf
+    most_rounds: float = math.inf
     dead_end_check: Callable[[], None] = no_check
     counts: dict[int, Counts] = field(default_factory=dict)
 

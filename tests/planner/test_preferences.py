@@ -160,3 +160,11 @@ def test_a_preference_that_is_no_fact_is_refused_by_name() -> None:
     problem = "(define (problem x) (:domain d) (:objects o) (:init) (:goal (preference both (and (p o) (q o)))))"
     with pytest.raises(PddlError, match="preference 'both': only preferences of one fact"):
         imported(parse(domain, problem))
+
+
+def test_without_rounds_a_time_limit_leaves_the_first_plan_as_it_is() -> None:
+    problem = confab.load("carts-small").problem
+    first = solve(Request(problem, limits=Limits(seconds=60.0, rounds=0)))
+    assert first.plan is not None
+    assert first.saving is None
+    assert solve(Request(problem, limits=Limits(seconds=60.0, rounds=1))).saving is not None
