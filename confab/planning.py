@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.util import find_spec
-from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias, cast, overload
@@ -188,24 +187,25 @@ def _plan(
         from confab.planner.preferences import preferred
 
         seconds = deadline.left
-        if seconds is None:
-            return preferred(problem, search)
 
         def choosing(task: Problem) -> Outcome:
-            if deadline.left is not None and deadline.left < seconds / 2:
+            if seconds is not None and deadline.left is not None and deadline.left < seconds / 2:
                 raise LimitError("half of the time limit, which is for proofs")
-            return search(task, DEFAULT_MODE if mode == "optimal" else mode, rounds=0)
+            return search(task, DEFAULT_MODE if mode == "optimal" else mode, brief=True)
 
         def proving(task: Problem) -> Outcome:
-            if deadline.left is not None and deadline.left < seconds / 10:
+            if seconds is not None and deadline.left is not None and deadline.left < seconds / 10:
                 raise LimitError("the time limit")
             return search(task, share=0.5)
 
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
-        task, outcome = preferred(alike, choosing, proving)
+        if seconds is None and mode != "optimal":
+            task, outcome = preferred(alike, choosing, finish=search)
+        else:
+            task, outcome = preferred(alike, choosing, proving)
         return replace(problem, goal=task.goal, weights=task.weights), outcome
 
-    def search(problem: Problem, mode: str = mode, share: float = 1.0, rounds: float = inf) -> Outcome:
+    def search(problem: Problem, mode: str = mode, share: float = 1.0, brief: bool = False) -> Outcome:
         deadline.check("reading the problem")
         if options.by_engine:
             from confab.engines import plan_by_engine
@@ -219,10 +219,10 @@ def _plan(
             seconds *= share * (OURS if more else 1.0)
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
         request = Request(
-            alike, mode, Limits(seconds=seconds, rounds=rounds), advisor, links, grounds, options.leave_levels
+            alike, mode, Limits(seconds=seconds, brief=brief), advisor, links, grounds, options.leave_levels
         )
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
-        outcome = solve(replace(request, limits=Limits(work=OURS_WORK)) if soon else request)
+        outcome = solve(replace(request, limits=Limits(work=OURS_WORK, brief=brief)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
         began = perf_counter() - outcome.seconds

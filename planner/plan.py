@@ -329,13 +329,13 @@ class Limits:
     `seconds` limits the whole call, unless it is None. In the paper's mode, `expansions` limits each search. In the other
     modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals together.
     `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states times
-    operators, about a microsecond each. `rounds` is the maximum number of rounds in which a time limit is used to shorten a plan.
+    operators, about a microsecond each. With `brief`, a plan is shortened with little work, and with `seconds` not at all.
     """
 
     expansions: int = 200_000
     seconds: float | None = None
     work: float = math.inf
-    rounds: float = math.inf
+    brief: bool = False
 
     def end(self, share: float = 1.0) -> float | None:
         """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`, or None without a limit.

@@ -7,7 +7,8 @@ choice with a small total cost:
 1. Plan for the hard goals alone. If there is no plan for the hard goals, the task has no plan.
 2. Plan for all soft goals together. Start with the choice of all soft goals if there is a plan, otherwise with the empty choice.
 3. Add or drop one soft goal, the heaviest first, if the new choice is cheaper. Repeat until no such change is cheaper.
-4. If `prove` is given, compute a lower bound for the choice and for all choices that could be cheaper. Choices with a smaller
+4. If `finish` is given, plan again for the chosen soft goals, with more work.
+5. If `prove` is given, compute a lower bound for the choice and for all choices that could be cheaper. Choices with a smaller
    sum of unmet weights come first.
 """
 
@@ -35,7 +36,9 @@ PRECISION = 1_000_000
 """Maximum denominator of the stated cost of meeting a soft goal; costs of plans are sums of floating-point numbers."""
 
 
-def preferred(problem: Problem, search: Search, prove: Search | None = None) -> tuple[Problem, Outcome]:
+def preferred(
+    problem: Problem, search: Search, prove: Search | None = None, finish: Search | None = None
+) -> tuple[Problem, Outcome]:
     """Choose among the soft goals of a task.
 
     Parameters
@@ -47,6 +50,9 @@ def preferred(problem: Problem, search: Search, prove: Search | None = None) -> 
     prove : callable, optional
         Function that plans for the goals of a problem and proves a lower bound on the cost of a plan. With this function,
         `preferred` tries all choices that could be cheaper, at most `MOST_CHOICES`.
+    finish : callable, optional
+        Function that plans for the goals of a problem with more work than `search`. With this function, `search` compares the
+        choices, and `finish` plans for the chosen soft goals.
 
     Returns
     -------
@@ -66,7 +72,7 @@ def preferred(problem: Problem, search: Search, prove: Search | None = None) -> 
             return choices.task(nothing), choices.outcome(nothing)
     best = choices.settled(nothing if choices.total(everything) is None else everything)
     if prove is None:
-        return choices.result(best)
+        return choices.result(best, finish=finish)
     return choices.result(*choices.cheapest(best))
 
 
@@ -180,20 +186,27 @@ class _Choices:
             for i in range(first, len(order)):
                 heapq.heappush(waiting, (unmet + self.weights[order[i]], (*dropped, i)))
 
-    def result(self, kept: Goals, least: Fraction | None = None) -> tuple[Problem, Outcome]:
+    def result(
+        self, kept: Goals, least: Fraction | None = None, finish: Search | None = None
+    ) -> tuple[Problem, Outcome]:
         """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each.
 
-        `least` is a lower bound on the total cost of any choice.
+        `least` is a lower bound on the total cost of any choice. `finish` plans for the task of the choice. The additional costs
+        are differences between plans of `search`.
         """
-        outcome = self.outcome(kept)
+        outcome, chosen = self.outcome(kept), kept
+        compared = self.price(outcome)
+        if finish is not None:
+            more_work = finish(self.task(kept))
+            outcome = min((one for one in (more_work, outcome) if one.plan), key=self.price)
         assert outcome.plan is not None
         kept |= {symbol for symbol in self.weights if symbol not in kept and self.met(symbol, outcome.plan)}
         cost, forgone = self.price(outcome), []
         for symbol in reversed(self.by_weight()):
             if symbol not in kept:
-                other = self.cost(kept | {symbol})
+                other = self.cost(chosen | {symbol})
                 fact = Fact(symbol, self.problem.goal[symbol])
-                more = None if other is None else (other - cost).limit_denominator(PRECISION)
+                more = None if other is None else (other - compared).limit_denominator(PRECISION)
                 forgone.append(Forgone(fact, self.weights[symbol], more))
         bound = None if least is None else float(min(max(least - self.unmet(kept), Fraction(0)), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from math import inf
 from random import Random
 from time import perf_counter
 
@@ -61,12 +62,14 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
     Without a time limit, there is one round. With a time limit, the number of rounds is at most twice the number of the last round
     that made the plan cheaper. If windows of the lowest level can make refinements cheaper, there are at least `LEAST_ROUNDS`
-    rounds.
+    rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
+    improve = 1 if call.space.brief else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    most = call.space.most_rounds if call.space.deadline is not None else 1
+    limited = call.space.deadline is not None
+    most: float = 1 if not limited else 0 if call.space.brief else inf
     while rounds < min(most, max(least, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)

@@ -51,6 +51,8 @@ class Workspace:
         Maximum number of expansions of all searches together; `LimitError` is raised above this number.
     most_work : float
         Maximum work in scopes, in states times operators; `LimitError` is raised above this work.
+    brief : bool
+        Whether the plan is shortened with little work, or with a time limit not at all.
     dead_end_check : function
         Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
     """
@@ -61,7 +63,7 @@ class Workspace:
     deadline: float | None = None
     most: int = 200_000
     most_work: float = math.inf
-    most_rounds: float = math.inf
+    brief: bool = False
     dead_end_check: Callable[[], None] = no_check
     counts: dict[int, Counts] = field(default_factory=dict)
 
