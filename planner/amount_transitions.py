@@ -83,7 +83,7 @@ def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
     return {row[:-1]: number(row[-1]) for row in rows}
 
 
-# ------------------------------------------------------------------------------------------- called by what is generated
+# ------------------------------------------------------------------------------------ functions called by generated code
 
 
 def changed(

@@ -53,7 +53,7 @@ class Marked:
 
 @dataclass(frozen=True)
 class Mark:
-    """A node that marks the step of a path as done if its child succeeds, and as not done otherwise.
+    """A node that marks the step of a path as done if the node's child succeeds, otherwise as not done.
 
     The node itself always succeeds.
     """
@@ -101,9 +101,9 @@ def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
     Parameters
     ----------
     problem : Problem
-        Its initial state is the one in which the plan begins.
+        The problem whose initial state is the state before the plan.
     plan : Plan
-        A valid one (`confab.planner.validation.validate`).
+        A plan that `confab.planner.validation.validate` accepts.
     """
     tree = _Tree(problem, plan)
     goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
@@ -127,7 +127,7 @@ class _Tree:
         self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
         asked_above = _abstract_links(self.purposes, purposes(problem, plan), plan)
         self.needs: dict[Path, list[Need]] = {}
-        for step in reversed(primitives):  # a primitive required only by needless steps is needless
+        for step in reversed(primitives):  # a primitive required only by superfluous steps is superfluous
             needs = dict.fromkeys(self.purposes[step.path].needs)
             for change, consumers in asked_above.get(step.path, ()):
                 needs |= {
@@ -171,7 +171,7 @@ class _Tree:
         return [below for below in Plan((step,)).primitives if self.needs[below.path]]
 
     def node(self, step: Step) -> Node:
-        """Return the fallback of a step."""
+        """Return the fallback node of a step."""
         if not step.steps:
             return First((self.kept(step.path), Do(step)))
         guard = All(tuple(self.kept(below.path) for below in self.needed(step)))
@@ -221,10 +221,10 @@ class _Tree:
 def _abstract_links(
     below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
 ) -> dict[Path, list[tuple[FactChange, list[Path]]]]:
-    """Return the causal links between abstract steps: each has a fact, and the primitives at which the link may end.
+    """Return the causal links between abstract steps: each link has a fact, and the primitives at which the link may end.
 
     A link between abstract steps begins with the primitive that makes its fact true. The link ends with the first
-    primitive of the later step that changes the fact, otherwise with the last primitive of that step that is required.
+    primitive of the later step that changes the fact, otherwise with the last required primitive of the later step.
     """
     under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
     found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}

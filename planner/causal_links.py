@@ -1,11 +1,12 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the previous
-value, the later step would be inapplicable or lose a required effect. The test with the previous value finds causal links for
-any kind of condition, for example "no object stands on the shelf". The checker (`confab.planner.validation`) rejects a plan
-without a needed step. Each level has a separate sequence of steps; where the plan leaves a level, lower-level steps take their
-place. The facts that a step reads are recorded, and only these facts are reset to their previous values. Therefore the effort
-grows with the number of facts that the steps read, and not with the square of the plan's length.
+A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the
+previous value, the later step would be inapplicable or lose a required effect. The test with the previous value finds
+causal links for any kind of condition, for example "no object stands on the shelf". The checker
+(`confab.planner.validation`) rejects a plan without a needed step. Each level has a separate sequence of steps. Where
+the plan leaves a level, lower-level steps replace the steps of the level. The facts that a step reads are recorded, and
+only these facts are reset to their previous values. Therefore the effort grows with the number of facts that the steps
+read, and not with the square of the plan's length.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
     ----------
     problem : Problem
     plan : Plan
-        One in which `confab.planner.validation.validate` finds no fault.
+        A plan in which `confab.planner.validation.validate` finds no fault.
     """
     gives: dict[Path, tuple[FactChange, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
@@ -146,7 +147,7 @@ class _Course:
         self.rules = BehaviorReader(problem)
         self.facts = _Noting(problem, problem.initial)
         self.written: dict[Cell, _Written] = {}
-        self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have, or had before, a value
+        self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have or had a value, by value
         self.gives: dict[Path, tuple[FactChange, ...]] = {}
         self.groups = {step.path: step for step in plan.walk() if step.steps and _least(step.steps) == level}
         self.whole = plan.steps if _least(plan.steps) == level else ()
@@ -251,7 +252,7 @@ class _Course:
         return (changes, (), differs) if differs else None
 
     def givers_of_amount(self, cell: Cell, before: str) -> _Written | None:
-        """Return the steps that provided a consumed amount: without any of them, the amount would have been smaller."""
+        """Return the last step that changed a consumed amount, and the amount that would be left without this step."""
         if cell not in self.written or not self.counted(cell):
             return None
         less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
@@ -279,7 +280,7 @@ class _Course:
     def left(
         self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
     ) -> Iterator[tuple[Path, Need]]:
-        """Yield each fact that sub-steps have to achieve for their parent (level 0: the plan), with its achiever."""
+        """Yield each fact that sub-steps achieve for their parent (level 0: the plan), and the step that achieves the fact."""
         touched = dict[Cell, str]()
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)
@@ -302,7 +303,7 @@ class _Course:
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the steps that make the facts true from which a defined goal follows.
 
-        Only facts count that the derivation of the goal read and without which the goal wouldn't hold.
+        A fact counts only if the derivation of the goal reads the fact, and the goal wouldn't hold without the fact.
         """
         if cell[0] not in self.problem.domain.rules:
             return
@@ -324,7 +325,7 @@ class _Course:
                 yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
 
     def changes_that_matter(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
-        """Return the changes of `cells` if a defined situation would differ without them.
+        """Return the changes of `cells` if a defined situation would differ without these changes.
 
         Otherwise return no changes.
         """

@@ -214,7 +214,7 @@ class Try:
 class Cases:
     """All reachable cases of a certificate, starting with the initial case.
 
-    `came_from` maps each case to its predecessor and the behaviour that leads from there.
+    `came_from` maps each case to its predecessor and the behaviour that leads from the predecessor to the case.
 
     `fault` is the reason why the certificate is invalid; `reached` is a case in which the goal may hold.
     """
@@ -275,7 +275,7 @@ class Cases:
         tries = list(self.tries())
         self.came_from[first] = (first, None)
         queue = [first]
-        for case in queue:  # the queue grows
+        for case in queue:  # the loop appends cases to the queue
             if self.ends_here(case):
                 self.reached = case
                 return
@@ -330,7 +330,7 @@ class Cases:
                             seen.add(key)
                             yield Try(behavior, env)
 
-    # -------------------------------------------------------------------------------------------- one try in one case
+    # -------------------------------------------------------------------------------------- one behaviour in one case
 
     def after(self, one: Try, case: Case) -> Leaf:
         """Return the result of a behaviour in a case, from the stored results if possible."""

@@ -125,7 +125,7 @@ class _Causes:
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
         last: tuple[tuple[Claim, ...], Cause] | None = None
-        for chain in queue:  # the queue grows
+        for chain in queue:  # the loop appends chains to the queue
             for cause in self.causes(chain[-1]):
                 if not cause.rests_on:
                     return list(chain), cause
@@ -161,7 +161,7 @@ class _Causes:
                 own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
                 terms = (*effect.arguments, None if amount else getattr(effect, "value", None))
                 boolean_or_set = fact.value if not amount else None
-                if kept:  # every other value matters
+                if kept:  # any other value would make the claim false
                     if terms[-1] == fact.value:
                         continue
                     boolean_or_set = None
@@ -200,7 +200,7 @@ class _Causes:
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
     def exceeded(self, fact: Fact) -> str:
-        """Return as text the bound of an amount that a goal value exceeds; an empty text if there is none."""
+        """Return as text the bound of an amount that a goal value exceeds; an empty text if the value exceeds no bound."""
         quantity, words = (
             self.lowest.quantity(fact.symbol.situation),
             _named(fact.symbol),
@@ -409,7 +409,7 @@ def variables_of(expression: Expression) -> set[str]:
 
 
 def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
-    """Return the number of different individuals that a condition requires, their class, and the conditions on each."""
+    """Return the number of different individuals that a condition requires, their class, and their common conditions."""
     before: list[str] = []
     found: tuple[str, tuple[Condition, ...]] = ("", ())
     while isinstance(condition, Witness) and not condition.negated and len(before) < len(WORDS) - 1:
@@ -454,5 +454,5 @@ class _Noting(CaseView):
 
 
 def _named(symbol: Symbol) -> str:
-    """Return the first argument (if any) and the situation type of a symbol."""
+    """Return the first argument of a symbol, if the symbol has arguments, and the situation type of the symbol."""
     return " ".join((*symbol.arguments[:1], symbol.situation))

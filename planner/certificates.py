@@ -35,7 +35,7 @@ class Certificate:
     cases : int
         Number of reachable combinations of distinguished values; the goal holds in none of these combinations.
     unmet : tuple of Fact
-        Goals of which at least one doesn't hold in each case.
+        Goals; in each case, at least one of these goals doesn't hold.
     """
 
     never: frozenset[Fact] = frozenset()
@@ -91,7 +91,7 @@ def certificate_from(data: Any) -> Certificate:
     Raises
     ------
     ValueError
-        The data contain none; the message says what was expected.
+        The data contain no certificate; the message states the expected data.
     """
     try:
         if data["format"] != FORMAT:

@@ -1,6 +1,6 @@
 """The outcome "unsolvable" needs a certificate that an independent checker accepts.
 
-Without one, the outcome becomes "gave up".
+Without such a certificate, the outcome becomes "gave up".
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     problem : Problem
         The whole task.
     outcome : Outcome
-        A certificate that it already has is checked first.
+        A certificate that the outcome already has is checked first.
     """
     if outcome.status is not Status.UNSOLVABLE:
         return outcome
@@ -57,7 +57,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
 
 def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
-    """Return the missing amount as the reason; it is more specific than combinations of values."""
+    """Return the missing amount as the reason; this reason is more specific than combinations of values."""
     if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
         return None
     from confab.planner.grounded.grounding import ground

@@ -4,10 +4,10 @@ The first step is relaxed reachability, which determines the facts that can beco
 computation works backwards from the goal, so that only relevant facts are considered. A required fact that isn't reachable
 in the relaxed task never holds.
 
-If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then it
-searches the cases, which are the combinations of the distinguished values. A path through the cases to the goal is executed
-on the original task. If the execution fails, the values that the path assumed wrongly are also distinguished. The second
-step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a plan.
+If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then the
+cases are searched; a case is a combination of the distinguished values. A path through the cases to the goal is
+executed on the original task. If the execution fails, the values that the path assumed wrongly are also distinguished.
+The second step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a plan.
 
 The last step distinguishes all values, so that each case is a state. A choice of distinguished values may have infinitely
 many cases, while another choice has only few cases. Therefore each choice is tried first with a small work limit, and then
@@ -116,7 +116,7 @@ def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate |
 
 
 def _contested(lowest: Lowest) -> Certificate | None:
-    """Return a certificate for two goals that require the same value, if only one symbol can have it."""
+    """Return a certificate for two goals that require the same value, if only one symbol can have this value."""
     wanting: dict[tuple[str, str], list[Symbol]] = {}
     for symbol, wanted in sorted(lowest.problem.goal.items()):
         kind = lowest.problem.domain.situations[symbol.situation]
@@ -147,7 +147,7 @@ class Relaxed:
         self._waiting: dict[Key, None] = {}
         self._asking: Key | None = None
 
-    # ------------------------------------------------------------------------------------------- what is known, so far
+    # -------------------------------------------------------------------------------------------- answers known so far
 
     def may(self, symbol: Symbol, value: str) -> bool:
         """Return whether a symbol can get a value."""
@@ -180,7 +180,7 @@ class Relaxed:
             self._readers[key][self._asking] = None
         return key in self.possible
 
-    # ------------------------------------------------------------------------------------------------------ finding out
+    # -------------------------------------------------------------------------------------------- computing the answers
 
     def reachable(self, key: Key) -> bool:
         """Answer a question about reachability: return whether the answer is yes."""
@@ -298,7 +298,7 @@ class Relaxed:
             elif kind == LEAVES:
                 text = self._bounds(symbol)
                 if not text:
-                    continue  # it may have any allowed amount
+                    continue  # the symbol may have any allowed amount
                 always[symbol] = text
             reading = self.look(key)
             if kind == LEAVES and amount:
@@ -328,7 +328,7 @@ def _number(effect: AmountEffect) -> bool:
     )  # fmt: skip
 
 
-# -------------------------------------------------------------------------------------------------------------- by cases
+# ----------------------------------------------------------------------------------------------- certificates with cases
 
 
 def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
@@ -348,7 +348,7 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     """Return a certificate that two goals about the same individual, including rest values, can't hold together."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
-        if a in other.arguments or b in one.arguments:  # one is about the value of the other: these pairs come first
+        if a in other.arguments or b in one.arguments:  # pairs whose goals mention each other's values come first
             pairs.append((0, {one: a, other: b}))
         elif not {*one.arguments}.isdisjoint(other.arguments):
             pairs.append((1, {one: a, other: b}))

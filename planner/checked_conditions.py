@@ -137,7 +137,7 @@ class ConditionReader:
     ) -> Candidates:
         """Return the candidates for a variable, and record the lookup: the individuals that initially satisfy the known conditions.
 
-        An individual that the problem doesn't contain keeps its values, since no step names it.
+        An individual that the problem doesn't contain keeps its values, because no step names the individual.
         """
         asked = tuple(c for c in conditions if variable in variables_of(c) <= bound)
         known = tuple(sorted(set().union(*map(variables_of, asked)) - {variable}))
@@ -160,7 +160,7 @@ class ConditionReader:
                 position, at = arguments.index(variable), self.place(value)
 
                 def having(facts: Stated, values: Values) -> Iterable[str]:
-                    if values[at] == FALSE:  # which is seldom stated
+                    if values[at] == FALSE:  # the value false is seldom stated
                         return self.problem.classes.get(kind, ())
                     return (found[position] for found in facts.holders(situation, values[at]))
 

@@ -31,7 +31,7 @@ class Definitions:
     strata : mapping of situation type to its stratum
         From `stratum_of`.
     given : function of a situation type and arguments to a truth value
-        Whether one of the rules derives it; rules read other defined situations by `follows`.
+        Returns whether one of the rules derives the symbol; rules read other defined situations by `follows`.
     """
 
     def __init__(self, strata: Mapping[str, tuple[str, ...]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
@@ -40,7 +40,7 @@ class Definitions:
         self._known: dict[Cell, bool] = {}
 
     def forget(self) -> None:
-        """Clear the cache; called after a change on which rules may depend."""
+        """Clear the cache of values after a change on which rules may depend."""
         self._known.clear()
 
     def follows(self, cell: Cell) -> bool:

@@ -78,7 +78,7 @@ def instead_of(
     ask : callable
         Plans a problem.
     place : Step, optional
-        The step to be replaced, of the same level. If left out, it is the most similar step at whose position `behavior` is
+        The step to be replaced, of the same level. By default, the most similar step at whose position `behavior` is
         applicable.
     """
     rules, before = BehaviorReader(problem), cost_of(problem, plan)
@@ -122,12 +122,12 @@ def instead_of(
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
-    """Return the result of a choice: the individual takes part in every change of the symbol in which it can.
+    """Return the result of a choice: the individual takes part in every change of the symbol in which the individual can.
 
     Raises
     ------
     NoChoiceError
-        No behaviour that changes such a symbol could take the individual.
+        No behaviour that changes the symbol has a suitable role for the individual.
     """
     behaviors = {b.name: _bound_to(problem, b, symbol, individual) for b in problem.domain.behaviors.values()}
     if behaviors == problem.domain.behaviors:
@@ -155,7 +155,7 @@ def _beyond(
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
-    """Return a behaviour that changes a symbol only with an individual in a suitable role, if it has a suitable role."""
+    """Return a behaviour that changes a symbol only with an individual in a suitable role, if there is a suitable role."""
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip
@@ -170,7 +170,7 @@ def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: 
             continue
         taken = tuple((EqualityCondition(part, individual),) for part in parts)
         inner = tuple(substituted(condition, dict(pairs)) for condition in effect.when)
-        if inner:  # the change is made only under these conditions, these may determine the terms
+        if inner:  # the change depends on these conditions, which may determine the terms
             asks.append(AnyOf((*taken, (AnyOf((inner,), negated=True),))))
         else:
             asks.append(AnyOf((*taken, *((EqualityCondition(term, name, negated=True),) for term, name in pairs))))

@@ -17,7 +17,7 @@ class CompiledRules:
     Parameters
     ----------
     writer : PythonWriter
-        Of the problem.
+        The writer of generated code for the problem.
     """
 
     def __init__(self, writer: PythonWriter) -> None:
@@ -82,7 +82,7 @@ class Stratum:
         self.table, self.age = table, -1
         self.tests: dict[str, Callable[..., bool]] = {}
         self.known: dict[Cell, bool] = {}
-        self.asked: dict[Cell, None] | None = None  # during a derivation: the cells read, with the results
+        self.asked: dict[Cell, None] | None = None  # the cells read during a derivation, with the results
 
     def holds(self, cell: Cell) -> bool:
         """Return whether a symbol is true; during another derivation, return the preliminary value."""
@@ -109,14 +109,14 @@ class Stratum:
         order, done, known = [cell], 0, self.known
         while True:
             grown = False
-            while done < len(order):  # those read for the first time
+            while done < len(order):  # the cells that were read for the first time
                 grown |= self._try(order[done])
                 done += 1
                 if len(asked) > len(order):
                     order += list(asked)[len(order) :]
             if cell in known:
                 return True
-            for other in reversed(order):  # others depend on the last ones read
+            for other in reversed(order):  # other cells depend on the cells that were read last
                 if other not in known:
                     grown |= self._try(other)
             if cell in known or not (grown or len(asked) > len(order)):

@@ -1,4 +1,4 @@
-"""Places in a plan by number, path and words."""
+"""Lookup of steps in a plan by number, path or words."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def numbers(places: Iterable[Place]) -> dict[Path, str]:
 
 
 def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: str = "") -> Path:
-    """Return the path of the step that an argument names.
+    """Return the path of the step that the argument `asked` names.
 
     Parameters
     ----------

@@ -245,7 +245,7 @@ class Reading:
     # ------------------------------------------------------------------------------------------------------- values
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
-        """If `must`, return whether a symbol has a value in every state; otherwise, return whether it may have the value."""
+        """Return whether a symbol may have a value; if `must`, return whether the symbol has the value in every state."""
         lowest = self.lowest
         lowest.spend()
         if not lowest.exists(situation, arguments):
@@ -322,7 +322,7 @@ class Reading:
         return self._totals[key]
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """If `must`, return whether an amount satisfies a goal in every state; otherwise, whether it may satisfy the goal.
+        """Return whether an amount may satisfy a goal; if `must`, whether the amount satisfies the goal in every state.
 
         The goal is a number or a pair of bounds.
         """
@@ -334,7 +334,7 @@ class Reading:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """If `must`, return whether a goal holds in every state; otherwise, return whether the goal may hold.
+        """Return whether a goal may hold; if `must`, return whether the goal holds in every state.
 
         A nonexistent symbol counts as false.
         """
@@ -347,7 +347,7 @@ class Reading:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """If `must`, return whether a condition holds in every state; otherwise, return whether the condition may hold.
+        """Return whether a condition may hold; if `must`, return whether the condition holds in every state.
 
         `env` contains the individuals of the variables.
         """
@@ -382,7 +382,7 @@ class Reading:
     def solutions(
         self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
     ) -> Iterator[dict[str, str]]:
-        """Yield the bindings with which all conditions may hold; if `must`, the bindings with which they hold in every state."""
+        """Yield the bindings with which conditions may hold; if `must`, with which the conditions hold in every state."""
         yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
 
     def _extended(
@@ -543,7 +543,7 @@ def variables(condition: Condition) -> set[str]:
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """If `must`, return whether a comparison holds for all pairs of amounts from two ranges; otherwise, for some pair."""
+    """Return whether a comparison holds for some pair of amounts from two ranges; if `must`, for all pairs."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):

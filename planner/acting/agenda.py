@@ -16,12 +16,13 @@ class Agenda:
     Attributes
     ----------
     planned_for : Problem
-        The task that they were planned for.
+        The task for which the steps were planned.
     steps : tuple of Step
     begun : mapping of path to State
         The situation before each step in progress.
     sound : bool
-        Whether the steps in progress could also have begun in a situation with the facts that were observed since then.
+        Whether the steps in progress could also have begun in a situation with the facts that were observed after the
+        steps began.
     """
 
     planned_for: Problem
@@ -50,7 +51,7 @@ class ReplanRequest:
     missed: dict[Symbol, str | None] = field(default_factory=dict)
 
     def add(self, why: str) -> None:
-        """Add a reason."""
+        """Add a reason to the request."""
         if why not in self.why:
             self.why = f"{self.why}; {why}" if self.why else why
 
@@ -71,16 +72,16 @@ class Postponed:
     put_off: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
 
     def reasons(self) -> Iterator[Reason]:
-        """Yield the reasons."""
+        """Yield the reasons for which goals were dropped or postponed."""
         yield from (reason for _, reason in (*self.aside.values(), *self.put_off.values()))
 
     def forget(self, symbols: Iterable[Symbol]) -> None:
-        """Remove goals from the goals that were dropped or postponed."""
+        """Remove the goals of the given symbols from the dropped and the postponed goals."""
         for symbol in symbols:
             self.aside.pop(symbol, None)
             self.put_off.pop(symbol, None)
 
     def clear(self) -> None:
-        """Remove all postponed goals."""
+        """Remove all dropped and all postponed goals."""
         self.aside.clear()
         self.put_off.clear()

@@ -15,11 +15,11 @@ class Discovery:
     ----------
     individual : str
     kinds : tuple of str
-        Its classes; their superclasses follow.
+        The classes of the individual; superclasses of these classes follow.
     relations : tuple of (str, tuple of str)
-        Static facts about it.
+        Static facts about the individual.
     fixed : str
-        The reason why it can't be moved, if it can't.
+        The reason why the individual can't be moved; empty if the individual can be moved.
     blocked : tuple of str
         Places without room for another object while the fact `by` holds.
     by : Fact, optional

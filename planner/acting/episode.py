@@ -15,13 +15,13 @@ from confab.reasoner.symbols import Fact, Problem, State, Symbol
 class InterventionKind(Enum):
     """The part of the task that an intervention changes."""
 
-    WORLD = "world"  # an object gets another value: moved, emptied, filled
+    WORLD = "world"  # an object gets another value: the object is moved, emptied or filled
     REMOVE = "remove"  # an object is taken away
     ADD = "add"  # an object appears
     KNOCK = "knock"  # an object is knocked over
     PUSH = "push"  # an object is pushed off its place
     BOX = "box"  # a box that no fact mentions is put at a place
-    GOAL = "goal"  # a goal is added, or replaces that of its symbol
+    GOAL = "goal"  # a goal is added, or replaces the goal of the same symbol
     DROP_GOAL = "drop-goal"
 
 
@@ -70,8 +70,8 @@ class End(Enum):
     """The way in which an episode ended."""
 
     REACHED = "reached"
-    IMPOSSIBLE = "impossible"  # proved: the goal has become unreachable
-    GAVE_UP = "gave-up"  # a limit came first
+    IMPOSSIBLE = "impossible"  # a proof shows that the goal has become unreachable
+    GAVE_UP = "gave-up"  # a limit was reached before the goal
 
 
 @dataclass(frozen=True)
@@ -176,13 +176,13 @@ class Episode:
     failures : tuple of Failure
         Experience for the memory.
     missed : tuple of Intervention
-        The interventions that didn't take place, because the episode ended before.
+        The interventions that didn't take place, because the episode ended earlier.
     course : tuple of Seen
         The changes of the situation from `initial` to `observed`, in order of time.
     refuted : tuple of Refutation
         Behaviours that motion planning found impossible in a situation and that the executive replaced.
     discovered : tuple of (Discovery, float)
-        Individuals that the world found and the scene doesn't have, with the time.
+        Individuals that the world found and the scene doesn't contain, with the time of discovery.
     """
 
     scene: str

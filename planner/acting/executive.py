@@ -1,10 +1,10 @@
 """The executive: it plans, executes primitives, observes, handles interventions, and repairs the plan.
 
 belief    the situation as last observed, the current goal, and doubts that failures have raised
-agenda    the steps still to be done; the first may be partly done
+agenda    the steps still to be done; the first step may be partly done
 expected  the situation that the next observation should show
 aside     goals that are impossible in the present situation; pursued again after an unexpected observation
-put off   goals that are unreachable while doubts hold; tried again when all other goals are done
+put off   goals that are unreachable while facts are in doubt; tried again when all other goals are done
 
 Rule 1: a primitive is begun only if its precondition holds in the last observation. Rule 2: the world is observed after
 every primitive; an unexpected observation triggers a check of the remaining plan. Rule 3: an unreachable goal is
@@ -106,7 +106,7 @@ def act(
     except (WorldError, LimitError) as error:
         run.world.stop()
         run.break_off(str(error))
-    except BaseException:  # Ctrl-C, too: no motion continues without the executive
+    except BaseException:  # also for Ctrl-C, so that no motion continues without the executive
         run.world.stop()
         raise
     return run.episode()
@@ -183,7 +183,7 @@ class _Run:
         return self.record.episode(self.belief.problem, clock, tuple(self.waiting))
 
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
-        """Notify the observer, if there is one."""
+        """Notify the observer of an event, if the episode has an observer."""
         if self.observer is None:
             return
         done, events = self.record.done, self.record.events
@@ -487,10 +487,7 @@ class _Run:
         self.request_replan(why)
 
     def try_anew(self, why: str) -> bool:
-        """Trust all facts again and resume postponed goals, if another round is allowed.
-
-        Return whether one was allowed.
-        """
+        """Return whether another round is allowed; if so, trust all facts again and resume postponed goals."""
         if not self.retries.another_round():
             return False
         self.belief.trust_again()

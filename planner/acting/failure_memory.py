@@ -1,8 +1,8 @@
 """Learning from failures: counts of static facts that proved unreliable, and removal of such facts from a problem.
 
 If a primitive fails although its preconditions hold, the static facts that it relied on become doubtful (for instance,
-that this hand can reach that place). Counts never decrease, so the counts of several robots can be added. A fact that
-failed more often than it held is avoided, as long as there is a plan without this fact.
+the fact that a hand can reach a place). Counts never decrease, so the counts of several robots can be added. A fact
+that failed more often than it held is avoided if there is a plan without this fact.
 
 A refutation by motion planning is certain and more specific: the behaviour is impossible while the objects stay where
 they are (`refuted_by`).
@@ -61,7 +61,7 @@ class Caution:
     def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
         """Return the problem without doubtful facts.
 
-        The most doubtful facts are removed first, as long as a plan exists.
+        A doubtful fact is removed only if a plan without the fact exists; the most doubtful facts are tried first.
         """
         end = limits.end()
         doubtful = [fact for fact in self.counts if self.failure_probability(fact) > DOUBTFUL]
@@ -83,7 +83,7 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
 def refuted_by(
     problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
 ) -> tuple[Refutation, ...]:
-    """Return what a failed primitive refutes under some facts: the primitive, and the behaviours that it refines.
+    """Return the refutations by a failed primitive: the primitive and its ancestors are impossible under some facts.
 
     Parameters
     ----------
@@ -91,11 +91,12 @@ def refuted_by(
     chain : sequence of Step
         The primitive, preceded by its ancestors.
     facts : sequence of Fact
-        The places of all participating objects; none if unknown. A level above is refuted only if it sees all of these facts.
+        The places of all participating objects; empty if unknown. A behaviour of an upper level is refuted only if the
+        level sees all of these facts.
     why : str
     likewise : sequence of Refutation
-        Primitives refuted for the same reason, for any hand. An ancestor is refuted if no other behaviour has its effects.
-        Primitives that are implied by these are left out.
+        Primitives refuted for the same reason, for any hand. An ancestor is refuted if no other behaviour has its
+        effects. Refutations that `likewise` implies are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
     for step in chain if facts and not any(one.covers(exact) for one in likewise) else ():
@@ -113,7 +114,7 @@ def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield upper-level behaviours with the effect of a refuted behaviour that only the behaviours `likewise` could refine."""
+    """Yield refutations of upper-level behaviours whose effect only the refuted behaviours `likewise` could make."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:

@@ -101,7 +101,7 @@ def repair_or_replan(
     repaired = repair(problem, rest, planned, using, in_progress, limits, begun)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
-    fewer = planned.goal.keys() - problem.goal.keys()  # then steps needed before may be needless
+    fewer = planned.goal.keys() - problem.goal.keys()  # steps for a goal that was dropped may be superfluous
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return RepairResult("repair", repaired.steps, repaired.cost)
     anew, outcome = replan(problem, planner, using, limits.until(end))
@@ -127,7 +127,7 @@ def repair(
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
     call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
-    # Replanning proves impossibility. Here no step is undone: a restart is a new plan.
+    # Only replanning proves impossibility. A repair undoes no applied step, because a restart would be a new plan.
     agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
@@ -140,7 +140,7 @@ def repair(
         _restore(call, pending)
         restored = len(call.steps)
         whole = _replay(call, pending, wanted)
-        # Where no step is dropped, all kept steps have their purpose.
+        # If no step is dropped, every kept step still has a purpose.
         kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
         settle(call)
         now = replace(problem, initial={**problem.initial, **call.table.state()})
@@ -151,7 +151,7 @@ def repair(
         return None
     costs = costs_of_steps(call.problem, call.tree().steps)
     needed = {i for i in kept if touched.isdisjoint(call.steps[i][2])} | _last_steps(call)
-    for individual in sorted(touched):  # one step might replace its steps
+    for individual in sorted(touched):  # one step might replace all steps about the individual
         together = [i for i in needed if individual in call.steps[i][2]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
@@ -335,7 +335,7 @@ def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
-    """Return whether all first-level changes of a step were goals once and no longer are."""
+    """Return whether all first-level changes of a step were goals earlier and are no longer goals."""
     situations, first = call.problem.domain.situations, call.program.levels[0]
     return all(
         call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value

@@ -148,7 +148,7 @@ def urgency_of(order: PartialOrder) -> dict[int, float]:
 
 
 def worker_of(step: Step, workers: Iterable[str]) -> str:
-    """Return the worker of a step: the first argument that is a worker; an empty string if no argument is one."""
+    """Return the worker of a step: the first argument that is a worker; an empty string if no argument is a worker."""
     known = workers if isinstance(workers, frozenset) else frozenset(workers)
     return next((argument for argument in step.arguments if argument in known), "")
 

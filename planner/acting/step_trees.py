@@ -30,7 +30,7 @@ def all_steps(steps: Sequence[Step]) -> Iterator[Step]:
 
 
 def tree_of(steps: Mapping[tuple[int, ...], Step], above: tuple[int, ...] = ()) -> tuple[Step, ...]:
-    """Return steps, given as a mapping from paths, as trees."""
+    """Return the trees of steps that are given as a mapping from paths to steps."""
     below: dict[tuple[int, ...], list[Step]] = {}
     for path in sorted(steps, key=lambda p: (-len(p), p)):
         below.setdefault(path[:-1], []).append(replace(steps[path], steps=tuple(below.get(path, ()))))

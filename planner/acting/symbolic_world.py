@@ -25,9 +25,9 @@ class SymbolicWorld:
     Parameters
     ----------
     problem : Problem
-        Its initial state is the world's.
+        The problem whose initial state is the initial state of the world.
     seconds_of : mapping of behaviour to seconds
-        Duration of each; one second by default.
+        Duration of each behaviour; one second by default.
     fault : callable, optional
     """
 
@@ -161,7 +161,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Replace an individual as the value of other symbols by its former place, or otherwise by the rest value."""
+    """Replace an individual as the value of a symbol by the individual's former place, or by the symbol's rest value."""
     own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:

@@ -1,8 +1,8 @@
 """The world in which the executive acts: a simulation, a set of symbols, or a robot (docs/connecting.md).
 
 A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same
-time. `stop` is the exception: another thread may call it while `execute` runs, and it is called after an exception in
-`execute`.
+time. `stop` is the exception: another thread may call `stop` while `execute` runs, and the executive calls `stop` after
+an exception in `execute`.
 """
 
 from __future__ import annotations
@@ -219,7 +219,7 @@ def _asking(call: str) -> Iterator[None]:
     """Turn an exception of the world into a `WorldError`, and log the traceback at level DEBUG."""
     try:
         yield
-    except (ImpossibleStateError, WorldError):  # the first is an error of the caller, not of the world
+    except (ImpossibleStateError, WorldError):  # an impossible state is an error of the caller, not of the world
         raise
     except Exception as error:
         logger.debug("the world failed", exc_info=True)

@@ -1,7 +1,7 @@
 """Planning with experience: learned rules propose steps, and may use only a bounded share of the effort.
 
 =========  ====================================================================================================
-guarded    rules are used for kinds of goals that they have achieved at least as often as not
+guarded    rules are used for kinds of goals for which rules succeeded at least as often as failed
 leading    rules are used regardless of their record
 strict     rules aren't used; their record is still updated when an episode is learned
 =========  ====================================================================================================
@@ -95,7 +95,7 @@ class Memory:
     ) -> RulePolicy:
         """Return the rules for a call, with scores of rules and of the individuals in their roles.
 
-        `joins` has the meaning that it has in `RulePolicy`.
+        `joins` contains compiled rules, as in `RulePolicy`.
         """
         reader = cache(lambda: FactReader(call.program, call.table, call.goal))
 
@@ -131,7 +131,7 @@ class Memory:
     def _fits(self, method: Method, using: Compiled) -> bool:
         """Return whether a domain has all behaviours, classes and situation types of a method, with the same numbers of arguments.
 
-        The number of parameters and variables of the method's behaviour must be the number of the method's roles.
+        The number of parameters and variables of the method's behaviour must equal the number of the method's roles.
         """
         behaviors = using.program.domain.behaviors
         own = behaviors.get(method.behavior)

@@ -5,8 +5,8 @@ values and their goals, the objects that have it or should have it as a value, a
 roles.
 
 Cogency is eq. (1) of the paper in log odds: a rule contributes ln((c + ½)/(p + ½)) for c choices and p rejections or
-failures, and each fact contributes ln(p(fact | chosen)/p(fact | not)). An unseen fact counts nothing; an unseen class
-is judged by its superclasses. Preferences for single individuals decay by a tenth with each episode.
+failures, and each fact contributes ln(p(fact | chosen)/p(fact | not)). An unseen fact contributes nothing; an unseen
+class is judged by its superclasses. Preferences for single individuals decay by a tenth with each episode.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FactReader:
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
     def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
-        """Return the individuals in the roles that few individuals can fill."""
+        """Return the individuals in those roles of a rule that few individuals can fill."""
         members = self.problem.members
         return [
             (f"who is {role[1:]}", individual)
@@ -113,7 +113,7 @@ class FactReader:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
-    """Return the individuals in the open roles of a method that few can fill: alone, and with each individual of the step."""
+    """Return facts about the individuals in open roles of small classes: alone, and with each individual of the step."""
     found = list[Fact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:

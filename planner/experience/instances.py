@@ -240,7 +240,8 @@ class Instances:
         if most <= 0 or self.more_than.get(query, 0) >= most:
             self.cut |= (query not in self.seen or query in self.least) and self.more_than.get(query, 0) < inf
             return False
-        before, self.more_than[query] = self.more_than.get(query, 0), most  # a chain that needs its goal isn't cheaper
+        # A chain of rules that has its own goal as a subgoal isn't cheaper.
+        before, self.more_than[query] = self.more_than.get(query, 0), most
         self.seen.add(query)
         if any(self.instance_within(level, one, most, suggested_or_not) for one in instances):
             self.least[query], self.more_than[query] = most, before
@@ -262,7 +263,7 @@ class Instances:
             left = self.of((level, goal, suggested_or_not)) if least < inf else []
             for cost in range(int(least), int(min(least + SLACK + 1, below))) if left else ():
                 equal = [one for one in left if self.instance_within(level, one, cost, suggested_or_not)]
-                taken = {*map(id, equal)}  # comparing two instances takes longer
+                taken = {*map(id, equal)}  # comparing the instances themselves takes longer
                 left, found = [one for one in left if id(one) not in taken], found or bool(equal)
                 yield cost, equal
             if found:

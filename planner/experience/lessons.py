@@ -70,7 +70,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
             lesson += rules_and_methods(variant, found, using)
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
-    lesson.personal.clear()  # choices of the planner are no preferences
+    lesson.personal.clear()  # the planner's own choices aren't counted as preferences
     experience.learn(with_first_record(experience, lesson, problem, using))
     return plan
 

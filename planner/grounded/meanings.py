@@ -90,7 +90,7 @@ class Meanings:
         """Add the meaning of each negated defined fact that a condition requires, except for recursively defined facts."""
         formulas = self.formulas
         waiting = [bit for bit in formulas.complements if bit in ways]
-        for bit in waiting:  # the list grows
+        for bit in waiting:  # the loop appends bits to the list
             self.reached.check_time()
             if bit in circular:
                 continue

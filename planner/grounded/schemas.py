@@ -37,7 +37,7 @@ from confab.reasoner.symbols import (
 
 @dataclass(frozen=True)
 class Atom:
-    """A condition that the rows of a table match; the table is that of a situation type, a relation or a class.
+    """A condition that the rows of a table match; the table belongs to a situation type, a relation or a class.
 
     For a situation type that isn't boolean, `terms` are the arguments and the value.
     """
@@ -77,7 +77,7 @@ def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[lis
     found: list[Behavior] = []
     made: dict[str, SituationType] = {}
     waiting = list(rules)
-    for rule in waiting:  # the list grows
+    for rule in waiting:  # the loop appends rules to the list
         conditions: list[Condition] = []
         parameters, variables = list(rule.parameters), list(rule.variables)
         left = list(rule.preconditions)

@@ -39,7 +39,7 @@ class SuccessorTree:
         found: list[int] = []
         visited = 0
         heads = [self]
-        for head in heads:  # the list grows
+        for head in heads:  # the loop appends nodes to the list
             node: SuccessorTree | None = head
             while node is not None:
                 visited += 1

@@ -44,7 +44,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
     owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
     kept = dict(enumerate(part for step in steps for part in parts(step, level)))
     before, left, fewer = 0, AGAIN * len(kept), kept
-    while before != len(fewer):  # the removed steps may have been the only ones that required other steps
+    while before != len(fewer):  # some steps may have been required only by removed steps
         before = len(fewer)
         table.undo(0)
         done, left = _without_cycles(refiner, fewer, owners, left)
@@ -95,7 +95,7 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return the steps, up to `last`, that changed exactly the same symbols and restored their values.
+    """Return the latest steps, up to `last`, that changed exactly the same symbols and in the end restored the old values.
 
     Return an empty list if there are no such steps.
     """

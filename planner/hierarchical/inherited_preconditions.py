@@ -91,7 +91,7 @@ def _unseen_values(
 def _conditions_for(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield the conditions under which an upper behaviour could have the given effect; yield nothing if it never could."""
+    """Yield the conditions under which an upper behaviour could have the given effect; yield nothing if none exist."""
     terms = upper.kinds
     here = lower.kinds
     names: dict[str, str] = {}

@@ -171,7 +171,7 @@ class Program:
         hard: set[str] = set()
         tests: list[str] = []
         lines: list[str] = []
-        for term, given in zip(given_to, inputs, strict=False):  # followed by the wanted value of an amount
+        for term, given in zip(given_to, inputs, strict=False):  # the wanted value of an amount is the last input
             if term.startswith("?") and term not in hard:
                 hard.add(term)
                 lines.append(f"{written(term)} = {given}")

@@ -160,7 +160,7 @@ class _Cut:
     def guard(self, behavior: Behavior) -> Behavior:
         """Return a behaviour with additional preconditions, so that it changes no reserved symbol.
 
-        The begin of a cut behaviour reserves symbols, and its end releases them.
+        The begin of a cut behaviour reserves symbols, and the end of the behaviour releases these symbols.
         """
         name, _, part = behavior.name.partition("@")
         held = self.held()

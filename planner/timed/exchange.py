@@ -119,7 +119,8 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
 def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
     """Return a function that tests whether a turn can have another actor.
 
-    For each step that names the actor, either all of the actor's primitives in the step belong to the turn, or none.
+    For each step that names the actor, either all of the actor's primitives in the step belong to the turn, or none of
+    these primitives does.
     """
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
     naming: dict[str, list[set[int]]] = defaultdict(list)
@@ -136,7 +137,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
     def whole(actor: str, members: Sequence[int]) -> bool:
         its = set(members)
         if any(i in its and actor not in order.activities[i].step.arguments for i in its & involved[actor]):
-            return False  # the actor is in a step that doesn't name it
+            return False  # the actor takes part in a step that doesn't name the actor
         return all(not (inside & its & involved[actor]) or inside & involved[actor] <= its for inside in naming[actor])
 
     return whole

@@ -38,7 +38,7 @@ class Network:
         The duration of each activity with the actors of the plan; other actors may have other durations.
     edges : tuple of Edge
     at : list of int or None
-        The fixed begin of each activity, if any.
+        The fixed begin of each activity, or None for an activity without a fixed begin.
     latest : list of tuple of pairs
         The latest times of the begin (0) or the end (1) of each activity.
     windows : list of tuple of pairs
@@ -89,7 +89,7 @@ class Begins:
     begins : list of int
         The begin of each activity.
     waits_for : list of int
-        The activity that determines the begin of each activity; -1 if there is none.
+        The activity that determines the begin of each activity; -1 if no activity determines the begin.
     makespan : int
     late : int
         The sum of the times by which activities miss their latest times, windows or fixed times. If the sum is 0, the begins
@@ -162,7 +162,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
         for j, _ in after:
             before[j] += 1
     ready = [i for i in range(count) if not before[i]]
-    for i in ready:  # the list grows
+    for i in ready:  # the loop appends activities to the list
         for j, apart in arcs[i]:
             before[j] -= 1
             if not before[j]:
@@ -177,7 +177,7 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
-    """Return the time by which an activity misses its latest times, windows or fixed time, or 0 if it misses none."""
+    """Return the time by which an activity misses its latest times, windows or fixed time, or 0 if in time."""
     late, end, fixed = 0, begin + lasts, network.at[i]
     for which, by in network.latest[i]:
         late = max(late, (end if which == END else begin) - by)
@@ -227,7 +227,7 @@ def _settled(
 def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int:
     """Return the first time, not before `begin`, at which an activity fits into a window.
 
-    If the activity fits into no window, return the begin of the last window, or `begin` if it is later.
+    If the activity fits into no window, return the begin of the last window, or `begin` if `begin` is later.
     """
     for low, high in windows:
         first = max(low, begin)

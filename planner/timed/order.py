@@ -294,7 +294,7 @@ def _latest(
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
     """Return the time windows of activities that name individuals with time windows.
 
-    An activity must lie within a window of each individual that it names.
+    An activity must lie within a window of each individual that the activity names.
     """
     found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
     for number, one in enumerate(activities):

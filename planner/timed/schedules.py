@@ -54,7 +54,7 @@ class CandidateSchedule:
 def shortest(
     order: Order, network: Network, choices: Choices, until: float, bound: int = 0
 ) -> CandidateSchedule | None:
-    """Return the best schedule that the greedy construction and the exchanges of turns find, or None if they find none.
+    """Return the best schedule that the greedy construction and exchanges of turns find, or None if no schedule is found.
 
     The schedule may be late (`Begins.late`). The search stops at a schedule that isn't late and whose makespan is the lower bound.
 
