@@ -75,23 +75,16 @@ def test_a_step_that_is_left_out_is_noticed() -> None:
 
 
 @pytest.fixture
-def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give each call a second; a call that gives up isn't wrong."""
-    monkeypatch.setattr(judging, "SECONDS", 1.0)
-
-
-@pytest.fixture
 def patiently(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give each call a minute by the clock; its CPU time stays limited."""
     monkeypatch.setattr(judging, "SECONDS", 60.0)
 
 
-@pytest.mark.usefixtures("briefly")
-@pytest.mark.parametrize("first", [5_050, 5_075, 5_100, 5_125])
+@pytest.mark.parametrize("first", [5_050, 5_100, 5_150, 5_200])
 def test_nothing_is_wrong_in_small_worlds_of_everything(first: int, tmp_path: Path) -> None:
     """Every mode, the checker, exports and execution agree with all that can happen."""
     wrong = []
-    for seed in range(first, first + 25):
+    for seed in range(first, first + 50):
         world, meant = drawn(seed)
         its = Judge(world, tmp_path, meant=meant).judged()
         wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
@@ -122,13 +115,11 @@ def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Pa
     assert its.least == 1.0 and its.length == 1
 
 
-@pytest.mark.usefixtures("briefly")
 def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path) -> None:
     """What has itself as its value is looked for in its class: neither the object nor the value leads to the other."""
     assert not Judge(mixed(201_042_338, 0.0), tmp_path, every=True).judged().complaints
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [202_002_963, 202_003_161])
 def test_no_level_is_left_to_bring_the_beginning_to_rest_where_levels_are_strict(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed, 0.0), tmp_path, every=True).judged().complaints
@@ -151,31 +142,26 @@ def test_a_count_that_takes_too_many_conditions_is_refused_at_once(seed: int, tm
     assert process_time() - begin < 3.0
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [340_028_395])
 def test_a_step_is_not_held_to_totals_that_its_level_does_not_see(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [340_001_535])
 def test_goals_of_lower_levels_leave_bounded_amounts_as_the_step_did(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [340_005_745])
 def test_equal_effects_on_a_total_are_exported_as_one_multiple(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, only="export").judged().complaints
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [340_025_843])
 def test_bounds_of_totals_are_exported_for_all_effects_of_an_action_together(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, only="export").judged().complaints
 
 
-@pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("seed", [340_002_931])
 def test_a_total_counts_individuals_that_the_task_does_not_need(seed: int, tmp_path: Path) -> None:
     """A variable of a total without a condition has all individuals of its class, so the slice has them."""
@@ -225,6 +211,5 @@ def test_a_total_of_totals_is_kept_by_the_change_of_each(tmp_path: Path) -> None
     assert its.status["paper"] == "solved"
 
 
-@pytest.mark.usefixtures("briefly")
 def test_absence_inside_a_condition_on_a_maximum_is_exported_with_its_meaning(tmp_path: Path) -> None:
     assert not Judge(mixed(371_027_808), tmp_path, only="export").judged().complaints
