@@ -124,7 +124,7 @@ class Table:
         return found
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the cells whose values differ from those at a mark, with their current values."""
+        """Return the cells whose values have changed since a mark, with the current values."""
         now = self.now
         return {cell: now[cell[0]][cell[1]] for cell, old in self.before(mark).items() if now[cell[0]][cell[1]] != old}
 
@@ -226,7 +226,7 @@ class PythonWriter:
         return [self.expression(ready, bound, kinds, where) for ready in in_binding_order(conditions, bound, where)]
 
     def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
-        """Return a condition as a Python expression; if the condition determines a variable, the expression assigns it."""
+        """Return a condition as a Python expression, which assigns a variable if the condition determines the variable."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 look = self.look(condition)
@@ -298,7 +298,7 @@ class PythonWriter:
         return f"{identifier('now', condition.situation)}.get({key_written(condition.arguments)}{default})"
 
     def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
-        """Return tests that a symbol exists; no test is needed for a term whose class guarantees this."""
+        """Return tests that a symbol exists; a term whose class guarantees the existence needs no test."""
         return [
             self.member(term, wanted)
             for term, wanted in zip(arguments, self.problem.domain.situations[situation].arguments, strict=True)

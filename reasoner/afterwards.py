@@ -1,4 +1,4 @@
-"""Regression: translation of a condition after a behaviour to an equivalent condition before it.
+"""Regression: translation of a condition after a behaviour to an equivalent condition before the behaviour.
 
 For example, ``IN(parcel) = van`` holds after LOAD(?item, ?into) in two cases: the parcel is ?item and the van is ?into, or the
 parcel isn't ?item and is in the van before. Conditions in alternatives and witnesses are translated, too. Equalities of equal
@@ -93,13 +93,13 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Return whether a condition may determine a variable, which its negation would leave undetermined."""
+    """Return whether a condition may determine a variable, which the condition's negation would leave undetermined."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 
 @dataclass
 class Afterwards:
-    """Translation of conditions and amounts after one behaviour to the state before it.
+    """Translation of conditions and amounts after one behaviour to the state before the behaviour.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Afterwards:
     kinds : dict of term to class
         The classes of all terms in the behaviour and the conditions; classes of new variables are added.
     holding : sequence of Condition, optional
-        The preconditions that hold when the effects take place; if left out, all of them.
+        The preconditions that hold when the effects take place; by default, all preconditions.
     """
 
     behavior: Behavior
@@ -165,7 +165,7 @@ class Afterwards:
         return name
 
     def renamed(self, condition: Condition) -> Condition:
-        """Return a condition in which the variables of witnesses are replaced by new ones."""
+        """Return a condition in which new variables replace the variables of witnesses."""
         match condition:
             case Witness(variable, kind, inner):
                 terms = {variable: self.fresh(kind)}
@@ -177,7 +177,7 @@ class Afterwards:
                 return condition
 
     def apart(self, effect: Effect) -> Effect:
-        """Return an effect in which the variables of its own conditions are replaced by new ones."""
+        """Return an effect in which new variables replace the variables of the effect's own conditions."""
         given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
         own = {*effect.arguments, *given}.union(*map(mentions, effect.when))
         own = {term for term in own if is_variable(term)} - self._fixed - ({effect.each.name} if effect.each else set())
@@ -299,7 +299,7 @@ class Afterwards:
     def linear(
         self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
     ) -> list[Term] | None:
-        """Return the changing amounts in an expression if it is linear in them and effects only increase or decrease them.
+        """Return the changing amounts in a linear expression, if effects only increase or decrease these amounts.
 
         Parameters
         ----------

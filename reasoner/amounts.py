@@ -26,13 +26,13 @@ LARGEST = 10**60
 
 
 def simplified(amount: int | Fraction) -> int | Fraction:
-    """Return an amount as an integer if it is whole."""
+    """Return an amount as an integer if the amount is a whole number."""
     return amount.numerator if amount.denominator == 1 else amount
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Properties of the amounts of a situation type: the unit, whether they are whole numbers, and the bounds."""
+    """Properties of the amounts of a situation type: the unit, whether the amounts are whole numbers, and the bounds."""
 
     unit: str = ""
     whole: bool = False
@@ -46,7 +46,7 @@ class Quantity:
 
     @cached_property
     def _bounds(self) -> tuple[Number, Number]:
-        """The bounds, as integers where they are whole: integers are compared much faster than fractions."""
+        """The bounds of the amounts; whole bounds are integers, because integers are compared much faster than fractions."""
         return -inf if self.least is None else simplified(self.least), inf if self.most is None else simplified(
             self.most
         )

@@ -75,7 +75,7 @@ def argument_properties(terms: Sequence[str]) -> Properties:
 
 
 def symbol_properties(situation: str, arguments: Sequence[str], value: str | None = None) -> Properties:
-    """Return the properties that state a symbol and its value; the value is omitted for amounts and true symbols."""
+    """Return the properties that state a symbol and its value; no value is stated for amounts and true symbols."""
     found = {"situationType": [situation], **argument_properties(arguments)}
     return found if value is None else {**found, "value": [value]}
 
@@ -229,7 +229,7 @@ class NodeWriter:
         return {"relation": [self.spelled(one.relation)], **argument_properties([*map(self.put, one.arguments)])}
 
     def side(self, name: str, one: Expression) -> Properties:
-        """Return the properties for one operand; an amount on the left and a number on the right need no node of their own."""
+        """Return the properties for one operand; an amount on the left and a number on the right need no separate node."""
         if name == "right" and isinstance(one, Fraction) and finite(one):
             return {"amount": [decimal_text(one)]}
         if name == "left" and isinstance(one, Amount | Measure):
@@ -285,7 +285,8 @@ def decimal_text(number: Fraction) -> str:
 class NodeReader:
     """Reader of conditions and numeric expressions from nodes.
 
-    `term` and `short` return the names of terms, classes, relations and situation types; subclasses implement and check them.
+    `term` and `short` return the names of terms, classes, relations and situation types; subclasses implement both
+    functions and check the names.
 
     Attributes
     ----------
@@ -375,7 +376,7 @@ class NodeReader:
         return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return the conjuncts of a conjunction or the alternatives of a disjunction in the order that the result shall have."""
+        """Return the conjuncts of a conjunction or the alternatives of a disjunction in the order of the result."""
         return tuple(parts)
 
     def entered(self, iri: str, what: str) -> None:

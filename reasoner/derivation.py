@@ -1,4 +1,4 @@
-"""Stratification of derived situation types: the order in which they are computed.
+"""Stratification of derived situation types: the order in which these types are computed.
 
 Mutually dependent types are computed together. A situation type may depend on the negation of another type only if the other type
 is computed earlier; otherwise its value would be undefined or ambiguous.
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
-    """Yield the situation types in conditions, each with a flag: whether the conditions depend on its negation.
+    """Yield the situation types in conditions, each with a flag: whether the conditions depend on the type's negation.
 
     >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
     [('FULL', True)]

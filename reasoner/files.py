@@ -29,7 +29,7 @@ PATIENCE = 600.0
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file atomically: readers see the old or the new content, even after a crash. Errors as in `written_whole`.
+    """Write a file atomically: readers see the old or the new content, even after a crash. Errors: see `written_whole`.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
             os.fsync(file.fileno())
         if old is not None:
             part.chmod(stat.S_IMODE(old.st_mode))
-            with suppress(PermissionError):  # only root can give a file away
+            with suppress(PermissionError):  # only the user root can change the owner of a file
                 os.chown(part, old.st_uid, old.st_gid)
         part.replace(target)
     except OSError as error:
@@ -125,7 +125,7 @@ def check_folder(path: Path) -> None:
 
 
 def made_folder(path: str | Path) -> Path:
-    """Create a folder, and the folder that contains it, unless they exist; return the path. Errors as in `check_folder`."""
+    """Create a folder, and the folder that contains it, unless both exist; return the path. Errors: see `check_folder`."""
     check_folder(Path(path))
     Path(path).parent.mkdir(exist_ok=True)
     Path(path).mkdir(exist_ok=True)

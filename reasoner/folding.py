@@ -44,7 +44,7 @@ class Folding:
     known: frozenset[Condition] = frozenset()
 
     def effects(self, effects: Iterable[AmountEffect]) -> tuple[AmountEffect, ...]:
-        """Return the increases and decreases that may happen, with equal ones combined."""
+        """Return the increases and decreases that may happen, with equal effects combined."""
         found = Counter[AmountEffect]()
         for effect in effects:
             when = self.conjunction(effect.when)
@@ -53,7 +53,7 @@ class Folding:
         return tuple(replace(effect, amount=_times(many, effect.amount)) for effect, many in found.items())
 
     def conjunction(self, conditions: Iterable[Condition]) -> Conjunction:
-        """Return the conjuncts that don't follow from the others; return None if the conjunction is contradictory."""
+        """Return the conjuncts that don't follow from other conjuncts; return None if the conjunction is contradictory."""
         known, found, more = self.known, list[Condition](), False
         for part in sorted(_parts(conditions), key=lambda condition: bool(groups(condition))):
             folded = replace(self, known=known).condition(part)

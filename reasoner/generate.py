@@ -46,8 +46,8 @@ Row = Mapping[str, object]
 class Layout:
     """The places of a table and the positions of objects on it.
 
-    `reach` contains the places that each hand reaches. `starts` and `goals` contain a place for each object, those of the first
-    kind first.
+    `reach` contains the places that each hand reaches. `starts` and `goals` contain a place for each object, first for
+    the objects of the first kind.
     """
 
     places: Sequence[int]
@@ -64,7 +64,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
     family : str
         One of `families`.
     objects : int
-        An even number; half of the objects are of the first kind (bottles), half of the second kind (cups).
+        An even number of objects: half of the objects are of the first kind (bottles), half of the second kind (cups).
     hands : int
     clutter : int
         Number of irrelevant objects in other rooms, which no hand reaches.
@@ -121,7 +121,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name:
 
 
 def _blocks(path: Path) -> list[tuple[str, str]]:
-    """Return the sections of a template with their texts, preceded by those of its ``like`` template."""
+    """Return the sections of a template with their texts, preceded by the sections of its ``like`` template."""
     found: list[tuple[str, str]] = []
     section, lines = "once", list[str]()
     for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:

@@ -171,7 +171,7 @@ def _json(text: bytes) -> Kind | None:
 
 
 def _turtle(text: bytes) -> Kind | None:
-    """Return the kind of a Turtle file according to its first distinctive triple; return None if it isn't Turtle."""
+    """Return the kind of a Turtle file according to its first distinctive triple; return None for a text that isn't Turtle."""
     some = False
     if nested(text) <= MOST_NESTED:
         try:

@@ -48,7 +48,7 @@ def walk(condition: Condition) -> Iterator[Condition]:
 
 
 def terms(condition: Condition) -> tuple[str, ...]:
-    """Return the terms of a condition, without those of nested conditions."""
+    """Return the terms of a condition, without the terms of nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):
             return (*arguments, value)
@@ -65,7 +65,7 @@ def terms(condition: Condition) -> tuple[str, ...]:
 
 
 def situations_of(condition: Condition) -> frozenset[str]:
-    """Return the situation types of a condition, without those of nested conditions."""
+    """Return the situation types of a condition, without the situation types of nested conditions."""
     match condition:
         case ValueCondition(situation):
             return frozenset({situation})
@@ -120,6 +120,6 @@ def _unbound(group: Sequence[Condition]) -> set[str]:
 
 
 def nothing_determines(where: str, waiting: Sequence[Condition], bound: AbstractSet[str]) -> DomainError:
-    """Return the error for a behaviour with conditions whose variables nothing binds."""
+    """Return the error for a behaviour with conditions whose variables no condition binds."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

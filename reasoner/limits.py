@@ -60,7 +60,7 @@ _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # n
 def within(limit: Deadline | float | None) -> Iterator[Deadline]:
     """Apply a deadline, or a limit in seconds from now, to a ``with`` block; provide the effective deadline.
 
-    The effective deadline is the earlier one of the given deadline and the current deadline.
+    The effective deadline is the earlier of the given deadline and the current deadline.
 
     Examples
     --------

@@ -121,7 +121,7 @@ def _ontology_name(iri: str) -> str:
 FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong one."""
 GUESSING: list[str] = []
-"""Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one."""
+"""Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one module."""
 
 
 class RightNames(ABCMeta):
@@ -162,9 +162,9 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
                 raise WrongNameError(kind, name, type(self), "set")
             object.__setattr__(self, name, value)
 
-        if getattr_static(cls, "__setattr__") is object.__setattr__:  # not frozen
+        if getattr_static(cls, "__setattr__") is object.__setattr__:  # the class isn't frozen
             type.__setattr__(cls, "__setattr__", settable)
-        type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
+        type.__setattr__(cls, "__getattr__", lacking)  # hidden from type checkers, which report wrong names
         if made:
             begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class
 
@@ -226,7 +226,7 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
 
 
 def _keys(unpacked: str, module: str) -> Iterable[str]:
-    """Return the keys of the typed dictionary in an annotation ``Unpack[module.Options]``; none of an empty annotation."""
+    """Return the keys of the typed dictionary in an annotation ``Unpack[module.Options]``; no keys for an empty text."""
     if not unpacked:
         return ()
     home, _, name = unpacked.removeprefix("Unpack[").removesuffix("]").rpartition(".")
@@ -237,7 +237,7 @@ def _keys(unpacked: str, module: str) -> Iterable[str]:
 class WrongNameError(AttributeError):
     """Raised for an unknown attribute; the message suggests the name with the same meaning, or the most similar name.
 
-    The message is created when it is read, because libraries often test whether objects have attributes.
+    The message is created only when a caller reads the message, because libraries often test whether objects have attributes.
 
     Parameters
     ----------

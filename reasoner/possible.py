@@ -32,7 +32,7 @@ class Impossible:
     symbol : Symbol
         A symbol with a faulty value.
     what, why, remedy : str
-        The fault, the reason why it is one, and the remedy.
+        The fault, the reason why the value is a fault, and the remedy.
     """
 
     symbol: Symbol

@@ -14,7 +14,7 @@ from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact,
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with arguments (an empty one stands for any individual), the facts that make it impossible, and the reason."""
+    """A behaviour with arguments (empty for any individual), the facts that make the behaviour impossible, and the reason."""
 
     behavior: str
     arguments: tuple[str, ...]

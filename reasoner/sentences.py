@@ -88,7 +88,7 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         asked[-1] = replace(asked[-1], negated=False)
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
-    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
+    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # denotes the individual
     clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
     if not clauses:
         return f"there is {whole}"

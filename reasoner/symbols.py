@@ -63,7 +63,7 @@ State: TypeAlias = Mapping[Symbol, str]
 
 @dataclass(frozen=True)
 class Perceived:
-    """How the values of a situation type are perceived.
+    """The way in which the values of a situation type are perceived.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Perceived:
 
 @dataclass(frozen=True)
 class SituationType:
-    """A property of objects that varies between states; it is also the class of its values.
+    """A property of objects that varies between states; the situation type is also the class of the property's values.
 
     - `arguments` are the classes of the arguments, and `range` is the class of the values.
     - A property that isn't functional is `boolean`: the property's value becomes the last argument of a symbol, whose own value is
@@ -111,7 +111,7 @@ class SituationType:
 
 @dataclass(frozen=True)
 class ValueCondition:
-    """The condition ``situation(arguments) = value``; if the value is an unbound variable, the condition determines it.
+    """The condition ``situation(arguments) = value``; if the value is an unbound variable, the condition determines the variable.
 
     A symbol that doesn't exist has no value: the condition is false, and its negation is true.
     """
@@ -282,7 +282,7 @@ class Times:
     Attributes
     ----------
     deadlines : mapping of Symbol to seconds
-        The time from which on a goal must hold at the latest.
+        The time from which on a goal must hold.
     windows : mapping of individual to pairs of seconds
         Time windows in which an individual is available; None as the end means no end. An individual without windows is always
         available.
@@ -316,7 +316,7 @@ class Behavior:
     - Effects are applied in order; effects that make facts false come first. As in PDDL, a fact that is made both false and true is
       true.
     - A behaviour isn't applicable if it would violate the bounds of an amount.
-    - `price` replaces `cost`; a precondition requires that it is a number (`priced`).
+    - `price` replaces `cost`; a precondition requires that the price is a number (`priced`).
     - `spread` contains the individuals that occur only because effects on all members of a class were expanded.
     - `timing` states the spans of conditions and effects (`confab.reasoner.timing`).
     """
@@ -381,8 +381,9 @@ class Behavior:
 class Rule:
     """A rule of a derived situation type: its symbol is true in every state in which all conditions hold.
 
-    A symbol is true if at least one rule applies to it, and false otherwise. States don't contain derived symbols; their values are
-    computed on demand. Rules may be recursive, but not through negation (`confab.reasoner.derivation`).
+    A symbol is true if at least one rule applies to the symbol, and false otherwise. States don't contain derived
+    symbols; their values are computed on demand. Rules may be recursive, but not through negation
+    (`confab.reasoner.derivation`).
 
     Parameters
     ----------
@@ -415,9 +416,10 @@ AGGREGATES = ("sum", "count", "max", "min")
 class Aggregate:
     """A rule of a derived amount: the sum, count, maximum or minimum over all solutions of its conditions, in every state.
 
-    A solution assigns an individual to each variable in `variables`. Solutions for which `amount` has no value are ignored. A sum
-    or count without solutions is zero; a maximum or minimum without solutions doesn't exist. Behaviours of the domain don't change
-    a derived amount directly; `confab.reasoner.aggregates` adds effects that update it.
+    A solution assigns an individual to each variable in `variables`. Solutions for which `amount` has no value are
+    ignored. A sum or count without solutions is zero; a maximum or minimum without solutions doesn't exist. Behaviours
+    of the domain don't change a derived amount directly; `confab.reasoner.aggregates` adds effects that update the
+    amount.
 
     Parameters
     ----------
@@ -430,7 +432,7 @@ class Aggregate:
     parameters : tuple of Parameter
         Names and classes of the arguments.
     variables : tuple of Parameter
-        The variables that the aggregate ranges over.
+        The variables over whose individuals the aggregate is computed.
     conditions : tuple of Condition
     """
 
@@ -515,7 +517,7 @@ class Problem:
     parents : mapping of class to its direct superclasses
         Used by statistics that generalise over classes, and not by the search.
     value_levels : mapping of individual to level
-        The first level on which a value exists, if it isn't 1.
+        The first level on which a value exists, if this level isn't 1.
     times : Times, optional
         Deadlines, time windows and measured durations (`confab.reasoner.timing`).
     weights : mapping of Symbol to Fraction
@@ -677,7 +679,7 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
-    """Return preconditions that ensure the bounds of the amounts that a behaviour changes, as far as conditions can express them.
+    """Return preconditions that keep the amounts that a behaviour changes within bounds, if conditions can express this.
 
     Each precondition negates the violation of a bound. The precondition therefore holds for amounts that don't exist, which effects
     don't change.

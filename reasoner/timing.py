@@ -1,8 +1,8 @@
 """Durations, actors and time spans of behaviours (docs/levels.md, "In time").
 
-The preconditions and effects of a behaviour are its *projection*: the conditions before it and the effects after it if no other
-step overlaps it. All planners use the projection. `Timing` states in addition when each condition must hold and when each effect
-takes place.
+The preconditions and effects of a behaviour are its *projection*: the conditions before the behaviour and the effects
+after the behaviour, if no other step overlaps the behaviour. All planners use the projection. `Timing` states in
+addition when each condition must hold and when each effect takes place.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours that give a symbol a value only while they last, if another behaviour or the goal may need it.
+    """Return the behaviours that give a symbol a value only during their execution, if another behaviour or the goal may need it.
 
     A plan with such a behaviour needs concurrency: in a sequence of steps, no other step ever finds the value.
     """
@@ -75,7 +75,7 @@ def only_during(problem: Problem) -> frozenset[str]:
 
 
 def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
-    """Return the effects at the start of a behaviour that a later effect of it reverses."""
+    """Return the effects at the start of a behaviour that a later effect of the behaviour reverses."""
     if behavior.timing is None:
         return ()
     last = {

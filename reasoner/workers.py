@@ -1,4 +1,4 @@
-"""Child processes that end together with their parent process, even if it is killed, and have their own limit of CPU time.
+"""Child processes with a limit of CPU time; they end with their parent process, even if the parent process is killed.
 
 Each process has one end of a pipe whose other end belongs to the parent process. When the parent's end is closed, the Linux
 kernel kills the process and its children. No code has to run in the parent, even after ``kill -9`` or a crash.
@@ -65,7 +65,7 @@ def tie(end: int) -> None:
         fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp())
         fcntl.fcntl(end, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([end], [], [], 0)[0]:  # already closed
+    if select.select([end], [], [], 0)[0]:  # the other end is already closed
         os._exit(1)
 
 
@@ -178,7 +178,7 @@ def answer(megabytes: int) -> None:
     import pickle
 
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # output of the function
+    os.dup2(2, 1)  # the output of the function becomes error output
     if megabytes:
         resource.setrlimit(resource.RLIMIT_AS, (megabytes * 1_000_000,) * 2)
     function, arguments = pickle.load(sys.stdin.buffer)

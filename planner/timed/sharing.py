@@ -198,7 +198,7 @@ class _Search:
     work: int = 0
     most: int = MOST_WORK
     known: dict[tuple[Task, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
-    """The known steps of each task after the same early steps; the planner tries known steps before it searches for others."""
+    """The known steps of each task after the same early steps; the planner tries known steps before a search for other steps."""
     failed: Counter[Task] = field(default_factory=Counter)
     """The number of times that no steps were found for a task, by task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Dependencies between aggregates, and expansion of derived situation types in their conditions."""
+"""Dependencies between aggregates, and expansion of derived situation types in the conditions of aggregates."""
 
 from __future__ import annotations
 

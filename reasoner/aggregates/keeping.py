@@ -52,7 +52,8 @@ from confab.reasoner.symbols import (
 )
 
 MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, including nested ones, of a behaviour that updates derived amounts (one second to compile)."""
+"""Maximum number of conditions, including nested conditions, of a behaviour that updates derived amounts (one second to
+compile)."""
 MOST_COMPARED = 300
 """Maximum number of candidates of a total that are compared with each other (one second)."""
 
@@ -335,7 +336,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return the conditions of a contribution: those that don't change, and the others before and after the behaviour."""
+        """Return the conditions of a contribution: constant conditions, and changing conditions before and after a behaviour."""
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]

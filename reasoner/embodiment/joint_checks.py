@@ -36,7 +36,7 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield perceived joints that are never open or never shut, always open or always shut, or both at once."""
+    """Yield perceived joints that are never open or never shut, always open or always shut, or open and shut at once."""
     uses = [use for use in embodiment.perceivers.values() if use.perceiver == JOINT]
     perceived = {name for use in uses for name in use.links}
     for link in _links(embodiment):
@@ -137,7 +137,7 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
 
 
 def _without_flat_top(part: Part) -> bool:
-    """Return whether a solid has no horizontal top, or a kind whose top isn't calculated."""
+    """Return whether a solid has no horizontal top, or has a kind for which no top is calculated."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 

@@ -9,7 +9,7 @@ from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that state the size of a solid by kind; a radius is doubled."""
+"""The attributes that state the size of a solid, for each kind of solid; a stated radius is doubled."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 
@@ -113,7 +113,7 @@ def _part(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Seq
 
 
 def _feature(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Feature:
-    """Return a feature, named after the last part of its IRI behind a dot."""
+    """Return a feature; the last part of the feature's IRI after a dot is the feature's name."""
     return Feature(
         names(node).rsplit(".", 1)[-1],
         facts.position(node, "0"),

@@ -22,7 +22,7 @@ def reach_relation(graph: KnowledgeGraph) -> str:
     Raises
     ------
     KnowledgeError
-        The domain declares no such relation, or several.
+        The domain declares no relation of reach facts, or several such relations.
     """
     found = [row[0].value for row in graph.select(RELATIONS) if isinstance(row[0], ox.NamedNode)]
     if len(found) != 1:

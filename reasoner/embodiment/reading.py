@@ -82,7 +82,7 @@ def _fixture(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Fixtur
 
 
 def _places(facts: BodyFacts) -> list[str]:
-    """Return the nodes that are places: they have coordinates or a carrier, and aren't robots, stands or parts of furniture."""
+    """Return the nodes that are places: nodes with coordinates or a carrier, except robots, stands and parts of furniture."""
     other = {
         node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
     }
@@ -107,7 +107,7 @@ def _stand(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Stand:
 
 
 def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
-    """Return each individual with its shape: its own shape, or the shape of the most specific class that has one."""
+    """Return each individual with its shape: its own shape, or the shape of the most specific class that has a shape."""
     found = []
     for node in facts.ordered(facts.classes):
         if node in facts.supers or any(node in kinds for kinds in facts.classes.values()):

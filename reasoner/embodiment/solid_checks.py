@@ -1,7 +1,8 @@
 """Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
-Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap their own case, neighbouring links or
-furniture. A neighbouring link that moves may be shut or fully open; an overlap is a fault only if it occurs in both cases.
+Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap their own case,
+neighbouring links or furniture. A neighbouring link that moves may be shut or fully open; an overlap is a fault only if
+the overlap occurs in both cases.
 """
 
 from __future__ import annotations
@@ -143,7 +144,7 @@ def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Fla
     for one, other in combinations(standing, 2):
         on = {embodiment.places[where[one]].carrier: other, embodiment.places[where[other]].carrier: one}
         inside = any(lower in vessels and upper in (one, other) for lower, upper in on.items())
-        if not inside and where[one] != where[other]:  # an object in a vessel is between its walls
+        if not inside and where[one] != where[other]:  # an object in a vessel is between the vessel's walls
             met += _meeting(standing[one], standing[other], 0.0)
     for deep, _, first, second in _deepest(met):
         places = [f"{name} is at {where[name]}" for name in (first.owner, second.owner) if name in where]

@@ -75,7 +75,7 @@ class Block:
 
 
 def overlap(one: Block, other: Block) -> float:
-    """Return the distance in metres by which a solid must be moved to be separated from another; negative for a gap."""
+    """Return the distance in metres by which a solid must be moved to be separated from another solid; negative for a gap."""
     apart = other.center - one.center
     if not apart.any():
         apart = np.array([1e-9, 0.0, 0.0])

@@ -1,8 +1,9 @@
 """Dataclasses of the embodiment for `sim/`: robots, fixtures, places, objects, skills and perceivers, without RDF.
 
-Lengths are in metres, masses in kilograms, angles in radians, forces in newtons. Positions are in the world frame with z up, unless
-stated otherwise. `confab.reasoner.embodiment.reading` reads the data from the graph, and `sim/` builds a physical world from them.
-Every name of an object, behaviour or situation type in `sim/` is from these data or from the plan.
+Lengths are in metres, masses in kilograms, angles in radians, forces in newtons. Positions are in the world frame with
+z up, unless stated otherwise. `confab.reasoner.embodiment.reading` reads the data from the graph, and `sim/` builds a
+physical world from the data. Every name of an object, behaviour or situation type in `sim/` is from these data or from
+the plan.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ Flaw: TypeAlias = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand of a robot, with the arm that carries it and its fingers.
+    """A hand of a robot, with the hand's fingers and the arm that carries the hand.
 
-    - `tip` is the URDF link whose frame, rotated by `turned` (roll, pitch, yaw), is the hand's frame. Its x axis is the direction
-      of the fingers, y leads from finger to finger, and z is up if the hand is upright.
+    - `tip` is the URDF link whose frame, rotated by `turned` (roll, pitch, yaw), is the hand's frame. The x axis of the
+      hand's frame is the direction of the fingers, y leads from finger to finger, and z is up if the hand is upright.
     - `arm` and `fingers` are joint names; the value of a finger joint increases when the hand opens.
     - `home` is the rest posture, one angle per arm joint; `opening` is the open position of a finger joint; `grip` is the force of
       each finger.
@@ -47,7 +48,7 @@ class Hand:
 class Robot:
     """A robot: its URDF file, the position of its base, the acceleration of its joints in rad/s², and its hands in declared order.
 
-    `driving` is the speed of a mobile base in m/s (0 for a fixed base), `turning` its angular speed in rad/s.
+    `driving` is the speed of a mobile base in m/s (0 for a fixed base), and `turning` is the angular speed of the base in rad/s.
     """
 
     name: str
@@ -71,7 +72,7 @@ class Stand:
 
 @dataclass(frozen=True)
 class Fixture:
-    """Immovable furniture with the shape of a box; `size` is its full extent and `position` its centre."""
+    """Immovable furniture with the shape of a box; `size` is the full extent and `position` the centre of the box."""
 
     name: str
     size: Vector
@@ -83,10 +84,11 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Place:
-    """A point on a supporting surface at which objects can be, in the frame of `carrier` if it has one.
+    """A point on a supporting surface at which objects can be, in the frame of `carrier` if the place has a carrier.
 
-    A carrier is a link or an object, which moves the place: a place in a drawer moves with the drawer. `stand` is the position from
-    which a mobile robot reaches the place. `height` is the grasp height of objects at the place, if the scene states it.
+    A carrier is a link or an object, which moves the place: a place in a drawer moves with the drawer. `stand` is the
+    position from which a mobile robot reaches the place. `height` is the grasp height of objects at the place, if the
+    scene states a height.
     """
 
     name: str
@@ -131,11 +133,11 @@ class Feature:
 class Link:
     """A link of a mechanism: its solids and features, and the joint that connects it to its parent (the base if empty).
 
-    - `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame; it is the link's
-      frame if the joint value is 0.
+    - `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame; this
+      frame is the link's frame if the joint value is 0.
     - The joint counts as open (or switched on) from `opened` on, and as shut up to `shut`.
     - `friction` (newtons or newton metres) and `damping` resist a motion; a `spring` pushes towards 0.
-    - A joint that `latches` stays at `opened` after a push beyond it, until the next push.
+    - A joint that `latches` stays at `opened` after a push beyond `opened`, until the next push.
     - `urdf_link` is the link's name in the mechanism's URDF file.
     """
 
@@ -214,7 +216,7 @@ class Filling:
 
 @dataclass(frozen=True)
 class Guard:
-    """A bound on a measured quantity, such as ``force >= 30``, that ends a motion or must hold after it.
+    """A bound on a measured quantity, such as ``force >= 30``, that ends a motion or must hold after a motion.
 
     `sign` is 1 for ``>=`` and -1 for ``<=``. `bound` is an expression (see `Phase`). If a required bound doesn't hold, the skill
     fails with `code`.
@@ -235,8 +237,9 @@ class Phase:
 
     - `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
       key of `confab.sim.phases.MOTIONS`.
-    - `to` is the goal, a role with a feature such as ``target.grip``. The hand's tip, or the point that `bring` names, moves there.
-    - `offset` is a shift of the goal in the hand's frame, `above` an upward shift.
+    - `to` is the goal, a role with a feature such as ``target.grip``. The hand's tip, or the point that `bring` names,
+      moves to the goal.
+    - `offset` is a shift of the goal in the hand's frame, and `above` is an upward shift.
     - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
     - `fingers` (open, shut or grasp) move before the hand. `touches` contains roles or features that the hand may touch.
     - The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold.
@@ -265,9 +268,9 @@ class Phase:
 class SkillUse:
     """The skill that executes a primitive behaviour.
 
-    `parameters` contains the roles of the behaviour's parameters in order, `variables` the roles of its determined variables.
-    `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python function.
-    `links` maps each role to the links that can play this role.
+    `parameters` contains the roles of the behaviour's parameters in order, and `variables` contains the roles of the
+    determined variables. `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without
+    `phases` is a Python function. `links` maps each role to the links that can play this role.
     """
 
     behavior: str
@@ -283,8 +286,8 @@ class SkillUse:
 class PerceiverUse:
     """The perceiver that measures a situation type, with its thresholds and special values.
 
-    `choices` are the situation type's values in declared order, `links` the links that have the situation type. A measured type is
-    true within the bounds `holds`; `asked` contains the arguments of its symbols if they are boolean.
+    `choices` are the situation type's values in declared order, and `links` are the links that have the situation type.
+    A measured situation type is true within the bounds `holds`; `asked` contains the arguments of all boolean symbols.
     """
 
     situation: str

@@ -16,8 +16,8 @@ from confab.reasoner.vocabulary import OWL, RDF
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
     """Write the triples that a CONSTRUCT query returns to a Turtle file, and return their number.
 
-    The file is an ontology that imports the scene and can itself be planned in. The ontology's IRI is the scene's IRI with the
-    file's name as the last part.
+    The file is an ontology that imports the scene, and is a scene itself. The ontology's IRI is the scene's IRI with
+    the file's name as the last part.
 
     Raises
     ------

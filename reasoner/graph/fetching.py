@@ -66,7 +66,8 @@ def fetch(url: str, folder: Path) -> Fetched:
     Raises
     ------
     KnowledgeError
-        The URL can't be reached, or the document is invalid, too large, unsafe or another ontology. No file is then written.
+        The URL can't be reached, or the document is invalid, too large, unsafe or another ontology. No file is written
+        in these cases.
     """
     try:
         parts = urlsplit(url)

@@ -63,7 +63,7 @@ def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
     Parameters
     ----------
     graph : KnowledgeGraph
-        Its graph `inferred` is cleared first.
+        The knowledge graph, whose graph `inferred` is cleared first.
     always : bool
         Whether to run the reasoner even if `needed` returns False.
 
@@ -118,7 +118,7 @@ def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
     import reasonable
 
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "static.ttl"  # N-Triples are Turtle
+        file = Path(folder) / "static.ttl"  # every N-Triples text is a Turtle text
         file.write_bytes(ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"")
         reasoner = reasonable.PyReasoner()
         reasoner.load_file(str(file))

@@ -89,7 +89,8 @@ class KnowledgeGraph:
     prefixes : mapping of prefix to namespace
         The prefixes of internal queries: `PREFIXES` and prefixes that files declare.
     declared : mapping of prefix to namespace
-        The prefixes that files declare, those of the scene first. The empty prefix is the one in the scene's file.
+        The prefixes that files declare, the prefixes of the scene's file first. The empty prefix has the meaning that
+        the scene's file gives.
     faults : list of str
         The reasons why the scene can't be planned in, if it was loaded with `tolerant`.
     written : mapping of individual to place
@@ -122,7 +123,7 @@ class KnowledgeGraph:
 
     @property
     def spoken(self) -> dict[str, str]:
-        """The prefixes for users' queries: ``confab:``, those of the scene's file, and those of internal queries."""
+        """The prefixes for users' queries: ``confab:``, prefixes of the scene's file, and prefixes of internal queries."""
         return {"confab": CORE, **self.prefixes, **self.declared}
 
     def require_whole(self) -> None:
@@ -146,7 +147,7 @@ class KnowledgeGraph:
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
-        """Return an iterator over the rows of a SELECT query, with the same errors as `select`; it needs less memory."""
+        """Return an iterator over the rows of a SELECT query, with the same errors as `select` and less memory."""
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError(NO_ROWS)
@@ -383,7 +384,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
         timed = _Timed(content, f"reading {file}")
-        if form.supports_datasets:  # all graphs of the file become one
+        if form.supports_datasets:  # all graphs of the file become one graph
             quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
             graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
         else:

@@ -26,7 +26,7 @@ class Mirror:
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
         self.world: Any = world_of(graph.ntriples(SCENE))
-        self.world.get_ontology(graph.scene + "#")  # the target of `with`
+        self.world.get_ontology(graph.scene + "#")  # the ontology for users' ``with`` blocks
         self._seen = self._lines()
 
     def pull(self) -> int:

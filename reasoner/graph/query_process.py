@@ -174,7 +174,7 @@ class QueryWorker:
         with self._sending:
             if self._process is None:
                 command = [sys.executable, str(PROCESS)]
-                self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # limited per query
+                self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # each query has a limit
                 self._send(self._setup())
             self._send((query, *dataset))
         left, process = deadline.left, self._process

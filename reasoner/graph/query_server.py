@@ -29,7 +29,7 @@ def main() -> None:
     store.bulk_extend(ox.parse(setup["quads"], format=ox.RdfFormat.N_QUADS))
     while True:
         question = received()
-        if question is not None:  # None is a late interruption of the last query
+        if question is not None:  # None is a late request to stop the last query
             sys.stdout.buffer.write(forked(store, question, setup))
             sys.stdout.buffer.flush()
 
@@ -85,7 +85,7 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
         found += part
     os.close(ours)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if part:  # interrupted, possibly after its answer
+    if part:  # the query was interrupted, possibly after its answer
         return pickle.dumps(("ended", -signal.SIGKILL, ""))
     return bytes(found) if status == 0 else pickle.dumps(("ended", status, found.decode("utf-8", "replace")))
 

@@ -176,7 +176,7 @@ class Endpoint:
             headers["Authorization"] = self.authorization
         slow = f"{self.url}: no answer within {self.timeout:g} s; the store is too slow for this, or the limit too low"
         for again in reversed(range(self.retries + 1)):
-            end = time.monotonic() + 2 * self.timeout  # one timeout for the first byte, one for the rest
+            end = time.monotonic() + 2 * self.timeout  # one timeout for the first byte, one timeout for the other bytes
             try:
                 response = self._pool.request("POST", self.url, body=body, headers=headers, preload_content=False)
                 answer = bytearray()

@@ -123,7 +123,7 @@ def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[o
 
 
 def _phases(describe: _Describe, whole: ox.NamedNode, episode: Data) -> Iterator[ox.Triple]:
-    """Yield a phase for each value of each symbol; a boolean symbol with several arguments only has phases of true."""
+    """Yield a phase for each value of each symbol; a boolean symbol with several arguments has phases only for the value true."""
     end = float(episode["seconds"].get("simulated", 0.0))
     values: dict[tuple[str, ...], tuple[str, float]] = {}
     found: list[tuple[tuple[str, ...], str, float, float]] = []
@@ -201,7 +201,7 @@ class _Describe:
         return node, found
 
     def of(self, name: str) -> ox.NamedNode:
-        """Return the scene's individual with a name; if the scene doesn't have it, return an individual of the episode."""
+        """Return the scene's individual with a name; if the scene has no such individual, return an individual of the episode."""
         return ox.NamedNode(self.names.iri(name)) if name in self.names else self.node(name.replace(":", "-"))
 
     def planning(self, node: ox.NamedNode, whole: ox.NamedNode, number: int, change: Data) -> Iterator[ox.Triple]:

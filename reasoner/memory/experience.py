@@ -9,10 +9,11 @@ Tally       numbers of times that an item was chosen successfully, was passed ov
 Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
-names, and their union merges them. An item has one tally per lifted fact (`Fact`): the empty fact counts the item itself, other
-facts count situations of the individuals in its roles. Tallies of epoch 0 never age. Each further epoch belongs to one episode of
-a replica, and contains preferences between individuals (for example between two hands), whose weight decays with later episodes.
+Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore
+have equal names, and their union merges them. An item has one tally per lifted fact (`Fact`): the empty fact counts the
+item itself, other facts count situations of the individuals in the item's roles. Tallies of epoch 0 never age. Each
+further epoch belongs to one episode of a replica, and contains preferences between individuals (for example between two
+hands), whose weight decays with later episodes.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class LearningError(ValueError):
 
 
 def _named(kind: str, said: object) -> str:
-    import hashlib  # imported only for learning, to start faster
+    import hashlib  # imported only for learning, so that Confab starts faster
 
     return f"{kind}_{hashlib.sha1(repr(said).encode(), usedforsecurity=False).hexdigest()[:16]}"
 
@@ -75,7 +76,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Order:
-    """A learned order: goals of one situation type are achieved before goals of another.
+    """A learned order: goals of one situation type are achieved before goals of another situation type.
 
     `first` and `then` are the situation types. `shared` contains the pairs of positions at which the two goals have the same
     individual; positions count the arguments from 0, and the value is last.
@@ -107,9 +108,9 @@ class Order:
 class OpenRole:
     """A role of a method that isn't a parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value the role is at its first use: its
-    situation type, and the roles that are its arguments. `becomes` is the situation type whose value the individual becomes; an
-    individual that no symbol has as its value is then preferred.
+    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value fills the role at the
+    role's first use: the situation type, and the roles that are the symbol's arguments. `becomes` is the situation type
+    whose value the individual becomes; an individual that no symbol has as its value is then preferred.
     """
 
     kind: str
@@ -249,7 +250,7 @@ class Experience:
         return found
 
     def preferences(self, decay: float) -> dict[str, dict[Fact, tuple[float, float]]]:
-        """Return the weighted numbers of choices and rejections by name and fact; each later episode multiplies them by `decay`."""
+        """Return weighted numbers of choices and rejections by name and fact; each later episode scales weights by `decay`."""
         found: dict[str, dict[Fact, tuple[float, float]]] = {}
         for (replica, epoch), name, fact, tally in self:
             if epoch:

@@ -1,10 +1,10 @@
 """Files and stores of experience: learned items as triples and tallies as annotated axioms, in Turtle that Protégé can open.
 
-Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and item
-(`:countsFor`). The counter is `:associatedWith` the item itself and with the lifted facts that held. An ``owl:Axiom`` on each of
-these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never share a
-counter, and other items are named by their content, so that the union of two files contains both memories. An edited rule keeps
-its tallies.
+Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and
+item (`:countsFor`). The counter is `:associatedWith` the item itself and with the lifted facts that held. An
+``owl:Axiom`` on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting
+`:probability`. Replicas never share a counter, and all other nodes are named by their content, so that the union of two
+files contains both memories. An edited rule keeps its tallies.
 
 Each link is written as one line, which is read by a regular expression. Files in another layout, such as that of Protégé, are read
 by the Turtle parser.
@@ -136,7 +136,7 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 def turtle(
     experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
 ) -> Iterator[str]:
-    """Yield a memory as Turtle, item by item; `only` restricts it to one replica's tallies, `words` returns an item's label."""
+    """Yield a memory as Turtle, item by item; `only` restricts the text to one replica's tallies, `words` returns labels."""
     iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
     replica = _text(experience.replica)
@@ -248,7 +248,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             if "episodes" in node:
                 several = [
                     _count(text, "episodes") for text in node["episodes"]
-                ]  # two numbers in a union of two versions
+                ]  # a union of two versions has two numbers
                 experience.episodes[node["replica"][0]] = max(several)
             if "chosen" in node:  # knowledge links have only a probability
                 counter, target = (

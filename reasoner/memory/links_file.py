@@ -1,7 +1,8 @@
 """Files of confabulation memories: knowledge links as annotated axioms in a Turtle file that imports the scene.
 
-Each link is a triple ``quantified behaviour :associatedWith situated object instance``, annotated with ``:probability`` by an
-``owl:Axiom``. Protégé shows the probability beside the triple. Confab writes only files of its own, and never edited ontologies.
+Each link is a triple ``quantified behaviour :associatedWith situated object instance``, annotated with ``:probability``
+by an ``owl:Axiom``. Protégé shows the probability beside the triple. Confab writes links only to separate files, never
+to ontologies that users edit.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     names : Names
         The scene's names; a term that the scene doesn't contain is named by the last part of its IRI.
     found : Lines, optional
-        The result of `memory_lines` for the file if it is known already.
+        The result of `memory_lines` for the file, if this result is known already.
 
     Raises
     ------
@@ -192,7 +193,7 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
         yield ox.Triple(axiom, node(owl + "annotatedSource"), source)
         yield ox.Triple(axiom, node(owl + "annotatedProperty"), node(CORE + "associatedWith"))
         yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
-        # a decimal, because some programs write doubles with only seven digits
+        # the probability is a decimal, because some programs write doubles with only seven digits
         decimal = f"{Decimal(repr(probability)):f}"
         yield ox.Triple(axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(XSD + "decimal")))
 

@@ -26,8 +26,9 @@ class Typed:
 class Action:
     """A parsed action; the names in `precondition` and `effect` have been checked against the declarations.
 
-    The precondition and effect of a durative action are those of the action as a whole (`confab.reasoner.pddl.durative`).
-    `durative` contains its conditions and effects with their times; it is None for other actions.
+    The precondition and effect of a durative action are those of the action as a whole
+    (`confab.reasoner.pddl.durative`). `durative` contains the conditions and effects of a durative action with their
+    times; None for other actions.
     """
 
     name: str
@@ -53,19 +54,19 @@ class Pddl:
 
     domain: str = "domain"
     problem: str = "problem"
-    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # with their direct supertypes
+    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # the direct supertypes
     predicates: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
-    objects: dict[str, str] = field(default_factory=dict)  # with their types; constants first
+    objects: dict[str, str] = field(default_factory=dict)  # objects with their types; constants come first
     actions: dict[str, Action] = field(default_factory=dict)
     axioms: list[Axiom] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)  # derived predicates that must never hold
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
-    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # (time, atom, new truth)
+    timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # time, atom and new truth value
     goal: Form | None = None
     preferences: dict[str, Form] = field(default_factory=dict)  # soft goals
-    minimize: Form | None = None  # the metric
+    minimize: Form | None = None  # the metric that a plan minimises
 
     def above(self, name: str) -> Sequence[str]:
         """Return a type and all its supertypes, from the nearest supertype to ``object``."""

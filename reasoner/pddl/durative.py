@@ -35,7 +35,7 @@ class NotTimedError(ValueError):
 
 
 def duration_in(form: Form) -> Word | Form:
-    """Return the number or expression that a ``:duration`` form states; return the lower bound if it states only bounds."""
+    """Return the number or expression that a ``:duration`` form states; return the lower bound if the form states only bounds."""
     if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
         return duration_in(form.items[2])
     bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]

@@ -99,7 +99,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Exists:
-    """An existential quantification; a universal quantification is the negation of one."""
+    """An existential quantification; a universal quantification is the negation of an existential quantification."""
 
     variables: tuple[Term, ...]
     inner: Formula
@@ -280,6 +280,6 @@ def number_text(number: Number) -> str:
 
 
 def decimal(number: Fraction) -> str:
-    """Return a number in decimal notation, rounded to `DIGITS` places if it has no finite decimal notation."""
+    """Return a number in decimal notation, rounded to `DIGITS` places if no finite decimal notation exists."""
     text = written(number)
     return text if "/" not in text else written(Fraction(round(number * 10**DIGITS), 10**DIGITS))

@@ -125,10 +125,10 @@ class _Import:
     pddl: Pddl
     scene: str
     level: int
-    names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to the problem's name
+    names: dict[tuple[str, str], str] = field(default_factory=dict)  # the problem's name, by kind and PDDL name
     taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
     places: dict[str, Place] = field(default_factory=dict)
-    variables: dict[str, str] = field(default_factory=dict)  # the problem's name to the PDDL name
+    variables: dict[str, str] = field(default_factory=dict)  # the PDDL name, by the problem's name
 
     def __post_init__(self) -> None:
         self.effects = {name: tuple(effects_of(action.effect)) for name, action in self.pddl.actions.items()}
@@ -178,7 +178,7 @@ class _Import:
         if not word.startswith("?"):
             return self.name("object", word)
         text = re.sub(r"[^0-9a-z_]", "_", word)[1:]
-        while self.variables.setdefault(f"?{text}", word) != word:  # ?a-1 and ?a_1
+        while self.variables.setdefault(f"?{text}", word) != word:  # the words ?a-1 and ?a_1 give the same text
             text += "_"
         return f"?{text}"
 
@@ -281,7 +281,7 @@ class _Import:
             classes[name] = tuple(own)
             key = self.common([self.signatures[p.predicate][p.key] for p in parts])
             found[name] = SituationType(name, (self.kind(key),), name, default=none)
-        for kind, above in parents.items():  # the values of a situation type are its class
+        for kind, above in parents.items():  # the values of a situation type form a class
             for name in above:
                 if name in found:
                     classes[name] = tuple(dict.fromkeys((*classes[kind], *classes[name])))
@@ -376,7 +376,7 @@ class _Import:
         return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to the facts in `found` if the conjunct is equivalent to a fact; return whether it is.
+        """Return whether a conjunct of the goal is equivalent to a fact; if so, add the fact to `found`.
 
         Facts include negated atoms of boolean situation types, and comparisons of a changing function with a number. A conjunct
         that contradicts an earlier fact isn't added.

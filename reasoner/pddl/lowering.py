@@ -66,7 +66,7 @@ from confab.reasoner.symbols import (
 
 Terms = Mapping[str, Term]
 CASES = 4
-"""Maximum number of other values of a symbol if a conditional effect on it is split into one action per value."""
+"""Maximum number of other values of a symbol if a conditional effect on the symbol is split into one action per value."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return the formula that a boolean symbol is true: the conditions of its rules, or an atom if they are recursive."""
+        """Return the formula that a boolean symbol is true: the conditions of its rules, or an atom for recursive rules."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -189,13 +189,13 @@ class Lowering:
                 holds = both([*guards, self.all_of(rule.conditions, terms, scope)])
                 if holds != NEVER:
                     inside = {term.name for term in head.terms}
-                    left = [term for term in terms.values() if term.name not in inside]  # PDDL omits the world
+                    left = [term for term in terms.values() if term.name not in inside]  # PDDL has no world
                     yield head, head.terms, some(left, holds)
 
     # ---------------------------------------------------------------------------------------------------- actions
 
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
-        """Yield one behaviour for each case of a behaviour's conditional effects; together these behaviours are equivalent to it.
+        """Yield behaviours that together are equivalent to a behaviour: one for each case of the behaviour's conditional effects.
 
         An effect is split only if its condition is that one symbol has a value, and the symbol has at most `CASES` other values.
         """
@@ -265,7 +265,7 @@ class Lowering:
         return term
 
     def known(self, situation: str, its: tuple[Term, ...], wanted: str, scope: Scope) -> Term:
-        """Return the value of a symbol; if no condition states the value, add a parameter for it and return the parameter."""
+        """Return the value of a symbol; if no condition states the value, add a parameter and return the parameter."""
         if (situation, its) not in scope.values:
             value = self.parameter(wanted, self.range_of(situation), scope)
             scope.values[situation, its] = value
@@ -367,7 +367,7 @@ class Lowering:
                 yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
 
     def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
-        """Yield the PDDL effects that replace the old value of a symbol by a new one, and that update the extra predicates."""
+        """Yield the PDDL effects that replace the old value of a symbol by a new value, and that update the extra predicates."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
         own, when = cell.own, cell.when

@@ -181,7 +181,7 @@ class _Reader:
     def metric(self, form: Form) -> None:
         words = form.items[1:]
         wanted = words[1] if len(words) == 2 and self.word(words[0], "minimize").text == "minimize" else None
-        if isinstance(wanted, Word):  # (:metric minimize total-cost), without the brackets
+        if isinstance(wanted, Word):  # (:metric minimize total-cost), a function without brackets
             wanted = Form((wanted,), wanted.line, wanted.column)
         if wanted is None:
             raise self.fail(form, "the only metric supported is (:metric minimize …)")
@@ -536,7 +536,7 @@ class _Reader:
         if item.head == "=":
             names = [word.text for word in item.items[1:] if isinstance(word, Word)]
             if len(names) == 2 and names[0] == names[1] in self.pddl.objects:
-                return  # (= a a)
+                return  # the equality (= a a) always holds
             if len(item.items) != 3 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (= (function …) NUMBER)")
             words = self.atom(item.items[1], {}, self.pddl.functions, "function")

@@ -136,7 +136,7 @@ def _all(forms: Sequence[Form], place: Word) -> Form | None:
 def happenings(
     table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
-    """Return the behaviours for timed initial literals in order of time, the goal that the last one happens, and their times."""
+    """Return the behaviours for timed initial literals in order of time, the goal that the last one happens, and all times."""
     pddl = table.pddl
     moments = sorted({time for time, _, _ in pddl.timed})
     if not moments:

@@ -1,7 +1,7 @@
 """Export of a planning problem as a scene in Turtle, from which `confab.reasoner.reading.problem` reads the same problem.
 
-Domain and scene are in one file. Every condition and effect is an individual with an IRI, so that Protégé can show and edit it.
-Effects are numbered in the order of their execution.
+Domain and scene are in one file. Every condition and effect is an individual with an IRI, so that Protégé can show and
+edit conditions and effects. Effects are numbered in the order of their execution.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def turtle(problem: Problem, title: str, description: str, labels: Said | None =
     Parameters
     ----------
     problem : Problem
-        Its names become local names of IRIs in the namespace of its scene.
+        The problem, whose names become local names of IRIs in the namespace of the scene.
     title, description : str
         Annotations of the scene.
     labels : mapping of name to label, optional
@@ -309,7 +309,7 @@ class _SceneWriter:
             label = _quoted(self.labels.get(name, name))
             yield f"{self.iri(name)} a {said} ; c:index {index} ; rdfs:label {label}@en ."
         if len(names) > 1:
-            different = " ".join(sorted(map(self.iri, names)))  # the OWL API, and so Protégé, saves them in this order
+            different = " ".join(sorted(map(self.iri, names)))  # the OWL API (and Protégé) saves names in this order
             yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {different} ) ] ."
 
     def above(self, kind: str) -> Iterator[str]:
@@ -381,7 +381,7 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Append the statement of a condition's or effect's time span unless it is the whole duration, and return its IRI."""
+    """Append the statement of a condition's or effect's time span unless the span is the whole duration, and return its IRI."""
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri

@@ -77,7 +77,7 @@ class Vocabulary:
                 chosen.setdefault(members, kind)
         names = {members: self.name("type", kind) for members, kind in chosen.items()}
         above = {}
-        for members in chosen:  # from large to small
+        for members in chosen:  # the classes are sorted from large to small
             larger = [names[other] for other in chosen if members < other]
             above[names[members]] = larger[-1] if larger else "object"
         types = {kind: names[its] for kind in self.problem.classes if (its := self.problem.members(kind)) in names}
@@ -253,7 +253,7 @@ class Vocabulary:
             elif symbol.situation in self.used and (value == TRUE or not boolean):
                 yield self.value(symbol.situation, its, None if boolean else self.object(value))
         every = dict.fromkeys(one for members in self.problem.classes.values() for one in members)
-        for situation in sorted(self.assigned):  # some planners want an initial value for all arguments
+        for situation in sorted(self.assigned):  # some planners require an initial value for all arguments
             kinds = self.situations[situation].arguments
             types = iter(map(self.common, self.functions[self.counted[situation]]))
             kept = self.about(situation, [Term(str(place)) for place in range(len(kinds))])

@@ -108,7 +108,7 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
     """Yield the derived facts of the graph `SITUATION`, in order of derivation.
 
-    The caller must add each fact to the graph before it requests the next fact.
+    The caller must add each fact to the graph before the caller requests the next fact.
     """
     rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
     again = circular(rules)
@@ -213,7 +213,7 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
                 pairs = zip(effect.arguments, other.arguments, strict=True)
                 equal = (*(EqualityCondition(a, b) for a, b in pairs if a != b), *other.when)
                 if not (equal or is_same):
-                    break  # both always change the same symbol
+                    break  # both effects always change the same symbol
                 if is_same:
                     total = Calculation(SIGNS[other.operation], total, other.amount)
                     where += equal

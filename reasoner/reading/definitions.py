@@ -84,7 +84,8 @@ _DEFINED = OWL + "equivalentClass"
 CLOSED = {OWL + name for name in ("complementOf", "allValuesFrom", "oneOf", "hasSelf")}
 CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinality")}
 CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
-"""OWL constructs from which OWL 2 RL infers no members; planning can, because it treats unstated facts as false."""
+"""OWL constructs from which OWL 2 RL infers no members; planning infers such members, because planning treats unstated
+facts as false."""
 MOST = 5
 """Maximum cardinality in a definition; the evaluation of larger cardinalities would take longer than planning."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
@@ -141,7 +142,7 @@ class Definitions:
         return self._spread(set(self.concluded))
 
     def _spread(self, found: set[str]) -> frozenset[str]:
-        """Return the classes in `found`, and all classes whose definitions depend on them or on a value property."""
+        """Return the classes in `found`, and all classes whose definitions depend on these classes or on a value property."""
         defined = {
             iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node
         }
@@ -228,7 +229,7 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions for a situation type that is true for the members of a class, apart from rules for it."""
+        """Return the conditions for a situation type that is true for the members of a class, without the type's own rules."""
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):
@@ -409,7 +410,7 @@ class Definitions:
         """Return conditions whose conjunction is equivalent to an amount being in a data range."""
         said = self.nodes.get(node, {})
         if not said:
-            return (Comparison(amount, "=", amount),)  # a datatype
+            return (Comparison(amount, "=", amount),)  # a datatype allows every number
         if OWL + "withRestrictions" in said:
             found: list[Condition] = []
             for facet in self._items(*said[OWL + "withRestrictions"], name="withRestrictions"):

@@ -39,7 +39,7 @@ def facts_of(
             continue
         situation, boolean = properties[predicate]
         if situation in domain.rules:
-            continue  # its facts are derived
+            continue  # the facts of the situation type are derived
         if boolean:
             stated[Symbol(situation, pair)].add(TRUE)
         else:

@@ -121,7 +121,7 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 
 
 def _with_situation(problem: Problem, words: Sequence[str]) -> str:
-    """Return a hint to the fact whose object and value are the first and the last word; empty if there isn't exactly one."""
+    """Return a hint to the only fact with the first word as object and the last word as value; empty for no or several facts."""
     about, value = (words[0], words[-1]) if words else ("", "")
     found = [
         each.name

@@ -70,7 +70,7 @@ class Individuals:
                 rows.append(stated((s, p, o), numbers))
                 continue
             if not names and said in links and subject not in nodes:
-                link((s, p, o))  # raises an error
+                link((s, p, o))  # this call raises an error for the triple
             if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
                 rows.append((subject, said, text(o)))
         self.triples.update(dict.fromkeys(rows))

@@ -53,10 +53,11 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 
 @dataclass(frozen=True)
 class Reading:
-    """A scene as a planning problem, with the mapping from its names to IRIs.
+    """A scene as a planning problem, with the mapping from the problem's names to IRIs.
 
-    `whole` states whether the problem contains all individuals of the scene, or only the individuals that its task can need
-    (`confab.reasoner.reading.relevance`). `schema` contains the part of the ontology that doesn't depend on individuals.
+    `whole` states whether the problem contains all individuals of the scene, or only the individuals that the task can
+    need (`confab.reasoner.reading.relevance`). `schema` contains the part of the ontology that doesn't depend on
+    individuals.
     """
 
     problem: Problem
@@ -72,7 +73,7 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     ----------
     graph : KnowledgeGraph
     schema : Schema, optional
-        The result of `read_schema` if it is known already.
+        The result of `read_schema`, if this result is known already.
 
     Raises
     ------

@@ -62,8 +62,9 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
 def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str:
     """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
 
-    If `ordered`, the rows are sorted by ID unless individuals share an index, or lack an index and belong to several ontologies. If
-    the reading contains only a part of the scene, the query is restricted to its individuals.
+    If `ordered`, the rows are sorted by ID unless individuals share an index, or lack an index and belong to several
+    ontologies. If the reading contains only a part of the scene, the query is restricted to the individuals of this
+    part.
 
     Raises
     ------

@@ -4,10 +4,10 @@ The selected individuals (the slice) are closed: if a behaviour can change a sym
 individuals in the behaviour's conditions and other effects. Planning in the slice therefore gives the same result as planning in
 the whole world (proof: docs/quantification.md; tests: test_recognition.py, test_closure.py). Recognition has two steps:
 
-1. `routes` reads only the behaviours. For each behaviour that can change a symbol, it finds routes from the symbol's object to the
-   other terms of the behaviour: forward to a value (the place of the object), along a static relation (a hand that reaches the
-   place), or backward from a value (other objects at the place). If a term has no route, the slice contains all individuals of
-   the term's class.
+1. `routes` reads only the behaviours. For each behaviour that can change a symbol, the function finds routes from the symbol's
+   object to the other terms of the behaviour: forward to a value (the place of the object), along a static relation (a hand
+   that reaches the place), or backward from a value (other objects at the place). If a term has no route, the slice contains
+   all individuals of the term's class.
 2. `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one step, until a
    query finds no new individual. A task without a plan in the slice then has no plan in the world.
 """
@@ -154,7 +154,7 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
         for aggregate in known.domain.aggregates.values():
             quantity = known.domain.situations[aggregate.situation].quantity
             if quantity is not None and quantity.bounded and read_by(aggregate) & changed:
-                counting.add(aggregate.situation)  # its bounds restrict behaviours
+                counting.add(aggregate.situation)  # the bounds of the total restrict behaviours
                 _span_to_totals(aggregate, changed, known, found, looked_up)
     return found
 
@@ -169,7 +169,7 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
                 start = {*condition.arguments, condition.value} - {TRUE, FALSE}
                 _span(scope, start, named, known, found, looked_up)
                 left -= {condition.situation}
-    if left:  # facts in nested conditions
+    if left:  # the facts occur in nested conditions
         found.classes.update(known.names.iri(parameter.kind) for parameter in aggregate.parameters)
 
 
@@ -300,8 +300,8 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 class _Step:
     """A route from one term of a condition to another: the properties to follow, and the cost.
 
-    `constants` are the individuals that the source may denote. `looks_up` is the situation type and the source's position in it; it
-    is None if the source alone determines the symbol.
+    `constants` are the individuals that the source may denote. `looks_up` is the situation type and the source's
+    position among the arguments; None if the source alone determines the symbol.
     """
 
     source: str
@@ -428,8 +428,8 @@ class _Search(Individuals):
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
     """Return the IRIs in known namespaces with the local name of an individual or class that has been read.
 
-    Each candidate IRI is looked up separately. An individual is included only if a class of it is stated. A class is included only
-    if it has individuals that aren't nodes of the schema.
+    Each candidate IRI is looked up separately. An individual is included only if a class of the individual is stated. A
+    class is included only if it has individuals that aren't nodes of the schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}

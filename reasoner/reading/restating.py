@@ -105,7 +105,7 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
     yield from _individual(every, "AllOf", "all of this", {})
     for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
         if not argument:
-            continue  # refuted for all arguments
+            continue  # an empty argument stands for all individuals
         part = ox.NamedNode(f"{node.value}.argument{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
         same = equality_properties(text(term), reading.names.iri(argument))
@@ -117,7 +117,7 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
 
 
 def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
-    """Return the value property of each situation type that has one; keys and values are IRIs."""
+    """Return the value property of each situation type with a value property; keys and values are IRIs."""
     return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
 
 

@@ -60,7 +60,8 @@ class Schema:
     - `pairs` contains the situation types whose value property isn't functional.
     - `whole` contains the amounts whose value property has the range of whole numbers.
     - `tuples` states whether some facts are nodes; `facts` contains the facts without arguments.
-    - `expressions` contains the definitions of classes, `axioms` the axioms about value properties, `swrl` the SWRL rules.
+    - `expressions` contains the definitions of classes, `axioms` contains the axioms about value properties, and `swrl`
+      contains the SWRL rules.
     - `ontologies` contains the IRIs of the loaded files.
     - `exclusive` contains the situation types for which physics gives a value to only one individual at a time.
     """
@@ -96,7 +97,7 @@ class Schema:
 
     @cached_property
     def individuals_of(self) -> frozenset[str]:
-        """The classes of objects, which stand for all of their members if they replace an individual in a condition or effect."""
+        """The classes of objects; in a condition or effect, such a class stands for all of its members."""
         known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}
         known |= {iri for iri, node in self.expressions.items() if OWL + "equivalentClass" in node}
         return frozenset(known - self.nodes.keys())

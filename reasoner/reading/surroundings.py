@@ -28,7 +28,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""Situation types or relations as IRIs, each with a flag per argument: whether it is the looked-up individual."""
+"""Situation types or relations as IRIs, each with a flag per argument: whether the argument is the looked-up individual."""
 
 
 class Surroundings:
@@ -60,7 +60,7 @@ class Surroundings:
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read some individuals, the members of some classes, and all individuals that their values lead to."""
+        """Read some individuals, the members of some classes, and all individuals to which the values lead."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)
@@ -77,7 +77,7 @@ class Surroundings:
 
     @property
     def agree(self) -> bool:
-        """Whether the names of the slice have the same meaning here."""
+        """Whether the names of the slice have the same meaning in the surroundings."""
         return self.names.agree(self.frame.names)
 
     @property

@@ -47,7 +47,7 @@ from confab.reasoner.updates.words import (
 )
 
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
-"""The change of an amount by operator: the new amount is the old amount, the operator and a term."""
+"""The change of an amount by operator: the operator combines the old amount and a term."""
 
 
 class UpdateCompiler:

@@ -131,7 +131,7 @@ class Conditions:
         )
 
     def equal(self, left: Any, right: Any, negated: bool, known: Collection[str]) -> str:
-        """Return the condition node that two terms are equal, or that they are different if `negated`."""
+        """Return the condition node that two terms are equal, or, if `negated`, that two terms are different."""
         at = place((left, right))
         one, other = (self.scope.put(term(unwrapped(side), at), known, at) for side in (left, right))
         return self.nodes.condition("EqualityCondition", at, equality_properties(one, other), negated)
@@ -154,7 +154,7 @@ class Conditions:
         return self.any_of(groups, at)
 
     def any_of(self, groups: Sequence[Sequence[str]], at: int, negated: bool = False) -> str:
-        """Return the node of a disjunction of conjunctions; a disjunction of a single condition is that condition's node."""
+        """Return the node of a disjunction of conjunctions; for a single condition, return the node of the condition."""
         if len(groups) == 1 and len(groups[0]) == 1 and not negated:
             return groups[0][0]
         node = self.nodes.new("condition", "AnyOf", at)

@@ -39,7 +39,7 @@ Triples = Sequence[tuple[ox.NamedNode | ox.BlankNode, ox.NamedNode, ox.NamedNode
 
 @dataclass(frozen=True)
 class Converted:
-    """Result of a conversion: the file's new text, the converted behaviours, and why other behaviours are unchanged."""
+    """Result of a conversion: the file's new text, the converted behaviours, and the reasons for unchanged behaviours."""
 
     text: str
     behaviors: Sequence[str]
@@ -279,7 +279,7 @@ def _is_said(iri: str, schema: Schema) -> bool:
 
 
 def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str:
-    """Return why the statements of a behaviour's parts can't be replaced; return an empty text if they can."""
+    """Return the reason why the statements of a behaviour's parts can't be replaced; an empty text if replacement is possible."""
     for part in sorted(parts):
         if part not in file.said:
             return f"{local_name(part)} isn't stated in this file"
@@ -300,7 +300,7 @@ def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> boo
 
 
 def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
-    """Return why an update isn't equivalent to the behaviour; return an empty text if it is."""
+    """Return the reason why an update isn't equivalent to the behaviour; an empty text for an equivalent update."""
     if behavior.price is not None:
         return "a price that is calculated stays with individuals"
     if spans_of(behavior):
@@ -354,7 +354,7 @@ def situations_of(schema: Schema) -> Situations:
 
 
 def plainly(behavior: Behavior) -> object:
-    """Return a canonical form of a behaviour: equal for behaviours that differ only in bound variables' names and in order."""
+    """Return a canonical form, which is equal for behaviours that differ only in the names of bound variables and in order."""
     effects = ((e.situation, e.arguments, e.value, _plain(e.when), e.each) for e in behavior.effects)
     return (
         behavior.name,

@@ -56,7 +56,7 @@ Value = Word | Truth | Number | tuple[Said, ...]
 
 @dataclass(frozen=True)
 class Triple:
-    """A triple pattern; if the object is a list such as ``(?shelf true)``, it is a tuple."""
+    """A triple pattern; an object that is a list, such as ``(?shelf true)``, is a tuple."""
 
     subject: Word
     predicate: Word
@@ -211,7 +211,7 @@ def _grammar(unit_name: str) -> pyparsing.ParserElement:
     unit, variable, name, iri, a, negative = deepcopy(
         (getattr(parser, unit_name), parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE)
     )
-    negative.set_parse_action(lambda tokens: Literal(-tokens[0].value))  # rdflib's own fails with a decimal number
+    negative.set_parse_action(lambda tokens: Literal(-tokens[0].value))  # rdflib's own action fails with decimals
 
     def word(element: pyparsing.ParserElement, spelled: Any) -> None:
         def placed(text: str, at: int, tokens: pyparsing.ParseResults) -> Word:
@@ -381,5 +381,5 @@ def words(tree: Any) -> Iterator[Word]:
 
 
 def place(tree: Any) -> int:
-    """Return the smallest position of a word in a part of the syntax tree; return 0 if it contains no word."""
+    """Return the smallest position of a word in a part of the syntax tree; return 0 if the part contains no word."""
     return min((word.at for word in words(tree)), default=0)

@@ -101,7 +101,7 @@ class _Writer:
     spell: Spell
     names: dict[str, str] = field(default_factory=dict)
     scope: dict[str, bool] = field(default_factory=dict)  # variables of the first WHERE, as in `group`
-    given: dict[Expression, str] = field(default_factory=dict)  # variables of its numbers
+    given: dict[Expression, str] = field(default_factory=dict)  # variables for the numbers in the first WHERE
 
     def main(self, effects: Sequence[ValueEffect | AmountEffect], labels: Sequence[str]) -> str:
         """Return the first operation, which contains the parameters and preconditions."""
@@ -158,7 +158,7 @@ class _Writer:
         return self.with_number(*said, before), self.with_number(*said, after), [" ".join(lines)] if lines else []
 
     def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
-        """Return the triple that an effect deletes: the fact that it makes false, or the old value in the preconditions."""
+        """Return the triple that an effect deletes: the fact that becomes false, or the old value in the preconditions."""
         if effect.value == FALSE:
             return self.situation(effect.situation, effect.arguments, TRUE)
         if effect.value == TRUE:
@@ -233,7 +233,7 @@ class _Writer:
             case EqualityCondition(left, right):
                 return f"FILTER({self.put(left)} = {self.put(right)})"
             case Witness(variable, kind, conditions):
-                if variable in known or variable in self.behavior.kinds:  # rename a shadowing variable
+                if variable in known or variable in self.behavior.kinds:  # rename a variable with a used name
                     own = f"{variable}_inside"
                     inner = tuple(substituted(one, {variable: own}) for one in conditions)
                     return self.said(Witness(own, kind, inner), known)
@@ -290,7 +290,7 @@ class _Writer:
             yield f"{self.put(value)} a {self.spell(kind)} ."
 
     def asked_of_class(self, term: str) -> bool:
-        """Return whether a class condition on a term exists; without the type pattern, it would be read as the term's type."""
+        """Return whether a class condition on a term exists; without a type pattern, it would be read as the type of the term."""
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
             for condition in self.behavior.conditions
@@ -309,7 +309,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of a disjunction that only enumerates individuals; None for any other."""
+    """Return the variable and the individuals of a disjunction that only enumerates individuals; None for others."""
     found: list[str] = []
     name = ""
     for group in alternatives:

@@ -155,7 +155,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         )
     for (situation, value), symbol in wanted.items():
         if any((situation, value) in given[name] for name in (*waiting, *contradictory)):
-            continue  # the finding on the behaviour reports it
+            continue  # the finding on the behaviour reports the value
         yield (
             names.iri(symbol.arguments[0]),
             f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
@@ -170,7 +170,8 @@ def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
     for situation in problem.domain.situations.values():
-        # Symbols that no behaviour changes may be changed by something else; situation types without objects are ignored.
+        # Symbols that no behaviour changes may have other causes of change; situation types without objects are
+        # ignored.
         present = all(problem.classes.get(kind) for kind in situation.arguments)
         if situation.name not in changed or not present:
             there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
@@ -194,12 +195,12 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield each group of behaviours that need only each other; they are the cause of the other findings."""
+    """Yield each group of behaviours that need only each other; these groups cause the other findings."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
         if name in seen or not reached <= needs.keys():
-            continue  # it needs a behaviour with contradictory conditions, which another rule reports
+            continue  # the group needs a behaviour with contradictory conditions, which another rule reports
         if all(name in _reached(other, needs) for other in reached - {name}):
             seen |= reached
             yield reached
@@ -258,7 +259,7 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
 
 
 def crowded_places(case: Case) -> Iterator[Fault]:
-    """Find individuals that share an initial value although every behaviour that gives the value requires it to be free."""
+    """Find individuals that share an initial value although every behaviour that gives the value requires a free value."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -273,7 +274,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     for symbol, value in sorted(problem.initial.items()):
         perceived = problem.domain.situations[symbol.situation].perceived
         if perceived is not None and perceived.exclusive:
-            continue  # an error: `confab.reasoner.validation.contradictions`
+            continue  # `confab.reasoner.validation.contradictions` reports an error
         if len(symbol.arguments) == 1 and asks.get((symbol.situation, value)):
             holders[symbol.situation, value].append(symbol.arguments[0])
     for (situation, value), individuals in holders.items():

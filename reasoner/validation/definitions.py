@@ -110,7 +110,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
         why = "a defined situation is true or false for each pair; a functional value property gives one value"
         return situation, what, why, f"drop owl:FunctionalProperty of {name}, or drop the axiom"
     if situation in changed:
-        return None  # `effect-on-definition` reports it at the effect
+        return None  # `effect-on-definition` reports the fault at the effect
     what += f"no property implies {name}"
     why = "planning derives consequences of situations that behaviours change and of static facts"
     mend = f"make a property that behaviours change, or a static one, rdfs:subPropertyOf {name}; or drop the axiom"

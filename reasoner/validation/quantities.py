@@ -34,7 +34,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     }
 
     def unit(expression: Expression) -> tuple[str, str]:
-        """Return the unit of an expression (empty if it has none or fits every unit), and a mismatch inside the expression."""
+        """Return the unit of an expression (empty for no unit or any unit), and a mismatch inside the expression."""
         match expression:
             case Amount(situation):
                 return units.get(situation, ""), ""
@@ -220,7 +220,7 @@ class _Ranges:
         }
 
     def widen(self, situation: str, more: Range, endlessly: bool = False) -> bool:
-        """Extend the range of a situation type, to infinity if `endlessly`; return whether it changed."""
+        """Extend the range of a situation type, to infinity if `endlessly`; return whether the range changed."""
         old = self.known.get(situation)
         low, high = more if old is None else (min(old[0], more[0]), max(old[1], more[1]))
         if endlessly and old is not None:
@@ -232,7 +232,7 @@ class _Ranges:
         return self.known[situation] != old
 
     def of(self, expression: Expression, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return the range of a numeric expression; return None if it has no value."""
+        """Return the range of a numeric expression; return None for an expression without a value."""
         if expression in narrowed:
             return narrowed[expression]
         match expression:
@@ -247,7 +247,7 @@ class _Ranges:
                 return expression, expression
 
     def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
-        """Return why a behaviour is never applicable, and the ranges of the amounts concerned; return None if it is applicable."""
+        """Return the reason why a behaviour is never applicable, and the ranges of the amounts concerned; otherwise None."""
         narrowed: dict[Expression, Range] = {}
         for condition in behavior.preconditions:
             if not isinstance(condition, Comparison) or condition.negated:
@@ -298,7 +298,7 @@ class _Ranges:
         return " and ".join(said) or "that is never so"
 
     def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
-        """Return the range of an amount after an effect; return None if it is unknown."""
+        """Return the range of an amount after an effect; return None if the range is unknown."""
         now, by = self.of(Amount(effect.situation, effect.arguments), narrowed), self.of(effect.amount, narrowed)
         if now is None or by is None:
             return None
@@ -361,6 +361,6 @@ def _plain_amount(amount: Amount) -> str:
 
 
 def some(names: Sequence[str], most: int = 5) -> str:
-    """Return an enumeration of names for a sentence; after `most` names, it ends with "others"."""
+    """Return an enumeration of names for a sentence; after `most` names, the enumeration ends with "others"."""
     shown = [*names[:most], *(["others"] if len(names) > most else [])]
     return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))

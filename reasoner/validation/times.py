@@ -17,7 +17,7 @@ SECONDS = ("", "s", "sec", "second", "seconds")
 
 
 def windows_too_short(case: Case) -> Iterator[Fault]:
-    """Find individuals none of whose windows is as long as a behaviour that names them."""
+    """Find individuals whose windows are all shorter than a behaviour that names the individual."""
     if case.reading is None or case.reading.problem.times is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -79,7 +79,7 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str | None:
 
 
 def _powers(expression: Expression, units: Mapping[str, str]) -> Mapping[str, int] | None:
-    """Return the powers of the basic units of an expression; None if they are unknown."""
+    """Return the powers of the basic units of an expression; None for unknown powers."""
     match expression:
         case Calculation(sign, left, right):
             one, other = _powers(left, units), _powers(right, units)

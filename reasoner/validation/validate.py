@@ -60,12 +60,12 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""Rules that are skipped for a node that mentions an undeclared term, because their faults may be consequences of it."""
+"""Rules that are skipped for a node that mentions an undeclared term, because their faults may be consequences of this term."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
 """Maps a check to another check; a node with a finding of the other check is skipped."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
-"""Checks whose findings are about initial facts or bounds, like those of ``impossible-situation``."""
+"""Checks whose findings are about initial facts or bounds, like the findings of ``impossible-situation``."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
 """Rules that depend on the initial state; they are skipped if the initial facts are faulty."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach", "no-value"}
@@ -95,7 +95,7 @@ def validate(
     files : sequence of str or Path
         Paths of files, or names of shipped scenes. Each file is checked together with its imports.
     deep : bool
-        Whether to run HermiT, too, which needs Java.
+        Whether to run also HermiT, which needs Java.
     done : callable, optional
         Is called with a description at the beginning of each stage: `STAGES` times per file, and once more if `deep`.
 
@@ -205,7 +205,7 @@ def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
 
 
 def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    """Add the inferences of OWL 2 RL to the graph; yield a finding if they identify two individuals."""
+    """Add the inferences of OWL 2 RL to the graph; yield a finding if the inferences identify two individuals."""
     try:
         infer(graph)
     except KnowledgeError as error:
