@@ -64,14 +64,14 @@ class Mark:
 
 @dataclass(frozen=True)
 class All:
-    """A sequence node: the children are ticked one after another, as long as they succeed."""
+    """A sequence node: the children are ticked one after another, until one child fails."""
 
     children: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class First:
-    """A fallback node: the children are ticked one after another, until one succeeds."""
+    """A fallback node: the children are ticked one after another, until one child succeeds."""
 
     children: tuple[Node, ...]
 

@@ -47,10 +47,10 @@ class FactChange:
 class Need:
     """A need for some of the facts that a step makes true.
 
-    `gives` lists the facts that are needed. `by` is the path of the step that needs the facts; it is empty for the goal
-    and for rest values at the end of the plan. `conditions` lists the ground preconditions of the later step that fail
-    without the facts; it is empty if only the later step's effects would differ. For a goal, `conditions` lists the
-    defined goals that follow from the facts.
+    `gives` lists the facts that are needed. `by` is the path of the step that needs the facts; the path is empty for
+    the goal and for rest values at the end of the plan. `conditions` lists the ground preconditions of the later step
+    that fail without the facts; the list is empty if only the later step's effects would differ. For a goal,
+    `conditions` lists the defined goals that follow from the facts.
     """
 
     kind: Kind
@@ -115,14 +115,14 @@ def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
 
 @dataclass
 class _Written:
-    """The step that gave a cell its value, and the cell's previous value."""
+    """The step that gave a symbol its value, and the symbol's previous value."""
 
     by: int
     before: str
 
 
 class _Noting(Facts):
-    """Facts that record which cells, and which holders of values, are read."""
+    """Facts that record the symbols that are read, and the values whose holders are read."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -147,7 +147,7 @@ class _Course:
         self.rules = BehaviorReader(problem)
         self.facts = _Noting(problem, problem.initial)
         self.written: dict[Cell, _Written] = {}
-        self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have or had a value, by value
+        self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # symbols that have or had a value, by value
         self.gives: dict[Path, tuple[FactChange, ...]] = {}
         self.groups = {step.path: step for step in plan.walk() if step.steps and _least(step.steps) == level}
         self.whole = plan.steps if _least(plan.steps) == level else ()
@@ -192,7 +192,7 @@ class _Course:
     def needs_of(
         self, step: Step
     ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
-        """Yield the steps that a step needs, with the conditions or cells that would differ without each of them."""
+        """Yield the steps that a step needs, with the conditions or symbols that would differ without the needed step."""
         facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
@@ -221,9 +221,9 @@ class _Course:
     def failures_without(
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
-        """Return the conditions of a step that fail if the given cells have their previous values.
+        """Return the conditions of a step that fail if the given symbols have their previous values.
 
-        Return None if the step isn't affected.
+        Return None if the previous values don't affect the step.
         """
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
@@ -260,11 +260,11 @@ class _Course:
         return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
 
     def counted(self, cell: Cell) -> bool:
-        """Return whether a cell contains an amount; a step that changes an amount depends on the previous amount."""
+        """Return whether a symbol has an amount; a step that changes an amount depends on the previous amount."""
         return self.problem.domain.situations[cell[0]].quantity is not None
 
     def done(self, number: int, step: Step) -> None:
-        """Execute a step with all its sub-steps, and record the cells that it changed."""
+        """Execute a step with all its sub-steps, and record the symbols that the step changed."""
         mark = len(self.facts.log)
         for primitive in Plan((step,)).primitives:
             for cell, value in (self.changes(primitive) or {}).items():
@@ -340,7 +340,7 @@ class _Course:
         return tuple(FactChange(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
 
     def fact_of(self, number: int, cell: Cell) -> Fact | None:
-        """Return the fact that a step makes true for a cell."""
+        """Return the fact that a step makes true for a symbol."""
         given = self.gives.get(self.steps[number].path, ())
         return next((c.fact for c in given if (c.fact.symbol.situation, c.fact.symbol.arguments) == cell), None)
 

@@ -73,7 +73,7 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
 
 
 class Decisions(Generic[T]):
-    """A trie of results; each result is indexed by the entries of the case on which it depends."""
+    """A trie of results; each result is indexed by the entries of the case on which the result depends."""
 
     def __init__(self) -> None:
         self.at: int | None = None
@@ -88,7 +88,7 @@ class Decisions(Generic[T]):
         return None if node is None else node.found
 
     def learn(self, case: Case, reads: Iterable[int], found: T) -> None:
-        """Store a result under the entries on which it depends."""
+        """Store a result under the entries on which the result depends."""
         node = self
         for at in dict.fromkeys(reads):
             node.at = at

@@ -115,7 +115,7 @@ class _Causes:
         self.claims = Claims(self.lowest, certificate)
 
     def reading(self) -> tuple[Reading, _Noting]:
-        """Return the reader of conditions, and the view that records the claims that it uses."""
+        """Return the reader of conditions, and the view that records the used claims."""
         view = _Noting(self.claims, ())
         return Reading(self.lowest, view), view
 

@@ -101,7 +101,7 @@ def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate |
 
     Return None if `find` exceeds the limit or finds no certificate.
 
-    A `NoTimeLeftError` isn't caught; it ends the whole search for a certificate.
+    A `NoTimeLeftError` isn't caught; this error ends the whole search for a certificate.
     """
     most = lowest.most
     try:
@@ -134,8 +134,8 @@ def _contested(lowest: Lowest) -> Certificate | None:
 class Relaxed:
     """Relaxed reachability, computed backwards from the questions.
 
-    A new question has the answer "impossible" until an achiever is found. When an answer changes, all answers that depend on
-    it are computed again.
+    A new question has the answer "impossible" until an achiever is found. When an answer changes, all dependent answers
+    are computed again.
     """
 
     def __init__(self, lowest: Lowest) -> None:
@@ -361,7 +361,7 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
-    """Distinguish more and more values until the goal, or part of it, holds in no case."""
+    """Distinguish more and more values until the goal, or a part of the goal, holds in no case."""
     certificate = Certificate(cases=0)
     while True:
         cases = Cases(lowest, certificate)
@@ -425,7 +425,7 @@ def _counted(lowest: Lowest, certificate: Certificate) -> Certificate | None:
 
 
 def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
-    """Return a few facts such that each case violates at least one of them."""
+    """Return a few facts such that each case violates at least one of the facts."""
     failing = {
         fact: {
             case for case in cases.came_from if not cases.met(Reading(cases.lowest, CaseView(cases.claims, case)), fact)

@@ -79,7 +79,7 @@ class ConditionReader:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], last: Sequence[Test] = ()
     ) -> list[Test]:
-        """Return conditions as tests; the last test may choose individuals and run the remaining tests on them.
+        """Return conditions as tests; the last test may choose individuals and run the remaining tests on the chosen individuals.
 
         The variables of the conditions are added to `bound`. Variables that occur only in nested conditions (`AnyOf`,
         `Witness`) are local to these conditions. The tests in `last` run after all others.
@@ -178,7 +178,7 @@ class ConditionReader:
         return lambda facts, values: self.problem.classes.get(kind, ())
 
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
-        """Return a condition as a test; choices inside the condition are local to it."""
+        """Return a condition as a test; choices inside the condition are local to the condition."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
                 key, at = self.key(arguments), self.place(value)

@@ -19,7 +19,7 @@ Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
 def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]]:
-    """Return, for each defined situation type, the situation types that depend on it and on which it depends."""
+    """Return, for each defined situation type, the situation types with which the type is mutually dependent."""
     return {name: group for group in strata(rules) for name in group}
 
 

@@ -57,7 +57,7 @@ def _lines(writer: PythonWriter) -> Iterator[str]:
 
 
 class DerivedCells(dict[Key, str]):
-    """A mapping in place of the cells of a defined situation type: it stores no values, and `get` derives each value."""
+    """A mapping from the symbols of a defined situation type: the mapping stores no values, and `get` derives each value."""
 
     def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
         super().__init__()
@@ -74,15 +74,15 @@ class Stratum:
     """Mutually dependent defined situation types, with the values known at one age of the table.
 
     The requested situations, and all situations that their rules read, are evaluated in rounds until no more become
-    true; the remaining ones are false. Other situations aren't evaluated, and the interpreter's stack doesn't limit the
-    depth of a derivation.
+    true; the remaining situations are false. Other situations aren't evaluated, and the interpreter's stack doesn't
+    limit the depth of a derivation.
     """
 
     def __init__(self, table: Table) -> None:
         self.table, self.age = table, -1
         self.tests: dict[str, Callable[..., bool]] = {}
         self.known: dict[Cell, bool] = {}
-        self.asked: dict[Cell, None] | None = None  # the cells read during a derivation, with the results
+        self.asked: dict[Cell, None] | None = None  # the symbols read during a derivation, with the results
 
     def holds(self, cell: Cell) -> bool:
         """Return whether a symbol is true; during another derivation, return the preliminary value."""
@@ -109,14 +109,14 @@ class Stratum:
         order, done, known = [cell], 0, self.known
         while True:
             grown = False
-            while done < len(order):  # the cells that were read for the first time
+            while done < len(order):  # the symbols that were read for the first time
                 grown |= self._try(order[done])
                 done += 1
                 if len(asked) > len(order):
                     order += list(asked)[len(order) :]
             if cell in known:
                 return True
-            for other in reversed(order):  # other cells depend on the cells that were read last
+            for other in reversed(order):  # other symbols depend on the symbols that were read last
                 if other not in known:
                     grown |= self._try(other)
             if cell in known or not (grown or len(asked) > len(order)):

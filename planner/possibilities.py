@@ -90,7 +90,7 @@ class Knowledge(Protocol):
 
 
 class Lowest:
-    """The lowest level of a problem, with its behaviours indexed by the situation types that they change.
+    """The lowest level of a problem, with its behaviours indexed by the situation types that the behaviours change.
 
     `work` counts tests. `WorkLimitError` is raised when `work` exceeds `most`. `NoTimeLeftError` is raised when the current
     deadline has passed.
@@ -179,7 +179,7 @@ class Lowest:
         return isinstance(condition, RelationCondition | ClassCondition | EqualityCondition)
 
     def steps(self, conditions: Sequence[Condition], bound: frozenset[str]) -> list[tuple[Condition, tuple[str, ...]]]:
-        """Return conditions in the order of their evaluation, each with the variables that it binds."""
+        """Return conditions in the order of their evaluation, each with the variables that the condition binds."""
         key = id(conditions), bound
         if key not in self._steps:
             self._kept.append(conditions)

@@ -10,8 +10,8 @@ optimal    shortened until a lower bound is met, without memory         `confab.
 paper      A* with eq. (5) on each level                                `confab.planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-`confab.planner.validation` has accepted every returned plan. `confab.planner.certificate_checks` has accepted the certificate
-of every unsolvable outcome. Both checkers share no code with any search.
+`confab.planner.validation` has accepted every returned plan. `confab.planner.certificate_checks` has accepted the
+certificate of every unsolvable outcome. The plan checker and the certificate checker share no code with any search.
 """
 
 from __future__ import annotations

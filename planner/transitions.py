@@ -1,10 +1,10 @@
 """A state as a table that is changed in place, and Python code generated for conditions and effects.
 
-The dictionary ``now`` of a table is the state: it maps each situation type and key to a value. A key is an individual, or a
-tuple of individuals if the symbol has several arguments. The dictionary ``holders`` maps each situation type and value to the
-keys with this value, except for the value false. The list ``trail`` contains the overwritten values, oldest first, and lets
-`undo` restore earlier values. The number ``age`` counts all changes, including undone changes. Results that are derived from
-the table are valid while the age is the same.
+The dictionary ``now`` of a table is the state, and maps each situation type and key to a value. A key is an individual,
+or a tuple of individuals if the symbol has several arguments. The dictionary ``holders`` maps each situation type and
+value to the keys with this value, except for the value false. The list ``trail`` contains the overwritten values,
+oldest first, and lets `undo` restore earlier values. The number ``age`` counts all changes, including undone changes.
+Results that are derived from the table are valid while the age is the same.
 
 The table contains no defined situations. ``now`` derives a defined situation when its value is read
 (`confab.planner.derived_facts`).
@@ -117,19 +117,19 @@ class Table:
             trail.pop()
 
     def before(self, mark: int) -> dict[Cell, str]:
-        """Return the cells set since a mark, with their values at the mark."""
+        """Return the symbols set since a marked state, with their values in the marked state."""
         found: dict[Cell, str] = {}
         for situation, key, old in self.trail[mark:]:
             found.setdefault((situation, key), old)
         return found
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the cells whose values have changed since a mark, with the current values."""
+        """Return the symbols whose values have changed since a marked state, with the current values."""
         now = self.now
         return {cell: now[cell[0]][cell[1]] for cell, old in self.before(mark).items() if now[cell[0]][cell[1]] != old}
 
     def changes(self, mark: int) -> Changes:
-        """Return the net changes since a mark: the values at the mark, and the current values."""
+        """Return the net changes since a marked state: the values in the marked state, and the current values."""
         before, after = self.before(mark), self.since(mark)
         return {cell: before[cell] for cell in after}, after
 

@@ -206,8 +206,8 @@ Condition: TypeAlias = (
 class ValueEffect:
     """The effect that ``situation(arguments)`` becomes `value` if all conditions in `when` hold in the state before.
 
-    Conditions in `when` may determine variables. With `each`, the effect is on every member of the class of this variable. In a
-    `Problem`, `spread` has replaced such an effect by one effect per member.
+    Conditions in `when` may determine variables. With `each`, the effect is on every member of the class of this
+    variable. In a `Problem`, `spread` has replaced an effect with `each` by one effect per member.
     """
 
     situation: str

@@ -141,7 +141,7 @@ def call(
     timeout : float, optional
         Maximum elapsed seconds.
     started : callable, optional
-        Is called with the process, so that other code can end it by `kill`.
+        Is called with the process, so that other code can end the process by `kill`.
 
     Raises
     ------

@@ -34,8 +34,9 @@ class AsyncWorld(Protocol):
 class Synchronous:
     """A `World` that awaits the coroutines of an `AsyncWorld`.
 
-    The event loop runs all the time, so tasks of the world (a subscription, a heartbeat) continue between the calls. Use it as a
-    context manager, or call `close` in the end: both stop the running primitive and end the loop.
+    The event loop runs all the time, so tasks of the world (a subscription, a heartbeat) continue between the calls.
+    Use a `Synchronous` world as a context manager, or call `close` in the end: both ways stop the running primitive and
+    end the event loop.
     """
 
     def __init__(self, world: AsyncWorld) -> None:

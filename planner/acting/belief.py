@@ -34,13 +34,13 @@ from confab.reasoner.symbols import (
 
 @dataclass
 class Belief:
-    """The planning task as the executive believes it to be.
+    """The planning task according to the executive's belief.
 
-    `problem` contains the situation, the goal, and those static facts and behaviours that aren't in doubt; `certain`
-    contains all static facts and behaviours, including those in doubt. `obstacles` are discovered objects that can't be
-    moved; behaviours that would move such an object are excluded from `problem` and from `certain`. `withdrawn` and
-    `refuted` contain the static facts and the behaviours in doubt. `unseen` are the symbols that the first observation
-    didn't include.
+    `problem` contains the situation, the goal, and the static facts and behaviours that aren't in doubt; `certain` also
+    contains the static facts and behaviours in doubt. `obstacles` are discovered objects that can't be moved;
+    behaviours that would move an obstacle are excluded from `problem` and from `certain`. `withdrawn` and `refuted`
+    contain the static facts and the behaviours in doubt. `unseen` are the symbols that the first observation didn't
+    include.
     """
 
     problem: Problem
@@ -54,7 +54,7 @@ class Belief:
 
     @cached_property
     def using(self) -> Compiled:
-        """The compiled domain; it is compiled at its first use, so that the time limit of an episode applies."""
+        """The compiled domain, which is compiled at the first use, so that the time limit of an episode applies."""
         return compiled(self.problem)
 
     @property

@@ -100,7 +100,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed primitive with the situation before it, the kind of failure, and the objects involved."""
+    """A failed primitive with the situation before the primitive, the kind of failure, and the objects involved."""
 
     step: Step
     code: str
@@ -111,10 +111,9 @@ class Failure:
 
 @dataclass(frozen=True)
 class ExecutedPrimitive:
-    """An executed primitive with its begin and end, the world's verdict, and the unexpected values observed after it.
+    """An executed primitive with its begin and end, the world's verdict, and the unexpected values observed after the primitive.
 
-    `relied_on` lists the static facts (relation and individuals) that the primitive, or the behaviour that it refines,
-    relied on.
+    `relied_on` lists the static facts (relation and individuals) on which the primitive, or the refined behaviour, relied.
     """
 
     step: Step
@@ -132,7 +131,7 @@ class Replan:
 
     `after` is the path of the last primitive that was begun before the change. `kind` is ``repair`` if steps of the old
     plan were kept, otherwise ``replan``. `steps` are the new remaining steps, and `cost` is their cost; `dropped` and
-    `added` count the primitives that the change removed from the plan and added to it.
+    `added` count the primitives that the change removed from the plan and added to the plan.
     """
 
     after: tuple[int, ...]
@@ -163,7 +162,7 @@ class Episode:
     planned : Plan
         The plan before the first step.
     done : Plan
-        The executed steps; a failed primitive isn't part of it, unless its effects were observed afterwards.
+        The executed steps; a failed primitive isn't part of the plan, unless its effects were observed afterwards.
     initial, observed : State
         The situation in the beginning, and the situation that was observed in the end.
     goal : State

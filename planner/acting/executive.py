@@ -67,7 +67,7 @@ def act(
     world : World
         An object with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
     plan : Plan, optional
-        The first plan; if left out, it is planned here.
+        The first plan; if left out, `act` plans.
     interventions : sequence of Intervention
         The interventions by people during the episode.
     planner : callable, optional

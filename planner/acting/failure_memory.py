@@ -1,11 +1,11 @@
-"""Learning from failures: counts of static facts that proved unreliable, and removal of such facts from a problem.
+"""Learning from failures: unreliable static facts are counted, and removed from a problem.
 
-If a primitive fails although its preconditions hold, the static facts that it relied on become doubtful (for instance,
-the fact that a hand can reach a place). Counts never decrease, so the counts of several robots can be added. A fact
-that failed more often than it held is avoided if there is a plan without this fact.
+If a primitive fails although its preconditions hold, the static facts on which the primitive relied become doubtful
+(for instance, the fact that a hand can reach a place). Counts never decrease, so the counts of several robots can be
+added. A fact that failed more often than it held is avoided if there is a plan without this fact.
 
-A refutation by motion planning is certain and more specific: the behaviour is impossible while the objects stay where
-they are (`refuted_by`).
+A refutation by motion planning is certain and more specific: the behaviour is impossible while the objects stay at
+their places (`refuted_by`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Repair of a plan: the steps that are still valid are kept, and the rest is planned again.
+"""Repair of a plan: steps that are still valid are kept, and the other steps are planned again.
 
 The remaining steps of the plan are replayed on a state table from the present situation. A step is
 
@@ -41,7 +41,7 @@ MOST = 5_000
 """Maximum number of expansions of a repair; at this number, the whole task is planned again."""
 
 SHARE = 0.5
-"""Share of the remaining time for a repair; the rest is reserved for a new plan."""
+"""Share of the remaining time for a repair; the other time is reserved for a new plan."""
 
 
 @dataclass(frozen=True)

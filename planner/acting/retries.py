@@ -55,7 +55,7 @@ class Retries:
     most: int = 0
 
     def another_round(self) -> bool:
-        """Begin another round if another round is allowed; return whether it was allowed."""
+        """Begin another round if another round is allowed; return whether the round was allowed."""
         if self.rounds >= self.policy.rounds:
             return False
         self.rounds += 1

@@ -1,8 +1,8 @@
-"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that respects it.
+"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that respects this order.
 
-Most of the order of a sequential plan is arbitrary. A primitive must wait for an earlier primitive only if exchanging
-the two would make one of them inapplicable or change its effects. The test applies the behaviours themselves, so it
-covers all kinds of conditions.
+Most of the order of a sequential plan is arbitrary. A primitive must wait for an earlier primitive only if an exchange
+of both primitives would make one primitive inapplicable or change its effects. The test executes the behaviours, so the
+test covers all kinds of conditions.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     Parameters
     ----------
     problem : Problem
-        Its initial state is the state before the primitives.
+        The problem whose initial state is the state before the primitives.
     primitives : sequence of Step
 
     Raises
     ------
     ValueError
-        A primitive isn't applicable in the state before it.
+        A primitive isn't applicable in the state before the primitive.
     """
     states: list[State] = [problem.initial]
     writes: list[dict[Symbol, tuple[str | None, str]]] = []
@@ -143,7 +143,7 @@ def ready(
 
 
 def urgency_of(order: PartialOrder) -> dict[int, float]:
-    """Return for each primitive the number of primitives in the longest chain that begins with it."""
+    """Return for each primitive the number of primitives in the longest chain that begins with this primitive."""
     return _urgency(order, dict.fromkeys(order, 1.0))
 
 
@@ -159,7 +159,7 @@ def makespan(slots: Sequence[Slot]) -> float:
 
 
 def _urgency(order: PartialOrder, seconds: Mapping[int, float]) -> dict[int, float]:
-    """Return for each primitive the total duration of the longest chain that begins with it."""
+    """Return for each primitive the total duration of the longest chain that begins with this primitive."""
     found: dict[int, float] = {}
     for i in reversed(list(networkx.topological_sort(order))):
         found[i] = seconds[i] + max((found[j] for j in order.successors(i)), default=0.0)
@@ -190,6 +190,6 @@ def _needs(
 
 
 def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:
-    """Return whether a primitive is applicable in a state and has the effects that it has in the plan."""
+    """Return whether a primitive is applicable in a state and has the same effects as in the plan."""
     after = _done(problem, step, state)
     return after is not None and all(after.get(s) == new for s, (_, new) in writes.items())

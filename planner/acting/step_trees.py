@@ -17,7 +17,7 @@ def first_chain(steps: Sequence[Step]) -> tuple[Step, ...]:
 
 
 def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps without their first primitive, and without the parents for which it is the last primitive."""
+    """Return the steps without the first primitive, and without parents that have no other primitive."""
     if not steps[0].steps:
         return tuple(steps[1:])
     below = without_first(steps[0].steps)

@@ -51,7 +51,7 @@ class SymbolicWorld:
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
     def execute(self, step: Step) -> Report:
-        """Execute a primitive; an intervention during the primitive stops it if its precondition no longer holds."""
+        """Execute a primitive; an intervention stops the running primitive if the primitive's precondition no longer holds."""
         end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
         disturbed = False
         while self._waiting and (self._waiting[0].at or 0.0) < end:
@@ -175,7 +175,7 @@ def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual
 
 
 def _is_whereabouts(problem: Problem, situation: str) -> bool:
-    """Return whether a situation type shares values with another situation type, so that a change of place changes both."""
+    """Return whether a situation type shares values with another situation type, so that a move changes symbols of both."""
     own = set(problem.classes.get(problem.domain.situations[situation].range, ()))
     return any(
         own & set(problem.classes.get(other.range, ()))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
-"""Code of a primitive that was stopped; a stopped primitive isn't a failure, so nothing is learned from it."""
+"""Code of a primitive that was stopped; a stopped primitive isn't a failure, so the executive learns nothing from a stop."""
 
 WITHOUT_EFFECT = "without effect"
 """Code of a primitive that was reported as done, although none of its effects is observed."""

@@ -8,7 +8,7 @@ strict     rules aren't used; their record is still updated when an episode is l
 
 On every level, rules are tried for goals and for refinements before a search begins
 (`confab.planner.experience.following`). Only the search can prove that there is no plan. Experience isn't used if the
-memory isn't trusted, has no rules for the goals, or has never achieved such goals.
+memory isn't trusted, has no rules for the goals, or has never achieved goals of the same kinds.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Memory:
         return self.record(rule).chosen < self.record(rule).failed
 
     def leads(self, problem: Problem, mode: str) -> bool:
-        """Return whether rules may be used: the mode requires them, or some open goal has rules with a good record."""
+        """Return whether rules may be used: the mode requires rules, or some open goal has rules with a good record."""
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
         return (
             mode != "strict"

@@ -1,7 +1,7 @@
 """Choice among rule instances by cogency, which is learned from the facts of earlier choices and rejections.
 
 The facts about an individual in a role are generated from the domain: its classes that behaviours distinguish, its
-values and their goals, the objects that have it or should have it as a value, and its static relations to the other
+values and their goals, the objects whose value the individual is or should be, and its static relations to the other
 roles.
 
 Cogency is eq. (1) of the paper in log odds: a rule contributes ln((c + ½)/(p + ½)) for c choices and p rejections or

@@ -175,7 +175,7 @@ class RulePolicy:
         return steps
 
     def differing(self, start: int, targets: Mapping[Cell, str], keep: Keep) -> dict[Cell, str]:
-        """Return the required values that don't hold: targets, and values to be kept that changed since the mark `start`."""
+        """Return the required values that don't hold: targets, and values to be kept that changed since `start`."""
         now, wanted = self.call.table.now, dict(targets)
         for cell in self.call.space.defined:
             if value := keep(cell, ""):
@@ -222,7 +222,7 @@ class RulePolicy:
         return None
 
     def undone_within_reach(self, level: int, mark: int) -> bool:
-        """Return whether rules can achieve again those achieved goals of the call that were undone since a mark."""
+        """Return whether rules can achieve again those achieved goals of the call that were undone since a marked state."""
         kept, trail = self.call.kept, self.call.table.trail[mark:]
         undone = dict.fromkeys((situation, key) for situation, key, _ in trail if (situation, key) in kept)
         return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)

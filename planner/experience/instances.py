@@ -184,7 +184,7 @@ class Instances:
         return found
 
     def goals_of(self, level: int, instance: RuleInstance, position: int) -> list[Goal]:
-        """Return the goals for an unmet condition of a rule instance; achieving one of them suffices."""
+        """Return the goals for an unmet condition of a rule instance; achieving one of these goals suffices."""
         self.refresh()
         if (key := (level, id(instance), position)) not in self.goals:
             self.goals[key] = instance, self._goals_of(level, instance, position)
@@ -307,7 +307,7 @@ class Instances:
         return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
 
     def next(self, level: int, instance: RuleInstance, goal: Goal) -> RuleInstance | None:
-        """Return the cheapest instance of the same rule for a goal in the current state, or None if there is none.
+        """Return the cheapest instance of the same rule for a goal in the current state, or None if there is no such instance.
 
         Among equally cheap instances, instances with fewer unmet conditions are preferred, then the same step as before.
         """

@@ -57,7 +57,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
         The experience that is extended.
     problem : Problem
     plan : Plan, optional
-        The plan to learn from; without it, the function plans.
+        The plan to learn from; without a given plan, the function plans.
     """
     using = compiled(problem)
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
@@ -171,7 +171,7 @@ def with_first_record(experience: Experience, lesson: Lesson, problem: Problem, 
 
 
 def record(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
-    """Return the record of the known rules on a problem: the goals that they achieve without search."""
+    """Return the record of the known rules on a problem: the goals that the rules achieve without search."""
     memory = Memory(experience)
     call = Call(problem, memory.warmed(using), None, SHORT.expansions)
     policy = memory.policy(call)
@@ -274,9 +274,9 @@ def possible(call: Call, method: Method, roles: Roles) -> bool:
 
 
 def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> PlanTrace:
-    """Return the trace of the steps of a level since a mark.
+    """Return the trace of the steps of a level since a marked state.
 
-    The trace begins with the state at the mark. The goals of the trace are the targets and the values to be kept.
+    The trace begins with the marked state. The goals of the trace are the targets and the values to be kept.
     """
     before, state = call.table.before(mark), call.table.state()
     goal = {}

@@ -116,8 +116,8 @@ class PlanTrace:
     ) -> Iterator[Condition]:
         """Yield ground conditions without quantifiers and alternatives.
 
-        A quantified condition is replaced by the conditions of an individual that satisfies it; alternatives are replaced by
-        an alternative that holds.
+        A quantified condition is replaced by the conditions of an individual that satisfies the condition; alternatives
+        are replaced by an alternative that holds.
         """
         for condition in (substituted(lifted, bound) for lifted in conditions):
             if isinstance(condition, Witness) and not condition.negated:
@@ -161,7 +161,7 @@ class PlanTrace:
     def rules_of(self) -> Iterator[Rule]:
         """Yield a rule for each change of a step that a goal or a later step needs.
 
-        Afterwards, the facts of the trace are those of the initial state.
+        Afterwards, the facts of the trace are the facts of the initial state.
         """
         later, facts = self.facts, Facts(self.problem, self.problem.initial)
         for done in self.done:

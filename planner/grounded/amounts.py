@@ -2,9 +2,9 @@
 
 A state is an integer. The low bits of a state represent facts. The high bits of a state are the number of a tuple of amounts.
 
-Each ground comparison has a bit that is derived from the tuple. Therefore conditions, goals and all functions that read bits
-are the same with and without amounts. An operator may make a comparison true if it changes the difference of both sides in the
-right direction (`Push`), or if the change depends on the state.
+Each ground comparison has a bit that is derived from the tuple. Therefore conditions, goals and all functions that read
+bits are the same with and without amounts. An operator may make a comparison true if the operator changes the
+difference of both sides in the right direction (`Push`), or if the change depends on the state.
 
 Comparisons are linear: both sides are sums of amounts times constants. Numbers are exact. Whole numbers are Python integers,
 because arithmetic with integers is fast.
@@ -196,7 +196,7 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return True if a comparison is always true within the bounds of its amounts, False if it is never true.
+        """Return True if a comparison is always true within the bounds of its amounts, False if the comparison is never true.
 
         Return None if the comparison depends on the amounts.
         """

@@ -1,7 +1,8 @@
 """Derived bits: disjunctions in conditions, and facts of defined situation types.
 
-A derived bit is set if all bits of one of its alternatives are set. An opposite bit is set if the bit that it negates isn't set.
-Bits that depend on each other form a part; most parts consist of one bit. A part comes after the parts that it depends on.
+A derived bit is set if all bits of one of its alternatives are set. An opposite bit is set if the negated bit isn't
+set. Bits that depend on each other form a part; most parts consist of one bit. Each part comes after the parts on which
+it depends.
 
 After a change, only the parts that depend on a changed bit are recalculated. A part with several bits is recalculated by counting
 the missing bits of each alternative (Dowling and Gallier, Journal of Logic Programming 1, 1984). If a change affects many

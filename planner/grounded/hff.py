@@ -27,7 +27,7 @@ MOST_TIMES = 1000
 AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
 """A difference, the required sign, and the change of the difference by an operator.
 
-The change is None if it depends on the state.
+The change is None if the change depends on the state.
 """
 
 
@@ -214,8 +214,9 @@ def _needed_by(needs: Sequence[Sequence[int]], size: int) -> list[list[int]]:
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:
     """Return the required bits, the added bits and the owners of the relaxed operators.
 
-    Also return the relaxed operators of each `AmountPush`. An operator has a separate relaxed operator for each comparison that it
-    may make true. The owner of a relaxed operator is the operator that it belongs to.
+    Also return the relaxed operators of each `AmountPush`. An operator has a separate relaxed operator for each
+    comparison that the operator may make true. The owner of a relaxed operator is the operator from which the relaxed
+    operator was made.
     """
     needs, adds, owners = task.needs.lists(), task.adds.lists(), list(task.owners)
     repeated = defaultdict[AmountPush, list[int]](list)

@@ -100,7 +100,7 @@ class Meanings:
             waiting += [other for other in list(formulas.complements)[known:] if other in ways]
 
     def _circular(self) -> set[int]:
-        """Return the bits of recursively defined situation types, and of situation types that depend on these."""
+        """Return the bits of recursively defined situation types, and of situation types that depend on recursive types."""
         rules: dict[str, list[Rule]] = {name: [] for name in self.reached.defined}
         for schema in self.reached.schemas:
             if schema.rule:

@@ -13,8 +13,8 @@ from confab.reasoner.symbols import Parameter, Problem, RelationCondition, Situa
 def lifted(problem: Problem, level: int) -> Problem:
     """Return a problem in which conditional effects of the same shape are one effect over the rows of an auxiliary relation.
 
-    In a problem, an effect on every member of a class is a separate effect for each individual. The model of a cube puzzle has
-    thousands of such effects, and each effect would need a separate join.
+    In a problem, an effect on every member of a class is a separate effect for each individual. The model of a cube
+    puzzle has thousands of separate effects, and each effect would need a separate join.
     """
     relations: dict[str, frozenset[tuple[str, ...]]] = {}
     behaviors = dict(problem.domain.behaviors)

@@ -1,10 +1,10 @@
 """The search order by novelty: states with a new fact come first.
 
-A goal is open if it doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The distance of a
-state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed plan. A
-new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier state with
-the same distance had. The test for novelty is one operation on two integers. The open list is sorted by novelty, then by the
-number of open goals and landmarks. Among equal states, the newest state comes first.
+An open goal is a goal that doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The
+distance of a state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the
+last relaxed plan. A new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact
+that no earlier state with the same distance had. The test for novelty is one operation on two integers. The open list
+is sorted by novelty, then by the number of open goals and landmarks. Among equal states, the newest state comes first.
 
 Relaxed plans are computed only for expanded states that reach an open goal or landmark. Therefore the order ranks a hundred
 thousand states per second. The order drops only states from which the goal is unreachable. If the open list is empty, there is

@@ -188,7 +188,7 @@ class _Sums:
     def kept(self, place: int) -> Fraction | None:
         """Return the part of an amount that no operator can consume, or None if unknown.
 
-        The part exists if every consuming operator requires more than it consumes.
+        The part exists if every consuming operator requires more than the operator consumes.
         """
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:

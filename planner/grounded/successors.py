@@ -1,7 +1,7 @@
 """Applicable operators of a state, found by a decision tree over symbols.
 
-The tree is the successor generator of Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A branch is
-created when a state first reaches it, because a search visits only few branches.
+The tree is the successor generator of Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A
+branch is created when a state first reaches the branch, because a search visits only few branches.
 """
 
 from __future__ import annotations

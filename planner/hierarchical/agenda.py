@@ -5,8 +5,9 @@ asleep:  blocked goals; a goal wakes when a symbol that it waits for changes
 kept:    achieved goals; later steps may violate achieved goals temporarily, but must restore them
 before:  ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is filled)
 
-If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed attempt is
-repeated only after a symbol that the goal depends on has changed. Steps are refined and applied as soon as they are found.
+If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed
+attempt is repeated only after a symbol that the goal depends on has changed. Each step is refined and applied as soon
+as the step is found.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ class Agenda:
         return False
 
     def wake(self, mark: int) -> None:
-        """Reopen the goals that waited for a symbol which has changed since a mark, and the goals that were undone."""
+        """Reopen the goals that waited for a symbol which has changed since a marked state, and the goals that were undone."""
         call, asleep = self.call, self._asleep
 
         def opened(cell: Cell) -> None:
@@ -213,7 +214,7 @@ class Agenda:
         return False
 
     def _ready(self) -> Iterator[Cell]:
-        """Yield the sleeping goals that wait for no unachieved goal; if there are none, yield all sleeping goals."""
+        """Yield the sleeping goals that wait for no unachieved goal; if there is no such goal, yield all sleeping goals."""
         call = self.call
         ready = [c for c in self._asleep if all(other in call.kept for other in self._before.get(c, ()))]
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
@@ -227,7 +228,7 @@ class Agenda:
         return call.achieve(attempt[0], cell, BY_RULES)
 
     def settles(self) -> bool:
-        """Return whether some symbol isn't at rest, and steps of lower levels may still be tried to bring it to rest."""
+        """Return whether some symbol isn't at rest, and steps of lower levels may still be tried to bring the symbol to rest."""
         call = self.call
         return (
             not (call.settled or call.at_rest())
@@ -341,7 +342,7 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Return, for each goal, the goals that must be achieved earlier, because the goal makes them unreachable."""
+    """Return, for each goal, the goals that would become unreachable, and therefore must be achieved earlier."""
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None

@@ -1,6 +1,6 @@
 """One planning call: the workspace, the goals, and the applied steps.
 
-`Call.achieve` searches for steps of a level towards a goal, and immediately refines and applies them to the table.
+`Call.achieve` searches for steps of a level towards a goal, and immediately refines and applies these steps to the table.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class Call:
             for cell, value in self.goal.items()
             if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals that the most abstract level doesn't see; additional steps in the refinement of the last step achieve them."""
+        """Goals that the most abstract level doesn't see; additional steps in the refinement of the last step achieve
+        these goals."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []

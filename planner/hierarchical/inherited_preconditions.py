@@ -1,9 +1,10 @@
 """Preconditions that a lower level inherits from the behaviours of the upper levels.
 
-A search of a lower level alone finds steps that refine no step of an upper level. Such steps may violate conditions of an upper
-level, such as "a filled cup isn't moved". Therefore the behaviours of a level that is planned alone inherit preconditions. A
-behaviour may change a symbol that an upper level sees only if some behaviour of the upper level could make the same change. The
-conditions of the upper behaviour on the changed individuals become preconditions.
+A search of a lower level alone finds steps that refine no step of an upper level. Steps that refine no upper-level step
+may violate conditions of an upper level, such as "a filled cup isn't moved". Therefore the behaviours of a level that
+is planned alone inherit preconditions. A behaviour may change a symbol that an upper level sees only if some behaviour
+of the upper level could make the same change. The conditions of the upper behaviour on the changed individuals become
+preconditions.
 
 Conditions on other individuals of the upper behaviour, such as the second vessel of pouring, aren't inherited. Conditions on the
 old value of the changed symbol aren't inherited if the upper level doesn't see all values of the symbol.

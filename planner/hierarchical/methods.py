@@ -125,7 +125,7 @@ class Methods:
 def open_role(
     behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
 ) -> OpenRole:
-    """Return an open role for a parameter, with the symbol whose value determines the individual, if there is one."""
+    """Return an open role for a parameter, with the symbol whose value determines the individual, if there is such a symbol."""
     for condition in behavior.preconditions:
         if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
             known = [places.get(terms.get(a, a)) for a in condition.arguments]

@@ -25,7 +25,7 @@ The required final value is None if any value is allowed.
 
 
 class Nogoods:
-    """The nogoods of one program; they are valid for all initial states and goals."""
+    """The nogoods of one program; all nogoods are valid for all initial states and goals."""
 
     def __init__(self, space: Workspace) -> None:
         self.space = space

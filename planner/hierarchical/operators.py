@@ -76,7 +76,7 @@ class BoundProgram:
 
 
 FEW = 8
-"""Maximum number of candidates that are all tried; of more candidates, one of each symmetry class is tried."""
+"""Maximum number of candidates that are all tried; of more candidates, one candidate of each symmetry class is tried."""
 
 
 class Program:
@@ -203,7 +203,7 @@ class Program:
             hard.add(term)
             free = [p for p in free if p != term]
             tests.append(self.writer.member(term, kinds[term]))
-        # Soft: terms that the state determines, and tests on them.
+        # Soft: terms that the state determines, and tests on these terms.
         emit("unmet = ()")
         bound = set(hard)
         soft: list[Condition] = []

@@ -1,8 +1,9 @@
 """A scope: a part of the world that is grounded and searched on one level if no short chain of relevant steps suffices.
 
-The individuals in *focus* are those in the targets, and those in chains towards the targets. Steps involve only individuals in
-focus. *Frozen* individuals have a fixed state. The values of individuals in focus are frozen, and the individuals that conditions
-quantify over. Because of the frozen individuals, quantified conditions have the same truth value as in the whole world.
+The individuals in *focus* occur in the targets, or in chains towards the targets. Steps involve only individuals in
+focus. *Frozen* individuals have a fixed state. The values of individuals in focus are frozen, and the individuals that
+conditions quantify over. Because of the frozen individuals, quantified conditions have the same truth value as in the
+whole world.
 
 The state of the individuals in focus is exact. Therefore the steps of a successful search are applicable in the whole world. A
 failed search proves nothing. The caller refines the steps, and bars steps that have no refinement. The grounding package is
@@ -182,9 +183,9 @@ def problem_of(
 def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
     """Return the individuals in focus together with the frozen individuals.
 
-    The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies over
-    individuals, an individual is also frozen if its value is an individual of the scope, or if a static relation relates it to an
-    individual of the scope.
+    The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies
+    over individuals, an individual is also frozen if its value is an individual of the scope, or if a static relation
+    contains both individuals.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)

@@ -38,7 +38,7 @@ def gave_up(call: Call, why: str) -> Reason:
 def missing_amounts(call: Call) -> Iterator[str]:
     """Yield the requirements on amounts that the final state doesn't meet.
 
-    The requirements are those of the behaviours that could achieve the first goal of the latest attempt.
+    The requirements come from the behaviours that could achieve the first goal of the latest attempt.
     """
     space, situations = call.space, call.problem.domain.situations
     if all(situation.quantity is None for situation in situations.values()):

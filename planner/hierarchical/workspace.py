@@ -119,8 +119,8 @@ class Workspace:
     def refining(self, level: int, careful: bool = False) -> Keep:
         """Return the function of required final values in the refinement of a step of a level.
 
-        Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value may have any
-        final value; if `careful`, it must be unchanged.
+        Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value
+        may have any final value; if `careful`, the symbol must be unchanged.
         """
         rest = self.rest
         return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)

@@ -1,9 +1,10 @@
 """The hierarchical planner of the paper.
 
-The planner searches the most abstract level, then refines each behaviour on the level below, down to primitives. The goal of a
-refinement is defined in docs/levels.md. Symbols that the level of the refined behaviour sees must end with the values
-that the behaviour gives them. Symbols that only the lower level sees must end at rest if the refinement changed them; for
-example, hands must be empty, raised and upright. The next behaviour begins in the state in which the refinement ended.
+The planner searches the most abstract level, then refines each behaviour on the level below, down to primitives. The
+goal of a refinement is defined in docs/levels.md. Symbols that the level of the refined behaviour sees must end with
+the values that the behaviour states. Symbols that only the lower level sees must end at rest if the refinement changed
+them; for example, hands must be empty, raised and upright. The next behaviour begins in the state in which the
+refinement ended.
 
 The planner stores the refinement of each behaviour in each state. If a behaviour has no refinement, or if the refinement makes
 a later behaviour inapplicable, the planner searches the level again with the stored results. If a level has no plan, the
@@ -28,7 +29,7 @@ from confab.reasoner.symbols import Fact, GroundBehavior, Problem
 SETTLED, UNSETTLED = "settled", "unsettled"
 """Marks of a symbol that isn't at rest in the beginning (`Target`).
 
-The symbol is settled if no step has changed it, or if the symbol is at rest; otherwise the symbol is unsettled.
+The symbol is settled if no step has changed the symbol, or if the symbol is at rest; otherwise the symbol is unsettled.
 """
 
 DOUBT = 1_000

@@ -41,9 +41,9 @@ class InapplicableError(Exception):
 
 @dataclass(frozen=True)
 class Access:
-    """The facts that a step reads and the cells that it changes, at one moment or throughout its duration.
+    """The facts that a step reads and the symbols that the step changes, at one moment or throughout its duration.
 
-    `writes` maps each changed cell to the old and the new value.
+    `writes` maps each changed symbol to the old and the new value.
     """
 
     reads: frozenset[Key] = frozenset()
@@ -51,7 +51,7 @@ class Access:
 
     @property
     def changes(self) -> Mapping[Cell, tuple[str, str]]:
-        """The cells that change, each with the values before and after."""
+        """The symbols that change, each with the values before and after."""
         return self.writes or {}
 
 

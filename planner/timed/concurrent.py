@@ -1,10 +1,11 @@
 """Plans that require concurrency: the begins and the ends of steps are operators of a grounded task.
 
-Some behaviours give a symbol a value only during their execution. The planner cuts such a behaviour into a begin and an end. Other
-behaviours are cut only if the planner finds no plan without these cuts. A first search ignores durations, and its plan is
-scheduled. If the plan has no schedule, a second search keeps a simple temporal network of events. The network contains the events
-since the last time at which no step was running (the *window*). The second search drops nodes in which a step can't end in time.
-The heuristic is the length of a relaxed plan plus the number of running steps.
+Some behaviours give a symbol a value only during their execution. The planner cuts a behaviour of this kind into a
+begin and an end. Other behaviours are cut only if the planner finds no plan without these cuts. A first search ignores
+durations, and its plan is scheduled. If the plan has no schedule, a second search keeps a simple temporal network of
+events. The network contains the events since the last time at which no step was running (the *window*). The second
+search drops nodes in which a step can't end in time. The heuristic is the length of a relaxed plan plus the number of
+running steps.
 
 The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The distinction
 of behaviours that need no cut follows Coles et al., "Extending the use of inference in temporal planning as forwards search",

@@ -107,7 +107,7 @@ class _Sequence:
 
 
 def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = True) -> Plan | None:
-    """Return a plan for the goals of a plan, whose steps are shared among actors for a short schedule.
+    """Return a plan for the same goals in which several actors share the steps, for a short schedule.
 
     Return None if no such plan is found.
 
@@ -115,7 +115,7 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
     ----------
     problem : Problem
     plan : Plan
-        A plan of the problem; it determines the first order of the goals.
+        A plan of the problem, which determines the first order of the goals.
     until : float, optional
         The end of the search, on the clock of `perf_counter`.
     shorten : bool

@@ -54,7 +54,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """Facts that record the cells that a condition reads, and the values whose holders a condition reads."""
+    """Facts that record the symbols that a condition reads, and the values whose holders a condition reads."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -79,7 +79,7 @@ Effects = tuple[tuple[Cell, str], ...]
 
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
-    """Return the changes of each step of a sequence, and the last step that changes each cell."""
+    """Return the changes of each step of a sequence, and the last step that changes each symbol."""
     rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     found, last = list[Effects](), dict[Cell, int]()
     for number, step in enumerate(steps):
@@ -111,9 +111,9 @@ class _Clock:
         self.pieces: dict[str, Pieces] = {}
         self.made: dict[int, dict[Cell, str]] = {}
         self.last: dict[Cell, int] = {}
-        self.since: dict[Cell, Fraction] = {}  # time at which a step last set a cell
-        self.changed: dict[Cell, Fraction] = {}  # time at which the value of a cell last changed
-        self.asked: dict[Cell, Fraction] = {}  # time at which a step last read a cell
+        self.since: dict[Cell, Fraction] = {}  # time at which a step last set a symbol
+        self.changed: dict[Cell, Fraction] = {}  # time at which the value of a symbol last changed
+        self.asked: dict[Cell, Fraction] = {}  # time at which a step last read a symbol
         self.read_by: dict[Cell, int] = {}
 
     def run(self) -> Iterator[Fault]:
@@ -218,7 +218,7 @@ class _Clock:
             self.put(one, (name, key), value, time)
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
-        """Set the value of a cell, and record the step and the time."""
+        """Set the value of a symbol, and record the step and the time."""
         if Facts.value(self.facts, *cell) != value:
             self.changed[cell] = time
         self.facts.put(*cell, value)
@@ -229,8 +229,8 @@ class _Clock:
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
         """Yield a fault if a step conflicts with another step.
 
-        A step conflicts with another step if it reads or changes a pending value of the other step. A step also conflicts if the
-        other step accessed the same cell less than the separation time before.
+        A step conflicts with another step if the step reads or changes a pending value of the other step. A step also
+        conflicts if the other step accessed the same symbol less than the separation time before.
         """
         read, values = set(self.facts.cells), set(self.facts.values)
         for other in self.running.values():
@@ -265,7 +265,7 @@ class _Clock:
     def in_the_end(self) -> Iterator[Fault]:
         """Yield a fault for each goal that isn't reached in time.
 
-        Also yield a fault for each cell whose last change is by another step than in the sequence of the plan.
+        Also yield a fault for each symbol whose last change is by another step than in the sequence of the plan.
         """
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE

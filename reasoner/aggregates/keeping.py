@@ -99,7 +99,7 @@ def _timed(
     situations: Mapping[str, SituationType],
     classes: Mapping[str, Sequence[str]],
 ) -> Behavior:
-    """Return a behaviour in whose timing a total changes together with each of the facts that it depends on.
+    """Return a behaviour in whose timing a total changes together with each fact on which the total depends.
 
     The effects of each span are a separate change, in the state in which the conditions of this span hold.
     """

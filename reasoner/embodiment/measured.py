@@ -39,7 +39,7 @@ def valued(store: ox.Store) -> frozenset[str]:
 
 
 def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alone: bool) -> tuple[Guard, ...]:
-    """Return the bounds within which a measured situation type is true; `alone` states whether it has a single argument.
+    """Return the bounds within which a measured situation type is true; `alone` states whether the type has a single argument.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """OWL 2 RL inference before planning, which adds inferred triples to the graph `inferred`.
 
-Only static facts are inferred. Facts of situation types are excluded because behaviours change them; only the domain and the range
-of their properties are applied. A class that is defined by situations is compiled into conditions instead
-(`confab.reasoner.reading.definitions`).
+Only static facts are inferred. Facts of situation types are excluded because behaviours change these facts; only the
+domain and the range of their properties are applied. A class that is defined by situations is compiled into conditions
+instead (`confab.reasoner.reading.definitions`).
 
 The reasoner runs only if `needed` finds axioms with consequences beyond subclasses, which are read without inference. The limits
 of RL are listed in docs/inference.md.

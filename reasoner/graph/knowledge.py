@@ -1,8 +1,8 @@
 """The knowledge graph: ontology files with all their imports in one SPARQL store.
 
-Each kind of triples has its own named graph (`GRAPHS`); a query is evaluated on their union. Files are only read. Nothing is
-downloaded (`confab.reasoner.graph.fetching` does this on request): imports are looked up in the catalog in the file's folder,
-then in the shipped catalog.
+Each kind of triples has its own named graph (`GRAPHS`); a query is evaluated on their union. Files are only read.
+Nothing is downloaded (only `confab.reasoner.graph.fetching` downloads, on request): imports are looked up in the
+catalog in the file's folder, then in the shipped catalog.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class KnowledgeGraph:
         The prefixes that files declare, the prefixes of the scene's file first. The empty prefix has the meaning that
         the scene's file gives.
     faults : list of str
-        The reasons why the scene can't be planned in, if it was loaded with `tolerant`.
+        The reasons why planning in the scene is impossible, if the scene was loaded with `tolerant`.
     written : mapping of individual to place
         The position in a SPARQL update of each individual that was compiled from the update.
     remote : Remote, optional
@@ -127,7 +127,7 @@ class KnowledgeGraph:
         return {"confab": CORE, **self.prefixes, **self.declared}
 
     def require_whole(self) -> None:
-        """Raise `KnowledgeError` if the scene can't be planned in."""
+        """Raise `KnowledgeError` if planning in the scene is impossible."""
         if self.faults:
             raise KnowledgeError(self.faults[0])
 
@@ -184,7 +184,7 @@ class KnowledgeGraph:
             raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if the data in a remote store have changed since they were read."""
+        """Raise `KnowledgeError` if the data in a remote store have changed since the data were read."""
         if self.remote:
             check("asking the knowledge graph again")
             self.remote.confirm()

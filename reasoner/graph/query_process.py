@@ -140,7 +140,7 @@ class QueryWorker:
             self._process = None
 
     def start(self) -> None:
-        """Start the process unless it is running, and wait until it has read the graph."""
+        """Start the process unless it is running, and wait until the process has read the graph."""
         if self._process is None:
             self.ask("ASK {}")
 
@@ -233,7 +233,7 @@ class QueryWorker:
 
 
 def allowed(query: str, limits: QueryLimits) -> str:
-    """Return a query unchanged; raise `KnowledgeError` if it queries other endpoints without permission."""
+    """Return a query unchanged; raise `KnowledgeError` if the query asks other endpoints without permission."""
     if not limits.service and SERVICE.search(TEXTS.sub(" ", query)):
         raise KnowledgeError(
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"

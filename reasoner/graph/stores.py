@@ -303,7 +303,7 @@ def _short(error: object) -> str:
 
 
 def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
-    """Return a scene in an Oxigraph store on disk, which is filled unless it contains the current version of all files.
+    """Return a scene in an Oxigraph store on disk, which is filled unless the store contains the current version of all files.
 
     Parameters
     ----------

@@ -10,10 +10,10 @@ Experience  all learned items, with grow-only tallies by replica and epoch, whic
 ==========  ===================================================================================================
 
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore
-have equal names, and their union merges them. An item has one tally per lifted fact (`Fact`): the empty fact counts the
-item itself, other facts count situations of the individuals in the item's roles. Tallies of epoch 0 never age. Each
-further epoch belongs to one episode of a replica, and contains preferences between individuals (for example between two
-hands), whose weight decays with later episodes.
+have equal names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`): the
+empty fact counts the item itself, other facts count situations of the individuals in the item's roles. Tallies of epoch
+0 never age. Each further epoch belongs to one episode of a replica, and contains preferences between individuals (for
+example between two hands), whose weight decays with later episodes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from confab.reasoner.symbols import Fact as Goal
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its arguments."""
 Fact: TypeAlias = "tuple[str, str]"
-"""A question about the individuals in the roles of an item, and its answer; both are empty for the item itself."""
+"""A question about the individuals in the roles of an item, and its answer; question and answer are empty for the item itself."""
 ITSELF: Fact = ("", "")
 
 

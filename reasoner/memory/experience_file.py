@@ -64,7 +64,7 @@ PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+
 
 @dataclass(frozen=True)
 class Lines:
-    """The parts of a memory file: links with tallies, lifted facts by name, knowledge links, and the rest as Turtle."""
+    """The parts of a memory file: links with tallies, lifted facts by name, knowledge links, and all other lines as Turtle."""
 
     links: list[tuple[str, str, Tally]] = field(default_factory=list)
     facts: dict[str, Fact] = field(default_factory=dict)

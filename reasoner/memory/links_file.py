@@ -117,7 +117,7 @@ def links_text(links: Links, names: Names, scene: str) -> str:
 
 
 def memory_lines(path: Path) -> Lines:
-    """Read a memory file and split it into its parts.
+    """Read a memory file and split the text into its parts.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Export of one level of a scene to PDDL, restricted to STRIPS where possible because many planners support little more.
 
-A class becomes a type, or a unary predicate if it overlaps another class. Every individual becomes an object, including
-individuals that are only values. A situation type becomes a predicate of its arguments and, unless it is boolean, its value.
-`confab.reasoner.pddl.lowering` describes the translation of behaviours.
+A class becomes a type, or a unary predicate if the class overlaps another class. Every individual becomes an object,
+including individuals that are only values. A situation type becomes a predicate of its arguments and, unless the type
+is boolean, its value. `confab.reasoner.pddl.lowering` describes the translation of behaviours.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def to_pddl(
     Raises
     ------
     KnowledgeError
-        A behaviour gives a symbol a value only while it lasts, and another behaviour or the goal may require this value.
+        A behaviour gives a symbol a value only during its execution, and another behaviour or the goal may require this value.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(

@@ -16,9 +16,10 @@ any other function              situation type whose values are amounts, unless 
 goal that isn't a fact          precondition of the behaviour ``REACH_GOAL``, whose effect is the goal
 ==============================  ================================================================
 
-Invariant synthesis finds mutually exclusive predicates. At most one of these predicates holds for an object initially, and an
-action that adds one of them for an object deletes another one that held for the object. Helmert, "Concise finite-domain
-representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
+Invariant synthesis finds mutually exclusive predicates. At most one of these predicates holds for an object initially,
+and an action that adds one of these predicates for an object deletes another of these predicates for the object.
+Helmert, "Concise finite-domain representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5,
+without its search for inequalities.
 """
 
 from __future__ import annotations
@@ -260,7 +261,7 @@ class _Import:
     def situations(
         self, classes: dict[str, tuple[str, ...]], parents: dict[str, tuple[str, ...]]
     ) -> dict[str, SituationType]:
-        """Return all situation types, those of invariants first, and store the translation of each predicate in `places`."""
+        """Return all situation types, first the types of invariants, and store the translation of each predicate in `places`."""
         found: dict[str, SituationType] = {}
         candidates = frozenset(self.changing - self.derived - self.happening)
         pddl, effects = snapped(self.pddl, self.effects)

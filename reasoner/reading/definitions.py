@@ -1,7 +1,8 @@
 """Compilation of classes that are defined by situations into conditions.
 
-The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL reasoner must
-not infer them before planning. In a behaviour, the conditions of the definition replace such a class:
+The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL
+reasoner must not infer these members before planning. In a behaviour, the conditions of the definition replace such a
+class:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
@@ -115,7 +116,7 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether conditions are used instead of a class: its members change, or OWL 2 RL doesn't find all of them."""
+        """Return whether conditions are used instead of a class: its members change, or OWL 2 RL doesn't find all members."""
         return iri in self._changing
 
     @cached_property
@@ -154,7 +155,7 @@ class Definitions:
     def _closed(self) -> frozenset[str]:
         """The classes whose members OWL 2 RL can't infer because their definitions contain `CLOSED` constructs.
 
-        A definition is included only if it has the form *Base and …* with known properties.
+        A definition is included only if the definition has the form *Base and …* with known properties.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -177,7 +178,7 @@ class Definitions:
         return {value for value in named if not _blank(value)}
 
     def _expressions(self, iri: str) -> list[str]:
-        """Return all class expressions in a definition, including nested ones."""
+        """Return all class expressions in a definition, including nested expressions."""
         found = dict.fromkeys(node for node in self._definitions(iri) if _blank(node))
         waiting = list(found)
         while waiting:
@@ -190,7 +191,7 @@ class Definitions:
         return self.nodes.get(iri, {}).get(OWL + "equivalentClass", [])
 
     def base(self, iri: str) -> str:
-        """Return a class itself if it is static; otherwise return the first static class in its definition."""
+        """Return a class itself if the class is static; otherwise return the first static class in its definition."""
         if not self.changes(iri):
             return iri
         if iri in self.concluded:

@@ -100,8 +100,9 @@ def frame(
 ) -> Frame:
     """Return the domain of a schema, and the classes of some individuals.
 
-    `namesakes` are IRIs of unread individuals with the same local names, so that names are unique in the whole scene. `earlier` is
-    a frame of fewer individuals; its behaviours are reused unless a name in them has changed.
+    `namesakes` are IRIs of unread individuals with the same local names, so that names are unique in the whole scene.
+    `earlier` is a frame of fewer individuals; the behaviours of this frame are reused unless a name in a behaviour has
+    changed.
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -282,7 +283,7 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
     Raises
     ------
     KnowledgeError
-        A constrained situation type isn't boolean, or it is constrained to be both never and always true.
+        A constrained situation type isn't boolean, or is constrained to be both never and always true.
     """
     found, known = {}, {situation.name: situation for situation in situations}
     for iri in sorted(schema.of_kind("SituationType"), key=parts.names.short):
@@ -401,7 +402,8 @@ def _situations(
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
         value_property = schema.values(iri, "valueProperty")
-        # A situation type with a value property has values other than true and false, even if none has been read.
+        # A situation type with a value property has values other than true and false, even if no other value has been
+        # read.
         boolean = not value_property and set(classes.get(name, ())) <= {TRUE, FALSE}
         if iri in schema.pairs:
             arguments, boolean = (*arguments, name), True

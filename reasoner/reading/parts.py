@@ -179,7 +179,7 @@ class Parts(NodeReader):
         return found
 
     def read(self, iri: str) -> Condition:
-        """Return the condition of a node; if a class stands for its members, the condition is universally quantified over them."""
+        """Return the condition of a node, which is universally quantified over members if a class stands for its members."""
         kinds = self.classes_in(iri)
         for kind in kinds:
             self.standing[kind] = f"?each{len(self.standing) or ''}"

@@ -205,7 +205,7 @@ class _Doing:
         self.spanned = set[tuple[int, frozenset[str]]]()
 
     def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
-        """Add the routes from each effect to all individuals of the behaviour, and to all symbols that it changes."""
+        """Add the routes from each effect to all individuals of the behaviour, and to all symbols that the behaviour changes."""
         if not self.spanned:
             for scope in self.asks[1:]:  # negated conditions, and alternatives
                 _span(scope, self.step, set(), known, found, looked_up)
@@ -334,7 +334,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
         situation is not None
         and len(arguments) > len(situation.arguments)
         and (situation.default in _constants(arguments[-1], scope, known))
-    )  # facts with a default value may be unstated, so they can't be used to find arguments
+    )  # facts with a default value may be unstated, so these facts can't be used to find arguments
     for at, source in enumerate(arguments):
         kind = scope.kinds.get(source)
         constants = _constants(source, scope, known)

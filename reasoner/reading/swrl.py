@@ -124,7 +124,7 @@ class _Imp:
         body = self._atoms("body")
         self._numbers(body)
         for atom in sorted(body, key=lambda atom: (len(atom[1]) != 1, self.definitions.changes(atom[0]))):
-            self._said(*atom)  # class atoms first, because they determine variables' classes
+            self._said(*atom)  # class atoms first, because class atoms determine variables' classes
         for predicate, said in self._atoms("head"):
             yield self._concluded(predicate, said)
 
@@ -246,7 +246,7 @@ class _Imp:
     # -------------------------------------------------------------------------------------------------------- concluding
 
     def _concluded(self, predicate: str, said: tuple[str, ...]) -> tuple[str, Rule]:
-        """Return the situation type that an atom of the head concludes, and the rule for it."""
+        """Return the situation type that an atom of the head concludes, and the rule for this type."""
         definitions = self.definitions
         if len(said) == 1 and predicate in definitions.concluded:
             situation = definitions.concluded[predicate][0]

@@ -124,7 +124,7 @@ class UpdateCompiler:
         self.nodes.links = {key: values for key, values in self.nodes.links.items() if values}
 
     def total(self, rule: Construction, group: Group, within: set[str]) -> None:
-        """Compile an aggregate: its amount, the variables that it aggregates over, and the number that each binding adds."""
+        """Compile an aggregate: its amount, the aggregated variables, and the number that each binding adds."""
         at = rule.head.subject.at
         if last_of(rule.head) != rule.name or not self.scope.vocabulary.numeric(self.scope.iri(rule.head.predicate)):
             raise UpdateError(

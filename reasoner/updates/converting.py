@@ -292,7 +292,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Return whether a triple of a part can be dropped: the other form expresses it, or it is a condition's label or definition."""
+    """Return whether a triple of a part can be dropped, because the other form expresses it, or it only labels a condition."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))

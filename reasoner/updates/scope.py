@@ -174,7 +174,7 @@ def variables_in(one: Triple) -> list[Word]:
 
 
 def last_of(one: Triple) -> Said:
-    """Return the object of a triple, or its last element if it is a list."""
+    """Return the object of a triple, or its last element if the object is a list."""
     return one.object[-1] if isinstance(one.object, tuple) else one.object
 
 

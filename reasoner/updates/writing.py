@@ -299,7 +299,7 @@ class _Writer:
 
 
 def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:
-    """Yield the labelled conditions; the conjuncts of an `AnyOf` with one alternative replace it."""
+    """Yield the labelled conditions; the conjuncts of an `AnyOf` with one alternative replace the `AnyOf`."""
     for condition, label in conditions:
         match condition:
             case AnyOf((group,), False):

@@ -104,8 +104,8 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     """Find values that behaviours or goals require and that are neither initial values nor values of an effect.
 
-    If a value is unreachable only because of another unreachable value, one finding reports both. Behaviours without objects in
-    the scene aren't reported, because they belong to other scenes.
+    If a value is unreachable only because of another unreachable value, one finding reports both values. Behaviours
+    without objects in the scene aren't reported, because they belong to other scenes.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -263,7 +263,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
-    asks: dict[tuple[str, str], set[str]] = {}  # for each value, the classes whose members must not have it
+    asks: dict[tuple[str, str], set[str]] = {}  # for each value, the classes whose members must not have the value
     for behavior in problem.domain.behaviors.values():
         for effect in behavior.effects:
             free = {kind for c in behavior.preconditions if (kind := _none_has(c, effect))}

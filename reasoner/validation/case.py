@@ -19,7 +19,7 @@ Fault = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Case:
-    """Input of a validation rule: the graph, and the planning problem that was read from it (None if it is unreadable)."""
+    """Input of a validation rule: the graph, and the planning problem that was read from it (None for an unreadable problem)."""
 
     graph: KnowledgeGraph
     reading: Reading | None

@@ -1,13 +1,14 @@
 """Validation rule on exclusive values: no behaviour may give a second individual a value that only one can physically have.
 
-The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an object. A
-behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other individual has it. Each
-level is checked separately.
+The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an
+object. A behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other
+individual has the value. Each level is checked separately.
 
 - *free*: The preconditions require that no individual has the value.
-- *handed over*: The same behaviour takes the value from the individual that has it.
-- *taken*: The value itself changes from a state in which no individual has it. (Example: A cup at a place is in no hand. Picking
-  it up takes the cup from the place, and each behaviour that brings a cup to a place takes the cup from a hand.)
+- *handed over*: The same behaviour takes the value from the individual that has the value.
+- *taken*: The value itself changes from a state in which no individual has the value. (Example: A cup at a place is in
+  no hand. Picking it up takes the cup from the place, and each behaviour that brings a cup to a place takes the cup
+  from a hand.)
 """
 
 from __future__ import annotations
@@ -172,7 +173,7 @@ class _Exclusive:
                     pass
 
     def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether an effect's value is in a state before the behaviour and not after it."""
+        """Return whether an effect's value is in a state before the behaviour and not after the behaviour."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)

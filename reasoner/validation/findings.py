@@ -94,7 +94,7 @@ def listing(findings: Sequence[Finding]) -> str:
 
 
 class Places:
-    """File, line and label of the nodes in a loaded graph; the files are parsed when the first finding needs them."""
+    """File, line and label of the nodes in a loaded graph; the files are parsed when the first finding needs the files."""
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph

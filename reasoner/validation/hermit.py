@@ -78,7 +78,7 @@ class Classification:
     Attributes
     ----------
     consistent : bool
-        Whether the ontology is consistent; if it isn't, the other attributes are empty.
+        Whether the ontology is consistent; for an inconsistent ontology, the other attributes are empty.
     empty : tuple of str
         IRIs of the named classes, including prototypes, that can have no individual.
     types : mapping of individual to classes

@@ -143,7 +143,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
 def _measured(
     conditions: Sequence[Condition], among: Mapping[str, tuple[str, frozenset[str]]], problem: Problem
 ) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Yield each relation that gives a number of a single term, with the term's class and the individuals it can denote."""
+    """Yield each relation that gives a number of a single term, with the term's class and possible individuals."""
     among = dict(among)
     for condition in conditions:
         if isinstance(condition, ClassCondition) and not condition.negated and condition.term in among:

@@ -67,7 +67,7 @@ WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situat
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
 """Checks whose findings are about initial facts or bounds, like the findings of ``impossible-situation``."""
 FROM_FACTS = {"unreachable", "amount-out-of-reach"}
-"""Rules that depend on the initial state; they are skipped if the initial facts are faulty."""
+"""Rules that depend on the initial state; these rules are skipped if the initial facts are faulty."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach", "no-value"}
 """Rules that are skipped if the text of a behaviour or rule can't be compiled."""
 
