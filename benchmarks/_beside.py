@@ -31,7 +31,7 @@ Row = tuple[float | None, int | None, int]
 
 
 class Rows:
-    """Measurements by planner, encoding and size, stored in the file that `CONFAB_PEER_ROWS` names, if any."""
+    """Measurements by planner, encoding and size, stored in the file `CONFAB_PEER_ROWS` if this variable is set."""
 
     def __init__(self) -> None:
         self.file = Path(os.environ["CONFAB_PEER_ROWS"]) if "CONFAB_PEER_ROWS" in os.environ else None

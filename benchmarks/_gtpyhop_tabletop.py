@@ -1,4 +1,4 @@
-"""The tabletop domain for GTPyhop, with handwritten methods on three levels, run by a Python that has gtpyhop.
+"""The tabletop domain for GTPyhop, with handwritten methods on three levels, run by a Python interpreter with gtpyhop.
 
     python _gtpyhop_tabletop.py TABLE.json
 

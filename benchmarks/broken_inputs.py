@@ -159,7 +159,7 @@ def swap(draw: random.Random, triples: Triples) -> None:
 
 
 def retype(draw: random.Random, triples: Triples) -> None:
-    """Give a node the type of another."""
+    """Give a node the type of another node."""
     types = [i for i, t in enumerate(triples) if t.predicate == TYPE]
     if types:
         place = draw.choice(types)
@@ -167,7 +167,7 @@ def retype(draw: random.Random, triples: Triples) -> None:
 
 
 def other_end(draw: random.Random, triples: Triples) -> None:
-    """Replace the object of a triple by another node, its own subject, a text, a number or a blank node."""
+    """Replace the object of a triple by another node, the triple's subject, a text, a number or a blank node."""
     if not triples:
         return
     place = _any(draw, triples)

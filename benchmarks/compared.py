@@ -31,7 +31,7 @@ from worlds.hierarchies import hierarchy
 LIMIT = Limits(seconds=float(os.environ.get("COMPARED_SECONDS", "10")))
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 LEAST = 0.05
-"""Minimum CPU seconds of a call for the comparison of times, since shorter times are noise."""
+"""Minimum CPU seconds of a call for the comparison of times, since shorter times are too inexact."""
 Made = tuple[str, Callable[[], Problem]]
 
 

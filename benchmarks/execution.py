@@ -346,7 +346,7 @@ def _save_curves(curves: Mapping[str, Sequence[float]], path: Path) -> Path:
 
 
 def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, retry_policy: RetryPolicy) -> list[bool]:
-    """Return for each episode of a robot whether it succeeds; the first grasp of the plan's last object is mostly blocked."""
+    """Return for each episode whether the episode succeeds; the first grasp of the plan's last object is mostly blocked."""
     random, caution, found = Random(seed), Caution(), list[bool]()
     reach = next(
         s

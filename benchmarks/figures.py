@@ -1,4 +1,4 @@
-"""Blocks of figures in the documentation; each names the command that printed it, the commit, and the measured code.
+"""Blocks of figures in the documentation; the header of a block names its command, its commit, and the measured code.
 
     <!-- figures NAME: COMMAND; commit ABC1234; 2026-01-31; measures PATH PATH; table 2; quick -->
     …

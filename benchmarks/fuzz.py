@@ -1,14 +1,14 @@
-"""Broken inputs of the command line (`benchmarks.broken_inputs`); each answer must be a result or one line of error.
+"""Broken inputs of the command line (`benchmarks.broken_inputs`); each answer must be a result or an error message in one line.
 
     python -m benchmarks.fuzz                          run up to 100,000 cases, continuing the last run
     python -m benchmarks.fuzz --cases 500 --door plan  run 500 more cases of one door
     python -m benchmarks.fuzz --again memory:17        run one case again, and keep its files
     python -m benchmarks.fuzz --table                  print the table of docs/figures/promises.md
 
-A case is a kind of input (a door) and a number, which is the seed of all random choices. A process with limits of time and
-memory runs `BATCH` cases one after the other. A case that breaks is run again in a separate process. ``fuzz-tried.json`` has
-the number of cases, and ``fuzz-seeds.txt`` has the cases that broke, with their corrections. `tests/confab/test_fuzz.py` runs
-these cases and some new cases.
+A case is a kind of input (a door) and a number, which is the seed of all random choices. A process with limits of time
+and memory runs `BATCH` cases one after the other. A case *breaks* if the answer is a fault; such a case is run again in
+a separate process. ``fuzz-tried.json`` has the number of cases, and ``fuzz-seeds.txt`` has the cases that broke, with
+their corrections. `tests/confab/test_fuzz.py` runs these cases and some new cases.
 """
 
 from __future__ import annotations
@@ -329,7 +329,7 @@ def _import_all() -> None:
 
 
 def known() -> Iterator[tuple[str, int, str]]:
-    """Yield the kept cases with their corrected causes, if any."""
+    """Yield the kept cases, each with its corrected cause if known."""
     for line in SEEDS.read_text(encoding="utf-8").splitlines() if SEEDS.is_file() else ():
         if match := re.match(r"(\w+):(\d+)", line):
             yield match[1], int(match[2]), line.partition(" mended: ")[2].strip()

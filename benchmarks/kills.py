@@ -181,7 +181,7 @@ def torn(folder: Path) -> list[str]:
 
 
 def rename(file: Path) -> str:
-    """Return a renaming that is possible in the memory: of Cup to Mug, or back."""
+    """Return a renaming that is possible in the memory: of Cup to Mug, or of Mug to Cup."""
     said = Memory.load(file).experience.said.values()
     classes = {kind for one in said if isinstance(one, GoalKind) for kind in one.classes}
     return "Mug=Cup" if "Mug" in classes else "Cup=Mug"

@@ -5,8 +5,8 @@
     python -m benchmarks.mixed --mutants 100      print the share of 100 small faults per part that the worlds detect
     python -m benchmarks.mixed --seed 5000123     judge one world with all checks, and print its scene
 
-An interrupted run can be continued with the same folder. The folder has the results of each stretch of worlds, and a small world
-for each fault. The exit code is 1 if a fault was found.
+An interrupted run can be continued with the same folder. The folder has the results of each stretch (range of seeds),
+and a small world for each fault. The exit code is 1 if a fault was found.
 """
 
 from __future__ import annotations

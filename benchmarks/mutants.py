@@ -55,7 +55,7 @@ TESTS: dict[str, tuple[str, ...]] = {
 }
 """The fast tests of each module; tests that detect most faults come first."""
 SAME = ("Eq_Is", "Eq_IsNot")
-"""Mutations without effect, since interned names that are equal are mostly identical."""
+"""Mutations without effect: tests for equality and for identity agree on names, since Python stores equal names once."""
 Fault = tuple[str, int]
 """An operator of cosmic-ray, and the index of the place to which it is applied."""
 

@@ -1,4 +1,4 @@
-"""The cost of the code for derived situations and amounts in scenes that have neither.
+"""The cost of the code for derived situations and amounts in scenes without derived situations and amounts.
 
 python -m benchmarks nothing_derived
 CONFAB_PAIRS=10 …            number of calls with and without this code, which alternate in one process

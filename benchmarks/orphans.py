@@ -31,7 +31,7 @@ MOMENTS = 50
 GRACE = 2.0
 """Seconds after the end of a command within which its processes must end."""
 LONGEST, LATEST = 1.5, 10.0
-"""Maximum seconds of the last moment after the first child process of a command, and after the start of the command."""
+"""Latest time in seconds at which a command is ended: after the command's first child process, and after the command's start."""
 MARK = "CONFAB_ORPHANS"
 """Environment variable that marks the processes of a command."""
 ADOPT = 36
@@ -207,7 +207,7 @@ def left(run: Callable[[], object], sign: signal.Signals, after: float) -> tuple
 
 
 def length(run: Callable[[], object]) -> float:
-    """Return the seconds after the start of a command until the last moment."""
+    """Return the latest time, in seconds after the start of a command, at which the command is ended."""
     begin, end = time.monotonic(), LATEST
     os.environ[MARK] = uuid4().hex
     child = begun(run)

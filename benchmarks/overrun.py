@@ -141,8 +141,8 @@ os._exit(3 if ended and ended.status.value == 'gave-up' else 0)
 class Ended:
     """The end of a process.
 
-    `took` is the wall time in seconds since the begin of the limit. `after` is the CPU time in seconds after the limit, or None
-    if the process ended before.
+    `took` is the wall time in seconds since the begin of the limit. `after` is the CPU time in seconds after the limit,
+    or None if the process ended before the limit.
     """
 
     code: int

@@ -85,7 +85,7 @@ def main() -> None:
 
 
 def wanted() -> list[str]:
-    """Return the names of the planners and tables in CONFAB_PLANNERS, by default of the main ones."""
+    """Return the names of the planners and tables in CONFAB_PLANNERS, by default the main planners and tables."""
     named = os.environ.get("CONFAB_PLANNERS")
     return named.split(",") if named else ["confab", "pyperplan", "lama-first", "grounding", "read-back"]
 
@@ -106,12 +106,12 @@ def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
 
 
 def _measured(place: str) -> bool:
-    """Return whether the problems of a folder belong to the benchmark. Training problems belong to it only with CONFAB_ALL."""
+    """Return whether the problems of a folder belong to the benchmark, to which training problems belong only with CONFAB_ALL."""
     return place.startswith("testing") or ("CONFAB_ALL" in os.environ and place.startswith("training"))
 
 
 def peers() -> str:
-    """Return a Python with the other planners; by default they are installed under ``confab-out`` once."""
+    """Return a Python interpreter with the other planners; by default the planners are installed under ``confab-out`` once."""
     if "CONFAB_PEERS" in os.environ:
         return os.environ["CONFAB_PEERS"]
     place = ROOT / "confab-out" / "peers"
@@ -289,7 +289,7 @@ def trucks(size: int) -> str:
 
 
 def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
-    """Print the times of parsing and grounding, and those of Fast Downward's translator."""
+    """Print the times of parsing and grounding, and the times of Fast Downward's translator."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
     from confab.reasoner.pddl.importing import imported

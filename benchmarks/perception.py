@@ -74,7 +74,7 @@ class Tally:
 
 
 def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally: Tally) -> bool:
-    """Set up the scene of a seed, and observe it before and after a hand grasps an object; return whether a hand grasped one."""
+    """Set up a scene, and observe the scene before and after a hand grasps an object; return whether an object was grasped."""
     rng = np.random.default_rng(seed)
     truth = _drawn(embodiment, symbols, rng)
     initial = {symbol: value for symbol, value in truth.items() if value is not None}
@@ -115,7 +115,7 @@ def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Gen
 
 
 def _disturb(world: PhysicsWorld, truth: Truth, rng: np.random.Generator) -> None:
-    """Shift one in five empty objects away from all places, and lay one in five on its side, so that they are at no place."""
+    """Shift one in five empty objects away from all places, and lay one in five on their side, so that these are at no place."""
     uses = world.embodiment.perceivers
     for symbol in [s for s in truth if uses[s.situation].perceiver == "perceive_place"]:
         name, draw = symbol.arguments[0], rng.random()
@@ -144,7 +144,7 @@ def _free(world: PhysicsWorld, name: str, spot: np.ndarray[tuple[int, ...], np.d
 
 
 def _taken(world: PhysicsWorld, truth: Truth, rng: np.random.Generator, reach: SkillUse) -> tuple[str, str]:
-    """Let a random hand reach for a random object at a place; return the names of both, or empty names if no hand can."""
+    """Let a random hand reach for a random object at a place; return both names, or empty names if no hand reaches an object."""
     uses = world.embodiment.perceivers
     standing = [
         s.arguments[0] for s, v in truth.items() if uses[s.situation].perceiver == "perceive_place" and v is not None

@@ -62,7 +62,7 @@ def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> str:
 
 
 def least(action: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Return the minimum time of several repetitions, which are fewer for slow functions."""
+    """Return the minimum time of several repetitions; slow functions have fewer repetitions."""
     best = float("inf")
     for _ in range(repeats):
         begin = perf_counter()

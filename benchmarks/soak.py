@@ -1,4 +1,4 @@
-"""Test that many episodes in one process don't increase its memory, its time per episode, its files, or PyBullet's clients.
+"""Test that memory, time per episode, open files and PyBullet's clients of a process don't grow over many episodes.
 
     python -m benchmarks.soak              1,000 symbolic episodes and 100 in physics
     python -m benchmarks.soak 1000 10      these numbers of episodes

@@ -1,4 +1,4 @@
-"""Temporal problems of the field: coverage and makespan beside LPG and Tamer, and random timed worlds against an exhaustive search.
+"""Temporal problems of the field: coverage and makespan of Confab, LPG and Tamer, and random timed worlds in a full search.
 
     python -m benchmarks temporal                        with problems in ../shared/temporal
     CONFAB_TEMPORAL=FOLDER python -m benchmarks temporal with problems elsewhere

@@ -15,7 +15,7 @@ SCENE = os.environ.get("CONFAB_SCENE", "beverage-serving")
 
 
 def entered(call: Callable[[], object]) -> dict[str, int]:
-    """Return the files of this repository of which a call enters a function, with their numbers of lines; imports don't count."""
+    """Return the files of this repository whose functions a call enters, with their numbers of lines; imports don't count."""
     call()
     files: set[str] = set()
 

@@ -1,4 +1,4 @@
-"""Conversion of arguments that have several forms: a plan, for example, may also be an object with a plan or a file's name."""
+"""Conversion of arguments with several forms, for example a plan, an object with a plan, or the name of a plan file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ values."""
 
 
 class Stated(list[str]):
-    """A list of facts as texts that can't be edited. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
+    """An immutable list of facts as texts. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...
@@ -57,7 +57,7 @@ class Stated(list[str]):
         return values[index]
 
     def __call__(self) -> Stated:
-        """Return the list itself, since other libraries have methods in place of such properties."""
+        """Return the list itself, so that ``scene.facts()`` is the same as ``scene.facts``."""
         return self
 
     def __reduce__(self) -> tuple[type[Stated], tuple[list[str]]]:
@@ -112,7 +112,7 @@ def check_goal(scene: str, problem: Problem) -> None:
 
 @contextmanager
 def possible() -> Iterator[None]:
-    """Raise `KnowledgeError` in place of an `ImpossibleStateError` of the block."""
+    """Raise `KnowledgeError` in place of an `ImpossibleStateError` from the code inside the ``with`` statement."""
     try:
         yield
     except ImpossibleStateError as error:
@@ -166,7 +166,7 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 
 
 def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) -> dict[str, str]:
-    """Return the shipped queries by name, with or without those on episodes; of a graph, those whose prefixes it declares."""
+    """Return the shipped queries by name, optionally without queries on episodes; a graph must declare a query's prefixes."""
     from confab.reasoner.graph.query_process import unknown_prefixes
 
     files = sorted((ontology.ROOT / "questions").glob("**/*.rq" if episodes else "*.rq"))

@@ -1,4 +1,4 @@
-"""An MCP server on stdio: language models' agents plan, replan, query, validate, explain and verify by its tools.
+"""An MCP server on stdio, whose tools plan, replan, query, validate, explain and verify for agents of language models.
 
 Each call runs in a separate process. The process ends when the call or the server ends, at the time limit, or when the client
 cancels the call. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the complete
@@ -50,7 +50,7 @@ class Kept:
         self._count = 0
 
     def shown(self, text: str) -> str:
-        """Return an answer; if it is too long, return its beginning and the address of the complete text."""
+        """Return an answer, or the beginning of a too long answer with the address of the complete text."""
         if len(text.encode()) <= SHOWN:
             return text
         self._count += 1
@@ -60,7 +60,7 @@ class Kept:
         return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
 
     def whole(self, number: str) -> str:
-        """Return the complete text of an answer by its number.
+        """Return the complete text of the answer with a number.
 
         Raises
         ------
@@ -177,7 +177,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Explain why a step is in the plan by its effects and the steps that need these effects."""
+        """Explain why a step is in the plan: name the step's effects, and the later steps that need these effects."""
         return await answered(answers.why, scene, goals, step, seconds, seconds=seconds)
 
     @made.tool()
@@ -189,7 +189,7 @@ def server(folder: Path) -> MCPServer[Any]:
         goals: Goals = [],  # noqa: B006
         seconds: Seconds = 20.0,
     ) -> str:
-        """Explain why an alternative isn't in the plan by its failing conditions or its additional cost."""
+        """Explain why an alternative isn't in the plan: name the alternative's failing conditions or its additional cost."""
         return await answered(answers.why_not, scene, goals, instead, seconds, seconds=seconds)
 
     @made.tool()

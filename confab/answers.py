@@ -122,7 +122,7 @@ def validate(folder: Path, name: str) -> str:
 
 
 def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float) -> str:
-    """Return why a step (by default each step) is in the plan; if there is no plan, return the reason."""
+    """Return the reasons why a step (by default each step) is in the plan, or the reason why there is no plan."""
     with within(seconds):
         result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
         return (
@@ -131,7 +131,7 @@ def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float
 
 
 def why_not(folder: Path, name: str, goals: Sequence[str], instead: str, seconds: float) -> str:
-    """Return why an alternative isn't in the plan."""
+    """Return the reasons why an alternative isn't in the plan."""
     with within(seconds):
         return str(planned(scene_of(folder, name), goals, (), "guarded", seconds).why_not(instead))
 

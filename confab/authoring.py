@@ -48,8 +48,7 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
     Raises
     ------
     KnowledgeError
-        The name contains other signs than letters, digits, ``_`` and ``-``, doesn't begin with a letter, or one of the files
-        exists.
+        The name contains characters other than letters, digits, ``_`` and ``-`` or doesn't begin with a letter, or a file exists.
 
     Examples
     --------
@@ -119,7 +118,7 @@ def generate(
     Raises
     ------
     KnowledgeError
-        The family doesn't exist or has no table for these numbers, or the path doesn't end in ``.ttl``.
+        The family doesn't exist, there is no table for the number of objects or hands, or the path doesn't end in ``.ttl``.
 
     Examples
     --------
@@ -146,7 +145,7 @@ def turtle_path(given: str | Path) -> Path:
     return path
 
 
-# ------------------------------------------------------------------------------------------------ what did my edit change?
+# ---------------------------------------------------------------------------------------------- comparison of two versions
 
 
 @dataclass(frozen=True)
@@ -223,7 +222,7 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     """Return the domain's terms in a memory that a scene doesn't contain, each with the most similar name in the scene.
 
-    Individuals of other scenes, which the paper's links may name, are no terms of the domain.
+    The paper's links may name individuals of other scenes; these individuals don't count as terms of the domain.
     """
     spoken: set[str] = set()
     with suppress(SyntaxError):  # `Memory.load` reports a syntax error
@@ -240,7 +239,7 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     names = (
         {local_name(q.subject.value) for q in graph.store if isinstance(q.subject, ox.NamedNode)} if unknown else set()
     )
-    elsewhere = [f"<{iri}>" for iri in unknown if local_name(iri) in names]  # another domain has such a name
+    elsewhere = [f"<{iri}>" for iri in unknown if local_name(iri) in names]  # the name is a term of another domain
     return [*elsewhere, *(f"{name}{nearest(name, names)}" for name in map(local_name, unknown) if name not in names)]
 
 

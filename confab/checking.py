@@ -1,4 +1,4 @@
-"""Validation against the whole scene of a plan that was made in a part of the scene."""
+"""Validation, in the whole scene, of a plan that was made in a part of the scene."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """The command line: a table of the commands, whose functions are in `confab/commands/`.
 
-Results go to stdout, progress and errors go to stderr (`confab.terminal`). The exit codes are 0 for a positive answer, 1 for a
-negative answer, 2 for misuse or unreadable input, 3 for a call that gave up at a limit, and 4 for a fault of the program. The
-module of a command is imported when the command is called. Slow imports are inside the functions that need them.
+Results go to stdout. Progress and errors go to stderr (`confab.terminal`). The exit codes are 0 for a positive answer,
+1 for a negative answer, 2 for misuse or unreadable input, 3 for a call that gave up at a limit, and 4 for a fault of
+the program. The module of a command is imported when the command is called. Slow imports are inside the functions that
+need them.
 """
 
 from __future__ import annotations

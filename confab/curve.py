@@ -49,10 +49,10 @@ def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, c
 
 @dataclass
 class Curve:
-    """A learning curve: expansions per mode and episode.
+    """A learning curve: numbers of expanded states by mode and episode.
 
-    `with_memory` has the expansions with the memory before the episode. `without` has the expansions without memory. A value is
-    None if planning found no plan.
+    `with_memory` has the number of states that planning with the memory expands before each episode is learned.
+    `without` has the number of expanded states without memory. A value is None if planning found no plan.
     """
 
     scenes: list[str] = field(default_factory=list)

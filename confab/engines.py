@@ -150,7 +150,7 @@ def some_installed(problem: Problem) -> bool:
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
-    """Return the initial rest values of symbols that the first level doesn't see; the plan must restore these values."""
+    """Return the initial values that a plan must restore: rest values of symbols that the first level doesn't see."""
     first = problem.domain.levels[0]
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
@@ -217,7 +217,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
         warnings.simplefilter("ignore")
         try:
             task = PDDLReader(environment).parse_problem_string(domain, problem)
-        except Exception as error:  # such as assertion errors of the reader, and errors of pyparsing
+        except Exception as error:  # for example assertion errors of the reader, and errors of pyparsing
             said = " ".join(str(error).split())[:200]
             raise KnowledgeError(f"unified-planning can't read this level: {type(error).__name__}: {said}") from None
         if engine and not {"INT_FLUENTS", "REAL_FLUENTS"}.isdisjoint(
@@ -244,7 +244,7 @@ def _tell(engine: str, deadline: Deadline) -> None:
 
 
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
-    """Run an engine that reads PDDL on the exported files; return its status and the steps of its plan.
+    """Run an engine that reads PDDL on the exported files, and return the engine's status and the steps of the plan.
 
     The files bypass unified-planning, whose reader takes minutes for large relations and doesn't support derived predicates.
     """

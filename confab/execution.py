@@ -292,7 +292,7 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
     }
 
 
-# ------------------------------------------------------------------------------------------------------------- at the front desk
+# -------------------------------------------------------------------------------------------------------------- public functions
 
 
 @right_names("an execution", "scene.execute() or scene.read_episode(FILE)")
@@ -353,7 +353,7 @@ class Execution(metaclass=RightNames):
         )
 
     def graph(self) -> networkx.DiGraph[int]:
-        """Return the partial order of the executed primitives; an edge leads to a primitive that depends on its predecessor."""
+        """Return the partial order of the executed primitives; an edge leads to a primitive that depends on the edge's start."""
         from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
@@ -525,8 +525,8 @@ def execute(
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
-        In PyBullet, execute the plan with all hands at once, and steps that remain one after another. Interventions aren't
-        allowed.
+        In PyBullet, execute the plan with all hands at once, and then execute the remaining steps one after another.
+        Interventions aren't allowed.
 
     Raises
     ------

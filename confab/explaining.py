@@ -1,4 +1,4 @@
-"""Explanation of a memory's preference for a behaviour: its rule, the episodes with the rule, and the summands of its cogency."""
+"""Explanation of a memory's preference for a behaviour: a learned rule, the rule's episodes, and the summands of the cogency."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 TALL, LINES = 21, 2.8
-"""Maximum number of characters in a line of a bar's text, and number of lines per second of a bar."""
+"""Maximum number of characters in a line of a bar's text, and number of text lines per second of a bar's duration."""
 
 
 def save_gantt(

@@ -1,9 +1,9 @@
-"""The right name for a wrong name.
+"""Suggestions of the right name for a wrong name.
 
-A wrong name is looked up in the table of its kind of object (`confab.hints`): first the whole name, then its words. If the table
-doesn't have the words, they are compared with the public names and their descriptions; words of one meaning are equal. The
-candidates are the names of the object itself, then those of the objects that it leads to (``result.outcome.search``), then all
-others (``scene.with_fact``).
+Each kind of object has a table of wrong names (`confab.hints`), in which first the whole wrong name is looked up, then
+its words. Words that the table doesn't have are compared with the public names and their descriptions. Words with the
+same meaning are equal. The candidates are first the names of the object itself, then the names of objects in its
+attributes (``result.outcome.search``), then all other names (``scene.with_fact``).
 """
 
 from __future__ import annotations
@@ -208,7 +208,7 @@ def described(kind: str) -> Mapping[str, str]:
 
 
 def places(kind: str) -> Iterator[tuple[str, str, int]]:
-    """Yield each kind of object that is reachable from `kind`, the expression that leads to the object, and the number of steps."""
+    """Yield each kind of object that is reachable from `kind`, the expression for the object, and the expression's length."""
     waiting, seen = [(kind, "confab." if kind == "confab" else "", 0)], {kind}
     while waiting:
         here, before, far = waiting.pop(0)
@@ -235,9 +235,9 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 
 
 TYPED = 0.85
-"""Minimum similarity of a wrong name to a known name for it to be treated as a typing error."""
+"""Minimum similarity to a known name for a wrong name to be treated as a typing error."""
 PART = 0.6
-"""Value of a word that an entry of a table has only in longer names."""
+"""Score of a word that occurs in a table's entry only as a part of longer names."""
 KNOWN_WORDS = 0.4
 """Minimum share of the words of a wrong name that an entry of a table must have; rare words weigh more."""
 
@@ -252,7 +252,7 @@ def whole(table: Mapping[str, str], name: str) -> str:
 
 
 def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = KNOWN_WORDS) -> str:
-    """Return the key of a table whose own words and values have the most of some words.
+    """Return the key of the table's entry (a key with its values) that contains the most of some wanted words.
 
     The weight of a word is greater if fewer entries have it. The result is empty if no entry has enough of the words.
 

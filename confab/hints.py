@@ -1,7 +1,7 @@
 """Names under which users of other libraries look for functions of Confab, and the names of these functions.
 
-Each table belongs to a kind of object. A key is an expression of Confab; the value contains other names with the meaning of the
-expression. `confab.guessing` compares whole names first, then their words.
+Each table belongs to a kind of object. A key is an expression of Confab; the value contains other names with the
+meaning of the expression. `confab.guessing` compares whole names first, then the words of the names.
 """
 
 from __future__ import annotations
@@ -587,7 +587,7 @@ OPTIONS = {
     "behavior": "action operator skill behaviour name",
     "from_observed": "initial_state input start",
 }
-"""Names of parameters in Python, which are also the names of options without ``--`` and with ``-``, and other words for them.
+"""Names of parameters in Python, and other words for each parameter. Options have the same names, with ``--`` and ``-``.
 
-If a key contains several names, the first one that the function or command has is used.
+If a key contains several names, the first name that the function or command has is used.
 """

@@ -28,7 +28,7 @@ class Run:
 
     Examples
     --------
-    `confab run SCENE -o runs --keep` makes one; `confab.history.runs("runs")` reads them.
+    `confab run SCENE -o runs --keep` makes a stored run; `confab.history.runs("runs")` reads all stored runs.
     """
 
     name: str

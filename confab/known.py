@@ -257,7 +257,7 @@ class Known(metaclass=RightNames):
         self._edited = True
 
     def settle(self) -> None:
-        """Transfer edits of the owlready2 world into the graph, and infer again after any edit."""
+        """Transfer edits of the owlready2 world into the graph, and repeat the inference after any edit."""
         if "_mirror" in self.__dict__ and self._mirror.pull():
             self.__dict__.pop("graph", None)
             self._forget()

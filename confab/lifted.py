@@ -1,4 +1,4 @@
-"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and the facts that cogency counts."""
+"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and facts counted for cogency."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of the paper's links in a memory. If a plan would add more links, it is learned for the default planner only."""
+"""Maximum number of the paper's links in a memory. A plan that would add more links is learned for the default planner only."""
 SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
 
@@ -149,7 +149,7 @@ class Memory(metaclass=RightNames):
         plan : Plan, Result, Execution or file
             An executed plan. For an execution, the method `live` is called.
         failed : path of a step, optional
-            The step that failed, if any. The steps before it succeeded, and the steps after it were not executed.
+            The failed step, or None. All earlier steps succeeded, and all later steps were not executed.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class Memory(metaclass=RightNames):
         return learned if len(learned) <= MOST_LINKS else self.links
 
     def merge(self, other: Memory | str | Path, trust: bool = False) -> None:
-        """Add the counts of another memory, but not its links. With `trust`, the replicas of the other memory are trusted."""
+        """Add the counts, but not the links, of another memory. With `trust`, the replicas of the other memory are trusted."""
         if not isinstance(other, Memory):
             other = Memory.load(other)
         self.experience.merge(other.experience)
@@ -224,7 +224,7 @@ class Memory(metaclass=RightNames):
             self.trusted.add(replica)
 
     def live(self, problem: Problem, episode: Episode) -> None:
-        """Learn from an execution: all steps if there was no intervention and no failure, and otherwise the behaviours that failed.
+        """Learn from an execution: from all steps, or only from the failed behaviours if there was an intervention or a failure.
 
         Parameters
         ----------

@@ -59,10 +59,10 @@ class ReportJson(TypedDict):
 @right_names("a report", "scene.verify() or scene.read_report(FILE, PLAN)")
 @dataclass(frozen=True)
 class Report(metaclass=RightNames):
-    """The report of a verification: the rollouts of a plan, and the film of the first rollout.
+    """The report of a verification: the rollouts (executions in simulation) of a plan, and the film of the first rollout.
 
-    A rollout is good if every primitive had its expected effects and no final observation contradicts a goal. `trusted` has the
-    numbers of effects of the plan that are not verified, since no perceiver reads their situation type.
+    A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. `trusted`
+    has the numbers of effects of the plan that are not verified, since no perceiver reads their situation type.
     """
 
     plan: Plan
@@ -95,7 +95,7 @@ class Report(metaclass=RightNames):
         return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
-        """Return the goals for whose symbols a rollout observed another final value; symbols without a perceiver are skipped."""
+        """Return the goals that the final observations of a rollout contradict; symbols without a perceiver are skipped."""
         wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
         return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
@@ -250,7 +250,7 @@ def verify(
     goal
         Goals that the final observation must confirm; by default the scene's goals.
     gui
-        Show the first rollout on the screen, at most as fast as simulated time.
+        Show the first rollout on the screen, in real time or slower.
     time_limit
         Time limit of the whole call in seconds. At the limit, the call raises `LimitError`.
 

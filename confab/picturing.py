@@ -76,7 +76,7 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
 
 
 def words_as_they_are() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib draws ``$`` as a character instead of reading it as the begin of a formula."""
+    """Return a context in which matplotlib draws ``$`` as a character, and not as the begin of a formula."""
     from matplotlib import rc_context
 
     return rc_context({"text.parse_math": False})
@@ -137,7 +137,7 @@ def class_tree(scene: Known) -> Figure:
     for row in scene.knowledge.select(SITUATIONS):
         situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
     defined: set[str] = set()
-    with suppress(KnowledgeError):  # the classes of a scene that can't be planned in can be drawn
+    with suppress(KnowledgeError):  # also draws the classes of scenes without a valid planning problem
         defined |= {local_name(scene.names.iri(name)) for name in scene.reading.problem.domain.rules}
     root = next((iri for iri in below if local_name(iri) == "Object"), None)
     if root is None:

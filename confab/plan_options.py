@@ -1,4 +1,4 @@
-"""The options of a planning call, which Python, the command line and agents share, and their validation."""
+"""The options of a planning call, with their validation; Python, the command line and agents share these options."""
 
 from __future__ import annotations
 

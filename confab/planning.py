@@ -92,10 +92,10 @@ def plan(
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
         The memory that guides the search; by default none.
     mode : str
-        ``paper`` is A* with eq. (5) on each level, with all behaviours quantified in the scene. ``guarded``, ``leading`` and
-        ``strict`` are modes of the default planner, which reads only the individuals that the task can need. In these modes,
-        learned rules guide the search if they have proved useful, always, and never, respectively. ``optimal`` is described at
-        the parameter `optimal`.
+        ``paper`` is A* with the paper's equation (5) on each level, with all behaviours quantified in the scene.
+        ``guarded``, ``leading`` and ``strict`` are modes of the default planner, which reads only the individuals that
+        the task can need. Learned rules guide the search in the mode ``guarded`` only if they have proved useful, in
+        ``leading`` always, and in ``strict`` never. For ``optimal``, see the parameter `optimal`.
     time_limit : float or Deadline, optional
         Time limit of the call in seconds, or its deadline. The optimal search has the default `OPTIMAL_SECONDS`.
     optimal : bool
@@ -104,10 +104,10 @@ def plan(
     observed : str or Path, optional
         File of observed facts, which replace the scene's facts.
     engine : str, optional
-        An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is tried if
-        Confab's own search gives up and `leave_levels` is true. The own search then has three fifths of the time limit. Without
-        a time limit, the engine is tried after about twenty seconds of search; if the engine finds no plan, the search starts
-        again without a limit. With ``none``, no engine is tried.
+        An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is
+        tried if Confab's own search gives up and `leave_levels` is true. Confab's own search then has three fifths of
+        the time limit. Without a time limit, the engine is tried after about twenty seconds of search; if the engine
+        finds no plan, the search starts again without a limit. With ``none``, no engine is tried.
     level : int, optional
         The level on which the engine plans; by default the lowest level.
     leave_levels : bool
@@ -177,7 +177,7 @@ def _plan(
         return with_goals(scene.problem, goals)
 
     faulty = [*never_done(problem)]
-    if faulty and not seen.whole:  # an individual that wasn't read may have the value
+    if faulty and not seen.whole:  # an individual outside the read part may have the value
         problem = whole()
         faulty = [*never_done(problem)]
 
@@ -263,7 +263,7 @@ def _plan(
     if in_part and (
         outcome.status is Status.UNSOLVABLE
         or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
-    ):  # the whole scene is read, since it may have a plan or invalidate the plan
+    ):  # reads the whole scene, in which there may be a plan, or the plan may be invalid
         anew = whole()
         if anew != seen.problem:
             in_part = False
@@ -423,7 +423,7 @@ class Result(metaclass=RightNames):
 
     @cached_property
     def purposes(self) -> dict[tuple[int, ...], Purpose]:
-        """The causal links of each step, by its path (`confab.planner.causal_links`)."""
+        """The causal links of each step, by the step's path (`confab.planner.causal_links`)."""
         from confab.planner.causal_links import purposes
 
         if needs_others_meanwhile(self.problem):
@@ -431,7 +431,7 @@ class Result(metaclass=RightNames):
         return purposes(self.problem, self.plan)
 
     def why(self, step: AnyStep) -> Because:
-        """Return why a step is in the plan: its effects, and the steps and goals that need these effects.
+        """Return why a step is in the plan: the step's effects, and the steps and goals that need these effects.
 
         Parameters
         ----------
@@ -482,7 +482,7 @@ class Result(metaclass=RightNames):
             return other.problem, other.outcome, other.labels
 
         with within(seconds):
-            choice = BY.search(asked) is not None  # the individual may only be in the whole scene
+            choice = BY.search(asked) is not None  # possibly only the whole scene has the individual
             if choice and self.part is not None:
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
@@ -507,7 +507,7 @@ class Result(metaclass=RightNames):
     def explain(self, step: AnyStep) -> Because: ...
 
     def explain(self, step: AnyStep | None = None) -> Account | Because:
-        """Return why each step is in the plan; without a plan, return the reason why there is no plan.
+        """Return the reasons why each step is in the plan, or the reason why there is no plan.
 
         With `step`, return why this step is in the plan, like `why`.
         """
@@ -544,7 +544,7 @@ class Result(metaclass=RightNames):
         return float(cost_of(self.problem, self.plan))
 
     def dearer(self) -> str:
-        """Return a remark on possible cheaper plans, and the option that searches for one.
+        """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.
 
         The text is empty if there is no reason to expect a cheaper plan, or if the search has proved a bound.
 

@@ -32,9 +32,9 @@ def has_robot(scene: Known) -> bool:
 def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
     """Return a scene whose reach facts are up to date if it has a robot with a body; other scenes are returned unchanged.
 
-    Reach facts are checked, and computed if necessary, if their file is missing or older than a file of the scene. If the
-    bodies are described incompletely, the scene is returned unchanged, and `tell` is called with the missing statement. The
-    reach facts of shipped scenes are always up to date.
+    If the file of reach facts is missing or older than a file of the scene, the reach facts are checked, and computed
+    if necessary. If the bodies are described incompletely, the scene is returned unchanged, and `tell` is called with
+    the missing statement. The reach facts of shipped scenes are always up to date.
     """
     graph = scene.knowledge
     if graph.remote or graph.faults or not graph.select(ROBOTS):

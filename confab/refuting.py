@@ -1,4 +1,4 @@
-"""Refutations: behaviours that physics found impossible in a situation, which the next plan and later calls avoid."""
+"""Refutations: behaviours that physics found impossible in a situation, and that the next plan and later calls avoid."""
 
 from __future__ import annotations
 

@@ -40,8 +40,7 @@ TOLD = 8
 class Job:
     """The arguments of `run`: a scene, goals, planning options, a target folder, and options for the film.
 
-    `memory` is the memory file to read and to write, if any. `noise` is the standard deviation of perceived positions in
-    metres.
+    `memory` is the memory file to read and to write, or None. `noise` is the standard deviation of perceived positions in metres.
     """
 
     scene: str

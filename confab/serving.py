@@ -123,7 +123,7 @@ class Worker:
 
 
 class Service:
-    """A served scene, the content of its page, and the processes that answer queries about the scene."""
+    """A served scene, with the content of the scene's page and the processes that answer queries about the scene."""
 
     def __init__(self, scene: Known, limits: QueryLimits) -> None:
         self.scene, self.limits, self.change = scene, limits, 0
@@ -188,7 +188,7 @@ class Service:
         return None if self.following.version <= after else json.dumps(self.following.data()).encode()
 
     def wait_for_page(self) -> None:
-        """Wait until a page that follows an execution has received its last state, for `LAST_STATE` seconds at most."""
+        """Wait, at most `LAST_STATE` seconds, until a page that follows an execution has received the execution's last state."""
         end = monotonic() + LAST_STATE
         followed = self.following.begun and end - self.page_asked < 2 * LAST_STATE
         while followed and self.page_version < self.following.version and monotonic() < end:
@@ -249,7 +249,7 @@ class Endpoint:
         self.app.router.redirect_slashes = False
 
     async def page(self, request: Request) -> Response:
-        """Respond with the HTML page, which requests its content."""
+        """Respond with the HTML page, which then requests the content from `/page.json`."""
         return HTMLResponse(page_html(None, "Confab"), headers={"Cache-Control": "no-store"})
 
     async def data(self, request: Request) -> Response:
@@ -354,7 +354,7 @@ async def while_connected(request: Request, work: Awaitable[T]) -> T:
 
 
 async def body(request: Request) -> bytes:
-    """Return the body of a request; refuse a body of more than `LARGEST` bytes, or one that takes more than `SLOWEST` seconds."""
+    """Return the body of a request; refuse a body that has more than `LARGEST` bytes or takes more than `SLOWEST` seconds."""
 
     async def read() -> bytes:
         content = bytearray()
@@ -383,7 +383,7 @@ def form(content: bytes) -> dict[str, list[str]]:
 
 
 def utf8(content: bytes) -> str:
-    """Decode bytes as UTF-8; refuse the request if they aren't UTF-8."""
+    """Decode bytes as UTF-8; refuse the request if the bytes aren't UTF-8."""
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:

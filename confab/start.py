@@ -15,7 +15,7 @@ from typing import NoReturn
 
 
 def main() -> None:
-    """Import the command line and run it."""
+    """Import the command line, and run the command."""
     signal.signal(signal.SIGINT, _interrupted)
     from confab.cli import main as answer
 

@@ -24,7 +24,7 @@ STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-cs
 
 
 class Row(tuple[str | None, ...]):
-    """A row of a table: a tuple whose cells can also be selected by the name of their column."""
+    """A row of a table: a tuple whose cells can also be selected by column names."""
 
     _fields: tuple[str, ...]
 

@@ -110,7 +110,7 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
-    """End the process if a block exceeds its time limit by a tenth, since a query of a store can't be interrupted.
+    """End the process if a block exceeds the block's time limit by a tenth, since a query of a store can't be interrupted.
 
     Files that the block writes are complete or unchanged (`confab.reasoner.files.write_whole`).
     """
@@ -143,7 +143,7 @@ def told(out: Path, text: str) -> None:
 
 def show_result(what: Any) -> None:
     """Print JSON data, a text, a table or an object of rich to stdout; a table in a pipe has tab-separated values."""
-    # The class is asked, since an object searches all modules for an unknown name.
+    # The check reads the class, since an object searches all modules for an unknown name.
     tsv = getattr(type(what), "tsv", None)
     if tsv is not None and not sys.stdout.isatty():
         print(tsv(what), end="")
@@ -195,7 +195,7 @@ PARAMETER = re.compile(
     r"(?<![\w'])(?P<name>engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
     r"(?=[\s),;.]|$)"
 )
-"""A parameter in Python, perhaps with a value, that the command line has as an option of the same name."""
+"""Pattern of a Python parameter, perhaps with a value, for which the command line has an option of the same name."""
 
 
 def _usage(error: Any) -> str:
@@ -230,7 +230,7 @@ def by_options(text: str) -> str:
 
 
 def _in_place_of(option: str, context: click.Context) -> str:
-    """Return what does the work of an unknown option: another option, an argument, or an option of other commands."""
+    """Return the replacement for an unknown option: another option, an argument, or an option of other commands."""
     from confab.guessing import chosen
 
     def names(command: click.Command | None) -> list[str]:

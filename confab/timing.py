@@ -1,4 +1,4 @@
-"""Schedules of plans for the public functions: when a plan needs a schedule, and the schedule as text and as JSON."""
+"""Schedules of plans for the public functions: the test whether a plan needs a schedule, and schedules as text and JSON."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def asks_for_times(problem: Problem, minimise: str | None) -> bool:
 
 
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Plan with steps that must overlap; return the outcome and the schedule."""
+    """Plan with steps that must overlap in time; return the outcome and the schedule."""
     from confab.planner.timed.concurrent import plan
 
     outcome, timed = plan(problem, Limits(seconds=deadline.left))

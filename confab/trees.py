@@ -115,7 +115,7 @@ class _Lowering:
         self.possible: set[str] = set()
 
     def lowered(self, node: Node) -> Element:
-        """Return the element for a node."""
+        """Return the element of a library for a node of the plan's behaviour tree."""
         check("exporting the behaviour tree")
         match node:
             case Holds(facts, conditions):
@@ -278,7 +278,7 @@ def to_py_trees(tree: Tree) -> str:
 
 
 def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
-    """Return an element as a Python expression."""
+    """Return a node of a behaviour tree as a Python expression."""
     pad = "\n" + "    " * (depth + 1)
     below = "".join(f"{pad}{_python(child, names, depth + 1)}," for child in element.children)
     end = "\n" + "    " * depth

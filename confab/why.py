@@ -43,7 +43,7 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Because:
-    """The reasons why a step is in a plan: its effects (`gives`), and what needs these effects (`needs`).
+    """The reasons why a step is in a plan: its effects (`gives`), and the steps and goals that need these effects (`needs`).
 
     `number` names the step. For example, ``L2#3`` is step 3 of level 2, counted from 0.
     """
@@ -162,7 +162,7 @@ class WhyNot:
 class Account:
     """An explanation of each step of a plan, or of the reason why there is no plan.
 
-    `proof` has the claims of the certificate of unsolvability, if any.
+    `proof` has the claims of the certificate of unsolvability; it is empty without a certificate.
     """
 
     headline: str
@@ -231,7 +231,7 @@ def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
 
 
 def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels: Labels) -> Step:
-    """Return the step that an argument names, also by words of its label (`confab.planner.finding.find_step`).
+    """Return the step that an argument names, for example by words of the step's label (`confab.planner.finding.find_step`).
 
     Raises
     ------
@@ -342,10 +342,10 @@ def why_not(
     Parameters
     ----------
     asked : str
-        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``, which may be followed by
-        ``by hand2``, the individual that must take part in its changes. A behaviour has arguments in the order of its
-        parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of explanations,
-        such as ``pick cup 1 with right hand``, are accepted, too.
+        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``, which may be
+        followed by ``by hand2``, an individual that must take part in the changes of the fact. A behaviour has
+        arguments in the order of its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK
+        hand=right_hand``. Sentences of explanations, such as ``pick cup 1 with right hand``, are also accepted.
     problem, plan
         The problem and its plan.
     labels : Labels
@@ -490,10 +490,10 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:
-    """Return the conditions of levels that the plan `other` violates and the plan `plan` doesn't, as sentences."""
+    """Return, as sentences, the conditions of levels that the plan `other` violates and that the plan `plan` meets."""
     first = problem.domain.levels[0]
     if all(step.level == first for step in other.steps):
-        return ()  # no level is without steps
+        return ()  # every level has steps
     known = {(one.change, one.conditions) for left in levels_left(problem, plan) for one in left.broken}
     found = []
     for level, one in ((left.level, one) for left in levels_left(problem, other) for one in left.broken):

@@ -20,7 +20,7 @@ from confab.scene import load
 from confab.sim.robots.transport import Model, RobotError
 
 MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
-"""Namespaces of the properties for a world model: for fields with literals, and for fields that name an entity."""
+"""Namespaces of the properties for the fields of a world model: fields with literals, and fields that name an entity."""
 
 DCTERMS = "http://purl.org/dc/terms/"
 WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
@@ -97,7 +97,7 @@ def scene_of_graph(source: Path, query: str, path: Path) -> int:
     query : str
         The path of a CONSTRUCT query, or the file name of a shipped query (in the folder ``alignments``).
     path : Path
-        File to write. It imports the shipped ontologies whose terms the query uses.
+        File to write. The file imports the shipped ontologies whose terms the query uses.
 
     Raises
     ------

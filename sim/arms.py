@@ -73,7 +73,7 @@ class Arm:
 
     @cached_property
     def hang(self) -> Array:
-        """Direction of the elbow at swivel 0: up if the upper arm points up at the zero posture, otherwise down."""
+        """Direction of the elbow at swivel angle 0: up if the upper arm points up at the zero posture, otherwise down."""
         return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
 
     @cached_property
@@ -83,13 +83,13 @@ class Arm:
 
     @cached_property
     def turning(self) -> tuple[Array, Array]:
-        """Cross-product matrices (k, 3, 3) of the axes, and their squares."""
+        """Cross-product matrices (k, 3, 3) of the joints' axes, and the squares of these matrices."""
         crosses = np.stack([cross_matrix(axis) for axis in self.axes])
         return crosses, crosses @ crosses
 
     @cached_property
     def limbs(self) -> tuple[float, float, Array, float, float]:
-        """Lengths of upper arm and forearm, the elbow's frame (3, 3), the elbow's bend in radians, and its sign (1 or -1)."""
+        """Lengths of upper arm and forearm, the elbow's frame (3, 3), the elbow's bend in radians and its sign (1 or -1)."""
         a, b, hinge = self.upper_length, self.lower_length, self.axes[3]
         upper, fore = (self.elbow - self.shoulder) / a, (self.wrist - self.elbow) / b
         bent = float(np.arctan2(cross(upper, fore) @ hinge, upper @ fore))

@@ -15,7 +15,7 @@ DRIVE = (("drive_x", "prismatic", "1 0 0"), ("drive_y", "prismatic", "0 1 0"), (
 """Joints below the base of a mobile robot, along x, along y and about z: name, URDF type and axis."""
 
 FARTHEST = 100.0
-"""Limits in metres of the joints along x and y."""
+"""Limits in metres of a mobile base's joints along x and y."""
 
 
 def read_robot(robot: Robot, base: Array | None = None) -> UrdfModel:

@@ -34,13 +34,13 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres on short lines, less than `MARGIN`, since the load may have slipped after the ends were chosen."""
+"""Margin in metres to obstacles on short straight motions, less than `MARGIN`, since the load may slip before them."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Distance out of reach, in metres, above which a pose was marked as impossible because the hand would not be level."""
+"""Distance in metres that is no true distance beyond the reach, but marks a pose in which the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
@@ -49,13 +49,13 @@ The margins in `TIGHT` are above `CLOSE`, since the load may slip on the way.
 """
 
 ROUNDED = 3
-"""Maximum number of samples on either side over which corners of a path are rounded."""
+"""Maximum number of samples before and after a corner of a path over which the corner is rounded."""
 
 THIN = 0.01
 """Assumed opening in metres of fingers that are closed around a handle."""
 
 WITHDRAWAL_SPEED = 0.5
-"""Share of its speed at which a stopped hand withdraws."""
+"""Ratio of the speed at which a stopped hand withdraws to the hand's normal speed."""
 
 SAMPLES = 1500
 """Maximum number of samples in the search for a path to one of the goals."""
@@ -103,7 +103,7 @@ class Attempt:
 
     @contextmanager
     def planning(self) -> Iterator[None]:
-        """Count the CPU time of the block as motion planning."""
+        """Count the CPU time of the code in the ``with`` block as motion planning."""
         begin = time.process_time()
         try:
             yield
@@ -115,7 +115,7 @@ class Attempt:
     def reacher(
         self, *ignored: str, margin: float = MARGIN, opening: float | None = None, whole: bool = False
     ) -> Reacher:
-        """Return the arm with its load among all obstacles except the `ignored` ones, with fingers open by `opening` if given."""
+        """Return the arm with its load among all obstacles except those in `ignored`, with fingers open by `opening` if given."""
         mover = self.hand.mover(opening)
         if self.held is not None:
             mover = mover.holding(self.world.load_spheres(self.hand, self.held, whole))
@@ -130,7 +130,8 @@ class Attempt:
         Raises
         ------
         SkillError
-            No candidate is left. The code is `unreachable` with the missing metres, or `goal in collision` with the obstacles.
+            No candidate is left. The code is `unreachable` with the distance in metres beyond the reach, or `goal in
+            collision` with the obstacles.
         """
         with self.planning():
             reacher = self.reacher(opening=opening)
@@ -157,7 +158,7 @@ class Attempt:
             return [int(left[i]) for i in found]
 
     def _unreachable(self, stages: Sequence[Stage], at: Stage, objects: tuple[str, ...]) -> SkillError:
-        """Return the error for a stage without a posture, with the missing metres and the value of the moved joint at the stage."""
+        """Return the error for an unreachable stage, with the distance beyond the reach and the furniture joint's value."""
         if at.joint is None:
             return SkillError("unreachable", objects, beyond_m=max(beyond(self.hand.arm, one.poses) for one in stages))
         missing = beyond(self.hand.arm, at.poses)
@@ -346,7 +347,7 @@ class Attempt:
         return {"slip_m": slip, "turned_rad": turned}
 
     def check_arrival(self, goal: Array, numbers: Numbers) -> dict[str, float]:
-        """Return the hand's distance from a goal pose (6,); raise `SkillError` if it exceeds the tolerance."""
+        """Return the hand's distance from a goal pose (6,); raise `SkillError` if the distance exceeds the tolerance."""
         error = float(np.linalg.norm(self.hand.frame()[1] - goal[:3]))
         if error > numbers["tolerance"]:
             message = f"the hand stopped {error * 1000:.0f} mm off its goal"
@@ -371,7 +372,7 @@ Scene = tuple[Mover, Surroundings, float]
 
 
 def _free(scenes: Sequence[Scene], postures: Sequence[Array], order: NDArray[np.intp]) -> list[int]:
-    """Return the first candidates, in `order`, that are collision-free at every stage."""
+    """Return the first candidate poses, in `order`, that are collision-free at every stage."""
     chosen: list[int] = []
     for start in range(0, len(order), BATCH):
         left = order[start : start + BATCH]

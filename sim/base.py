@@ -20,7 +20,7 @@ FORCE = 5000.0
 class Base:
     """The base of a robot in a physics world, on joints along x and y and about z.
 
-    The base stops at most `miss` metres and `miss` radians off its goal.
+    The base stops at most `miss` metres and `miss` radians away from the goal pose.
     """
 
     client: int

@@ -1,9 +1,9 @@
 """Bodies of the world: their shape, mass and appearance.
 
-`KINDS` maps each kind of shape to the function that creates the body in PyBullet, and to the cylinder that represents the body
-in motion planning. A vessel is a solid of revolution. The collision shape of a vessel is a bottom cylinder and a ring of flat
-boxes for each segment of the profile. The visual shape of a vessel is a smooth mesh. The origin of a body's frame is the middle
-of its base, with z up. Units are metres and kilograms.
+`KINDS` maps each kind of shape to the function that creates the body in PyBullet, and to the cylinder that represents
+the body in motion planning. A vessel is a solid of revolution. The collision shape of a vessel is a bottom cylinder and
+a ring of flat boxes for each segment of the profile. The visual shape of a vessel is a smooth mesh. The origin of a
+body's frame is the middle of the body's bottom face, with z up. Units are metres and kilograms.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
 
 STEP = 0.001
-"""Maximum height in metres of a segment of a turned solid's outline that gets no cylinder."""
+"""Height in metres up to which a segment of a turned solid's outline gets no collision cylinder."""
 
 SIDES = 40
 """Number of corners of the polygon that stands for a circle in a visual mesh."""

@@ -233,7 +233,7 @@ def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
 
 
 def column(heights: Array, radii: Array, bottom: float) -> Spheres:
-    """Return spheres that cover an upright body of revolution above `bottom`, except its edges.
+    """Return spheres that cover an upright body of revolution above `bottom`, except the body's edges.
 
     Ascending `heights` and `radii` give the outline of the body. Each sphere is as wide as the body at the sphere's centre.
 

@@ -104,7 +104,7 @@ class Roller:
 
 
 def drive(engine: Engine, robot: str, stand: str) -> None:
-    """Drive a robot with its loads to a stand; raise `SkillError` if that fails."""
+    """Drive a robot with its loads to a stand; raise `SkillError` if the drive fails."""
     if robot not in engine.bases or stand not in engine.embodiment.stands:
         raise SkillError("ill-defined", (robot, stand), f"{robot} doesn't drive, or {stand} is no stand")
     base, there = engine.bases[robot], engine.embodiment.stands[stand]

@@ -48,7 +48,7 @@ STEADY = 5.0
 """Number of standard deviations of the perceived position within which a body counts as unmoved."""
 
 NEAR_PLACE = 0.05
-"""Maximum distance in metres between a place and a body that is at it."""
+"""Maximum distance in metres between a place and a body at the place."""
 
 
 STEP_UP = 0.01
@@ -257,7 +257,7 @@ class Engine:
         Raises
         ------
         SkillError
-            The body is not visible, and no earlier pose of it is known.
+            The body is not visible, and no earlier pose of the body is known.
         """
         if name in self.bodies:
             rotation, position = self.truth(name)
@@ -289,7 +289,7 @@ class Engine:
         self.remembered[name] = self.steps
 
     def sight(self) -> Sight:
-        """Return the observations of the cameras, and forget the poses of bodies that the cameras see to be gone."""
+        """Return the observations of the cameras, and forget the poses of bodies that are gone according to the cameras."""
         if self.sighted is None or self.sighted[0] != self.steps:
             self.sighted = self.steps, Sight()
             poses = {name: self._believed(name) for name in self.known}
@@ -331,7 +331,7 @@ class Engine:
         )
 
     def knows(self, name: str) -> bool:
-        """Return whether a body is perceived now, or an earlier pose of it is known."""
+        """Return whether a body is perceived now, or an earlier pose of the body is known."""
         self.sight()
         return name in self.known or self.perceives(name)
 
@@ -341,7 +341,7 @@ class Engine:
         return self.noise / float(np.sqrt(LOOKS))
 
     def look(self, before: int = 0) -> None:
-        """Draw new perception errors.
+        """Draw new random errors of perception.
 
         The error of a mechanism holds until the next look, and the error of a body until the next simulation step. An error is
         the mean of several measurements. After `before` earlier looks at an unchanged world, the error is the mean of all
@@ -423,7 +423,7 @@ class Engine:
         return None
 
     def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> list[Bead]:
-        """Return the beads, of one filling if given, inside a vessel at its true pose; with `sensed`, at its perceived pose."""
+        """Return the beads, of one filling if given, inside a vessel at the true pose or, with `sensed`, at the perceived pose."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
@@ -493,7 +493,7 @@ class Engine:
         return around
 
     def taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return the rotation and base of a body after links have moved to `values` and carried it along."""
+        """Return the rotation and base of a body after links have moved to `values` and carried the body along."""
         rotation, base = self.sense(name)
         link = self.known[name][0]
         if link not in values:

@@ -104,7 +104,7 @@ def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] 
 
 
 def touched(engine: Engine, name: str, feature: str) -> tuple[str, ...]:
-    """Return the parts of a link that a hand touches at a feature; for an object or place, its own name."""
+    """Return the parts of a link that a hand touches at a feature, or the name of an object or place with the feature."""
     if name in engine.links:
         found: Feature | None = engine.links[name].link(name).features.get(feature)
         return found.parts if found is not None else ()

@@ -46,7 +46,7 @@ VIEWS = (
 )
 """Directions of cameras: the angle in radians around the tables, and the tangent of the downward angle.
 
-A primitive is shown by the camera that sees most of its objects.
+A primitive is shown by the camera that sees most of the primitive's objects.
 """
 
 ABOVE = 0.01
@@ -81,7 +81,7 @@ class Film:
     speed : float
         Ratio of simulated time to the film's time.
     stills : str or Path, optional
-        Folder for a PNG per primitive, taken at its end.
+        Folder for PNG files: the picture at the end of each primitive.
     names : mapping of name to text, optional
         Displayed names of places and objects; others are displayed with their own names.
     """
@@ -125,7 +125,7 @@ class Film:
             self._file.__exit__(kind, error, trace)  # removes the unfinished film
 
     def __call__(self, world: Engine) -> None:
-        """Take a frame if one is due, and count its CPU time as rendering."""
+        """Take a frame if the next frame is due, and count the CPU time as rendering."""
         begin = time.process_time()
         self._take(world)
         world.clock.rendering += time.process_time() - begin
@@ -150,7 +150,7 @@ class Film:
         return self._caption(self._named(picture(world, self.camera), world), world.current)
 
     def _turn_to_action(self, world: Engine) -> None:
-        """Choose the camera that sees most objects of the present primitive; the present camera wins ties."""
+        """Choose the camera that sees most objects of the present primitive; of equally good cameras, keep the present camera."""
         if not self._views:
             size = self.width, self.height, BAR
             self._views = [view_of(world.embodiment, *size, around, down) for around, down in VIEWS]
@@ -164,7 +164,7 @@ class Film:
         self.camera = best if seen[id(best)] > seen.get(id(current), 0) else current
 
     def close(self) -> None:
-        """Finish the film and move it to its path."""
+        """Finish the film, and move the file to the film's path."""
         self._keep()
         if self._writer is None:
             return
@@ -284,7 +284,7 @@ def _meets(box: tuple[float, float, float, float], others: Sequence[tuple[float,
 
 
 def _write_row(draw: ImageDraw.ImageDraw, texts: Sequence[str], width: int, y: float) -> None:
-    """Write texts side by side in the largest font size that fits, and the last text dark."""
+    """Write texts side by side in the largest font size that fits, and the last text in a dark colour."""
     gap = 26
     for size in SIZES:
         font = ImageFont.load_default(size)

@@ -21,7 +21,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 """The orientation of an upright object, as a quaternion."""
 
 FALLING = 1.3
-"""Tilt in radians of an object that has been knocked and falls over."""
+"""Initial tilt in radians of an object that a person has knocked over."""
 
 
 def move(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:

@@ -55,7 +55,7 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
 
 
 def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the elbow at `swivel` about the line from shoulder to wrist, and flags of the reachable ones."""
+    """Return postures with the elbow at `swivel` about the line from shoulder to wrist, and flags of reachable postures."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
     a, b, zero, bent, side = arm.limbs
@@ -82,7 +82,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return angles (n, 3) of the spherical joint from joint `first` on; with parallel axes, those farther from the limits."""
+    """Return angles (n, 3) of the spherical joint from joint `first` on; parallel outer axes get angles far from limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:
@@ -93,7 +93,7 @@ def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
 
 
 def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the last joint at its middle plus `swivel` and the hand's roll, and flags of the reachable ones.
+    """Return postures with the last joint at its middle plus `swivel` and the hand's roll, and flags of reachable postures.
 
     The last angle determines the wrist (w) and the direction of the sixth axis (e). The distance from shoulder to wrist
     determines the elbow's angle. The angle between w and e determines the angle of the fifth joint. The directions w and e
@@ -159,7 +159,7 @@ def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> 
 
 
 def _frame(a: Array, b: Array) -> Array:
-    """Return right-handed frames (n, 3, 3) whose first axis is along `a` and whose second lies in the plane of `a` and `b`."""
+    """Return right-handed frames (n, 3, 3) with the first axis along `a`, and the second axis in the plane of `a` and `b`."""
     first = a / np.maximum(_length(a), 1e-9)[:, None]
     across = b - np.einsum("ni,ni->n", first, b)[:, None] * first
     second = across / np.maximum(_length(across), 1e-9)[:, None]

@@ -79,7 +79,7 @@ class LiveWorld:
         self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
 
     def observe(self) -> State:
-        """Bring up tilted empty hands and hands at no perceivable position, and return the facts perceived afterwards."""
+        """Raise tilted empty hands and hands at no perceivable position, and return the facts that are perceived afterwards."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
@@ -164,7 +164,7 @@ class LiveWorld:
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a hand with a load upright and up, or an empty hand to its rest posture, as far as possible."""
+        """Turn a loaded hand upright and raise the hand, or move an empty hand to the rest posture, as far as possible."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):

@@ -47,7 +47,7 @@ HEIGHTS = (0.06, 0.12, 0.18)
 
 @dataclass
 class Lookout:
-    """Discovers objects and spots in a world, and adds them to a problem with the relation of reach facts `reaching`, if any."""
+    """Discovers objects and spots in a world, and adds both to a problem. The relation `reaching` has the reach facts."""
 
     world: PhysicsWorld
     problem: Problem

@@ -85,7 +85,7 @@ MEASURES: Mapping[str, Measure] = {
 
 
 def observe_measured(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether the bounds hold; for a situation type with values, return the first value for which the bounds hold.
+    """Return whether the bounds hold; for a situation type with several values, return the first value whose bounds hold.
 
     If no value fits, return the special value `nothing` of the situation type. Return None if the situation type has no value
     `nothing`, or if a quantity can't be measured.

@@ -36,7 +36,7 @@ def _slip(run: Run) -> float | None:
 
 
 def _load(run: Run) -> str:
-    """Return the held body; if there is none, the skill's object."""
+    """Return the held body; if the hand is empty, return the skill's object."""
     return run.attempt.held or run.roles.get("object", "")
 
 

@@ -20,7 +20,7 @@ from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, w
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which its latch holds it."""
+"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which the latch holds the joint."""
 
 
 SLIGHT = 0.0002

@@ -46,7 +46,7 @@ X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Blocked:
-    """Why a path is impossible: a code of `confab.sim.verdict`, the obstacles, and the smallest clearance in metres."""
+    """The reason why a path is impossible: a code of `confab.sim.verdict`, obstacles, and the smallest clearance in metres."""
 
     code: str
     objects: tuple[str, ...] = ()
@@ -61,7 +61,7 @@ class Traveller(Protocol):
         """Size (6,) of the search region beyond start and goal, in metres and radians."""
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the joint values at poses, and for each pose whether it is within reach."""
+        """Return the joint values at poses, and for each pose whether the pose is within reach."""
 
     def free(self, q: Array) -> Flags:
         """Return for each row of joint values whether the robot is free of collisions."""
@@ -101,7 +101,7 @@ class Reacher:
         return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the postures at poses, and for each pose whether it is within reach and joint limits."""
+        """Return the postures at poses, and for each pose whether the pose is within reach and joint limits."""
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
     def free(self, q: Array) -> Flags:
@@ -216,7 +216,7 @@ def connect(
     attempts : int
         Maximum number of samples.
     """
-    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # others can't end the search
+    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # unreachable goals can't end the search
     if within and reacher.follow(line(start, goals[within[0]])) is not None:
         return within[0], np.stack([start, goals[within[0]]])
     for i in within:
@@ -304,7 +304,7 @@ def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
 
 
 def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
-    """Replace the part of a path between two random points by a straight line if it is free; try `attempts` times."""
+    """Replace the part of a path between two random points by a straight line if the line is free; try `attempts` times."""
     for _ in range(attempts):
         if len(corners) < 3:
             break
@@ -365,7 +365,7 @@ def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array,
 
 
 def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities at `rate` hertz along samples `q`, with `rows` within limits of speed and acceleration."""
+    """Return positions and velocities at `rate` hertz along samples `q`; `rows` keep the limits of speed and acceleration."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
     push = most / 2

@@ -1,9 +1,9 @@
 """Inverse kinematics of arms without a closed form: damped least squares within the joints' limits.
 
-The search starts from the rest posture, turned about the arm's first axis until the arm points to the goal. From this posture,
-the hand is led straight to the goal in several stretches. So equal poses have equal postures, and neighbouring poses have
-neighbouring postures unless the arm has to reconfigure. If the first search fails, further searches start from random postures
-with a fixed seed.
+The search starts from the rest posture, turned about the arm's first axis until the arm points to the goal. From this
+posture, the hand is led straight to the goal in several stretches. Therefore equal poses have equal postures, and
+neighbouring poses have neighbouring postures unless the arm has to reconfigure. If the first search fails, further
+searches start from random postures with a fixed seed.
 """
 
 from __future__ import annotations

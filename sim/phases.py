@@ -340,7 +340,7 @@ def _rise(run: Run, phase: Phase) -> None:
 
 
 def _home(run: Run, phase: Phase) -> None:
-    """Move to the home pose, or near it if an opened link is in the way."""
+    """Move to the home pose, or to a near pose if an opened link is in the way."""
     hand = run.attempt.hand
     home = pose_of(hand.arm, np.array(hand.hand.home))
     run.attempt.move_to_any(

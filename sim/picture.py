@@ -96,7 +96,7 @@ class Camera:
         return float(self.width / 2 + self.focal * x / z), float(self.height / 2 - self.focal * y / z)
 
     def window(self, center: Array, radius: float) -> tuple[slice, slice] | None:
-        """Return the rows and columns that a sphere can cover, or None if it lies outside the picture."""
+        """Return the rows and columns that a sphere can cover, or None if the sphere lies outside the picture."""
         x, y, z = self.axes @ (center - np.array(self.eye))
         if z < NEAR:
             return None
@@ -335,7 +335,7 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
 def _look(
     camera: Camera, rotation: Array, base: Array, shape: Shape
 ) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
-    """Return a vessel's window in the picture, its rays and the eye in the vessel's frame, and its outer heights and radii.
+    """Return a vessel's window in the picture, the rays and the eye in the vessel's frame, and the outer heights and radii.
 
     Return None if the vessel lies outside the picture.
     """
@@ -394,7 +394,7 @@ def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, bas
 
 
 def _walls(origin: Array, rays: Array, heights: Array, radii: Array) -> tuple[Array, Array]:
-    """Return the distances at which rays first enter and last leave a surface of revolution, infinite for rays that miss it."""
+    """Return the distances at which rays first enter and last leave a surface of revolution; a ray that misses has infinity."""
     near, far = np.full(rays.shape[:2], np.inf), np.full(rays.shape[:2], -np.inf)
     for (h0, r0), (h1, r1) in pairwise(zip(heights, radii, strict=True)):
         slope = (r1 - r0) / (h1 - h0)

@@ -69,7 +69,7 @@ def reach(embodiment: Embodiment) -> Reach:
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
-    """Return for each hand that does not reach a place the first impossible stage of a grasp and its obstacle, with links open.
+    """Return, for each hand that does not reach a place, the first impossible stage of a grasp and the obstacle, with open links.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
 
 
 def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, UrdfModel]]:
-    """Yield each stand of a mobile robot with the robot's model at the stand; for a fixed robot, an empty name and its model."""
+    """Yield each stand of a mobile robot with the robot's model there; for a fixed robot, yield an empty name and the model."""
     if not robot.driving:
         yield "", read_robot(robot)
         return

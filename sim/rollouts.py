@@ -203,7 +203,7 @@ class _Pool:
         connection.send(seed)
 
     def _receive(self, connection: Connection) -> Rollout | None:
-        """Return the rollout of a process; if the process died, start a new process with its seed and return None."""
+        """Return the rollout of a process; if the process died, start a new process with the same seed and return None."""
         process, seed = self.busy.pop(connection)
         try:
             result: Rollout | Exception = connection.recv()

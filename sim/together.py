@@ -80,7 +80,7 @@ class _Job:
 def perform_together(
     world: PhysicsWorld, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
 ) -> Performance:
-    """Execute primitives with all hands at once; each starts as soon as its predecessors are done and there is room.
+    """Execute primitives with all hands at once; each primitive starts when its predecessors are done and there is room.
 
     Parameters
     ----------

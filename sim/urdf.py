@@ -254,7 +254,7 @@ def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, fl
 
 
 def mesh_file(name: str, folder: Path) -> Path:
-    """Return the path of a mesh that a URDF in `folder` names: in `folder`, its parent, or PyBullet's data."""
+    """Return the path of a mesh that a URDF names; the mesh is in `folder`, in the parent folder, or in PyBullet's data."""
     name = name.removeprefix("package://")
     places = [place for place in (folder, folder.parent, pybullet_data()) if place and (place / name).is_file()]
     if not name or not places:
@@ -281,7 +281,7 @@ def _primitive(shape: ET.Element) -> tuple[Array, float]:
 
 
 def _spread(half: float, radius: float) -> Array:
-    """Return positions from -half to half that are at most the radius apart."""
+    """Return positions from -half to half with gaps of at most the radius."""
     if half <= 0:
         return np.zeros(1)
     if radius * MOST_SPHERES <= 2 * half:

@@ -26,7 +26,7 @@ CODES = {
     "ill-defined": "the skill can't be carried out as the ontology describes it",
     "unexpected": "the perceived facts differ from the behaviour's effects",
 }
-"""Failure codes and their meanings. `Verdict.code` is one of them, or None for success."""
+"""Failure codes and their meanings. `Verdict.code` is one of these codes, or None for success."""
 
 
 REFUTED = ("no path", "goal in collision")

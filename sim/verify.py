@@ -16,7 +16,7 @@ from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
-"""Maximum number of looks, with noisy perception, until a difference from the expected state counts."""
+"""Maximum number of observations, with noisy perception, until a difference from the expected state counts."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def verify(
     progress: Callable[[int, PrimitiveStep], None] | None = None,
     gui: bool = False,
 ) -> Rollout:
-    """Execute the primitives of a plan in a new world until one fails.
+    """Execute the primitives of a plan in a new world until a primitive fails.
 
     Parameters
     ----------

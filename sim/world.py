@@ -159,7 +159,7 @@ class PhysicsWorld(Engine):
         return Verdict(True, measured=measured)
 
     def _with_facts(self, verdict: Verdict, step: PrimitiveStep) -> Verdict:
-        """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of its objects."""
+        """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of the objects."""
         if verdict.code not in REFUTED:
             return verdict
         spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}

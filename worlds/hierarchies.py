@@ -44,7 +44,7 @@ def hierarchy(seed: int) -> Problem:
 
 
 def states(problem: Problem) -> int:
-    """Return the number of states, reachable or not; each hand counts as if it had one value for each hand."""
+    """Return the number of states, reachable or not; a hand's state is counted with as many values as there are hands."""
     held = len(problem.classes["Hand"])
     return prod(
         2 if problem.domain.situations[s.situation].boolean

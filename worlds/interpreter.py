@@ -63,7 +63,7 @@ def divided(one: Any, other: Any) -> Any:
 
 
 def number(text: str | Fraction) -> Any:
-    """Return a number as an integer if it is whole, otherwise as a fraction."""
+    """Return a whole number as an integer, and any other number as a fraction."""
     value = Fraction(text)
     return value.numerator if value.denominator == 1 else value
 

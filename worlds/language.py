@@ -60,7 +60,7 @@ DEFINED = {
     "ABOVE": SituationType("ABOVE", ("Thing", "Thing"), "Truth", boolean=True),
     "LOST": SituationType("LOST", ("Cup",), "Truth", boolean=True),
 }
-"""Situation types with random rules; the first two may depend on each other, and the last on the negations of both."""
+"""Situation types with random rules; the first two may depend on each other, the last on the negations of the first two."""
 RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 

@@ -86,7 +86,7 @@ def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -
 
 
 def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter]:
-    """Return the random world of a seed, and an interpreter of it.
+    """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------

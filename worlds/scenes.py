@@ -214,7 +214,7 @@ class _Scene:
         yield from self.nodes
 
     def as_update(self, one: Behavior) -> str | None:
-        """Return a behaviour as a SPARQL update, or None if an update can't express it."""
+        """Return a behaviour as a SPARQL update, or None if an update can't express the behaviour."""
         properties = {
             name: name.lower()
             for name, its in self.situations.items()

@@ -25,7 +25,7 @@ from worlds.mixed import RandomWorld
 
 
 def shrunk(world: RandomWorld, still: Callable[[RandomWorld], bool], seconds: float = 60.0) -> RandomWorld:
-    """Return a world from which no part can be removed while `still` holds, or the smallest one found in CPU `seconds`."""
+    """Return a world from which no part can be removed while `still` holds, or the smallest world found in CPU `seconds`."""
     end = process_time() + seconds
     again = True
     while again:

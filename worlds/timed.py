@@ -98,7 +98,7 @@ State = tuple[frozenset[int], frozenset[Running]]
 def timed_world(seed: int, constrained: bool = False, limited: bool = False) -> TimedWorld:
     """Return the random world of a seed.
 
-    With `constrained`, two literals may never hold together; with `limited`, it has deadlines and windows.
+    With `constrained`, two literals may never hold together; with `limited`, the world has deadlines and windows.
     """
     rng = Random(seed)
     while True:

@@ -143,7 +143,7 @@ class StateSpace:
         return fits
 
     def do(self, number: int, codes: Codes, fields: list[NDArray[np.int64]]) -> Iterator[Codes]:
-        """Yield the successors, by a grounded behaviour, of the states in which it is applicable."""
+        """Yield the successors, by a grounded behaviour, of the states in which the behaviour is applicable."""
         if self.trees[number] is UNSEEN:
             self.trees[number] = self.grown(number, UNSEEN, codes[0])
         waiting: list[tuple[Any, NDArray[np.int64] | None]] = [(self.trees[number], None)]

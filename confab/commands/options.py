@@ -37,7 +37,7 @@ FOLDER = click.Path(path_type=Path)
 
 
 class Output(click.Path):
-    """A file that a command writes, or ``-`` for standard output, which only the kinds in `TEXTS` may use.
+    """A file that a command writes, or ``-`` for standard output, to which only content of the kinds in `TEXTS` may go.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Output(click.Path):
 
 
 class Command(click.Command):
-    """A command that refuses an output file that is also an input or another output, and refuses stdin for two inputs."""
+    """A command that refuses one file as input and output, one file for two outputs, and stdin for two inputs."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; raise `UsageError` if one file, or stdin, is given for two purposes."""

@@ -344,10 +344,10 @@ def execute(
             noise=noise,
             both_hands=both_hands,
         )
-    if execution.episode.refuted and on is None:  # refusals of an external robot don't follow from the scene's geometry
+    if execution.episode.refuted and on is None:  # an external robot refuses for reasons outside the scene's geometry
         from confab.refuting import keep
 
-        met = {found.individual for found, _ in execution.episode.discovered}  # not in the scene of later calls
+        met = {found.individual for found, _ in execution.episode.discovered}  # unknown to later calls
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
         with undisturbed(memory):  # other processes may have changed the file during the episode

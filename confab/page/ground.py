@@ -68,7 +68,7 @@ def _too_many(number: int) -> Ground:
 
 
 def _furnished(embodiment: Embodiment) -> Ground:
-    """Return furniture and places of an embodiment as in the film, with the camera opposite the robots (`sim.picture.view_of`)."""
+    """Return furniture and places of an embodiment as the film shows them, with the camera opposite the robots."""
     if len(embodiment.places) > MOST_SPOTS:
         return _too_many(len(embodiment.places))
     from confab.sim.linkage import with_open_mechanisms

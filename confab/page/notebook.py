@@ -1,4 +1,4 @@
-"""HTML representations, in notebooks, of values of modules that contain no HTML (`register`)."""
+"""HTML representations in notebooks (`register`), for values whose own modules contain no HTML."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Row(TypedDict, total=False):
 
 
 class StepData(TypedDict, total=False):
-    """A step of the plan. The ID of a step is its path, joined by dots; the ID of its parent is a prefix."""
+    """A step of the plan. The step's ID is the path joined by dots, so the ID begins with the parent step's ID."""
 
     id: str
     number: str
@@ -54,7 +54,7 @@ class StepData(TypedDict, total=False):
 
 
 class Thing(TypedDict):
-    """An object on the map. Each element of `at` has a time, the place from then on (or an empty text), a sentence, and a tone."""
+    """An object on the map. Each element of `at` has a time, the object's place (or an empty text), a sentence, and a tone."""
 
     id: str
     label: str

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes if each lane has the primitives with one first argument. Otherwise all primitives share one lane."""
+"""Maximum number of lanes, where a lane has all primitives with the same first argument (such as a hand). With more
+first arguments, all primitives share one lane."""
 
 
 @dataclass(frozen=True)

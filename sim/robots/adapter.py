@@ -1,9 +1,9 @@
 """The world of an external robot; an interface describes calls and readings, and a transport performs them.
 
-Rule 1: only facts that the robot's world model shows are believed. Facts that the scene doesn't know are ignored.
-Rule 2: an action that exceeds its time limit, or that is stopped, is cancelled. The result of a cancelled action is ignored.
-Rule 3: a robot that doesn't confirm a cancellation is busy, and gets no further calls until the action has ended.
-Rule 4: if an exception such as Ctrl-C ends the wait for an action, `stop` itself cancels the action.
+Rule 1: the world observes only facts that the robot's world model shows. Facts about individuals outside the scene are
+ignored. Rule 2: an action that exceeds its time limit, or that is stopped, is cancelled. The result of a cancelled
+action is ignored. Rule 3: a robot that doesn't confirm a cancellation is busy, and gets no further calls until the
+action has ended. Rule 4: if an exception such as Ctrl-C ends the wait for an action, `stop` itself cancels the action.
 """
 
 from __future__ import annotations
