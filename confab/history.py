@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from confab.reasoner.files import made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.names import nearest
+from confab.reasoner.names import local_name, nearest
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def listed(those: Sequence[Run]) -> Table:
     figures = [run.figures() for run in those]
     names = tuple(dict.fromkeys(name for one in figures for name in one))
     rows = tuple(
-        (run.name, run.page["title"], run.when, *(one.get(name, "") for name in names))
+        (run.name, local_name(run.page["iri"]), run.when, *(one.get(name, "") for name in names))
         for run, one in zip(those, figures, strict=True)
     )
     return Table(("run", "scene", "when", *names), rows)
@@ -166,9 +166,16 @@ def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) ->
 
     by_name = _by_name(those, names)
     shown = [those.index(by_name[name]) for name in names] or [len(those) - 1]
-    told = [{"name": run.name, "when": run.when, "figures": run.figures(), "page": run.page} for run in those]
+    told = [{
+            "name": run.name,
+            "scene": local_name(run.page["iri"]),
+            "when": run.when,
+            "figures": run.figures(),
+            "page": run.page,
+        }
+        for run in those]
     return page_html({"title": title, "runs": told, "shown": shown}, title)
 
 
 def _text(value: object) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return ", ".join(map(_text, value)) if isinstance(value, list) else f"{value:g}" if isinstance(value, float) else str(value)

@@ -14,9 +14,9 @@ import pyoxigraph as ox
 
 from confab.accepting import Facts, Stated, several, sparql_of
 from confab.reasoner.graph.inference import infer
-from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.limits import within
-from confab.reasoner.names import GUESSING, Named, Names, RightNames, nearest, right_names
+from confab.reasoner.names import GUESSING, Named, Names, RightNames, local_name, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.reading.problem import Reading, read, read_names
 from confab.reasoner.symbols import Behavior, Fact, Problem
@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 GUESSING.append("confab.guessing")
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
+TITLE = """SELECT ?title {{ {{ <{0}> <http://purl.org/dc/terms/title> ?title . BIND(0 AS ?rank) }}
+  UNION {{ <{0}> rdfs:label ?title . BIND(1 AS ?rank) }} }}
+  ORDER BY ?rank DESC(LANGMATCHES(LANG(?title), "en")) ?title LIMIT 1"""
 
 
 @right_names("a scene", "confab.load(SCENE)")
@@ -86,6 +89,19 @@ class Known(metaclass=RightNames):
     def iri(self) -> str:
         """The IRI of the scene's ontology."""
         return self.knowledge.scene
+
+    @property
+    def title(self) -> str:
+        """The title of the scene: ``dcterms:title`` or ``rdfs:label`` of its ontology, otherwise the last part of its IRI.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").title
+        'Beverage serving'
+        """
+        rows = self.knowledge.select(TITLE.format(self.iri))
+        return text(rows[0][0]) if rows else local_name(self.iri)
 
     @property
     def problem(self) -> Problem:

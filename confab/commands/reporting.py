@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -49,6 +50,7 @@ def report(
             data = page_data(loaded, execution=loaded.read_episode(episode))
         elif plan is not None and verdicts is not None:
             data = page_data(loaded, report=loaded.read_report(verdicts, plan_in(plan, loaded)))
+            data["again"] = data["again"].replace("PLAN.json", quote(str(plan)))
         else:
             with progress("planning"):
                 data = page_data(loaded, loaded.plan(goal))

@@ -26,7 +26,6 @@ from confab.page.timeline import Bar, Timeline, of_episode, of_plan, of_rollout,
 from confab.planner.causal_links import purposes
 from confab.planner.plan import Plan, Step
 from confab.reasoner.graph.knowledge import KnowledgeError, text
-from confab.reasoner.names import local_name
 from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ def timeline_data(
     rows, hidden = rows_of(timeline, labels)
     data: PageData = {
         "format": FORMAT,
-        "title": labels.words.get(scene.iri) or local_name(scene.iri),
+        "title": scene.title,
         "iri": scene.iri,
         "end": axis_end(timeline),
         "unit": timeline.unit,

@@ -130,7 +130,7 @@ def alarm_of(
         ]
         meaning = CODES.get(failed.code or "", "")
         text = labels.sentence(plain(failed.note.removeprefix(f"{failed.code}: ")))
-        where = f"after {failed.begin:.1f} {timeline.unit}" + (f", in “{' › '.join(above)}”" if above else "")
+        where = f"at {failed.end:.1f} {timeline.unit}" + (f", in “{' › '.join(above)}”" if above else "")
         code = f"{failed.code}: {meaning}" if meaning else failed.code or ""
         return {
             "title": f"Failed: {labels.step(failed.step)}",
@@ -211,17 +211,19 @@ def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData
 
 
 def again_of(scene: Known, problem: Problem, report: Report | None, execution: Executed | None, physical: bool) -> str:
-    """Return the command that repeats a run."""
+    """Return the command that repeats a planning call, a verification or an execution."""
     path = scene.knowledge.path
     name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
     if execution is not None:
         people = [part for i, _ in execution.episode.interventions for part in ("--intervene", i.text)]
         return join(["confab", "execute", name, *(["--world", "pybullet"] if physical else []), *people])
-    wanted = problem.goal if report is None else report.goal
+    if report is not None:
+        many, seed = len(report.rollouts), report.rollouts[0].seed
+        options = [*(["--rollouts", str(many)] if many > 1 else []), *(["--seed", str(seed)] if seed else [])]
+        return join(["confab", "verify", name, "PLAN.json", *options])
     first = scene.problem.goal
-    goals = [str(Fact(symbol, value)) for symbol, value in sorted(wanted.items()) if first.get(symbol) != value]
-    seed = ["--seed", str(report.rollouts[0].seed)] if report is not None and report.rollouts[0].seed else []
-    return join(["confab", "plan" if report is None else "run", name, *(f"--goal={goal}" for goal in goals), *seed])
+    goals = [str(Fact(symbol, value)) for symbol, value in sorted(problem.goal.items()) if first.get(symbol) != value]
+    return join(["confab", "plan", name, *(f"--goal={goal}" for goal in goals)])
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rdflib
 from click.testing import CliRunner
 
 import confab
@@ -104,6 +105,7 @@ def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, Pa
     data = pages["failed"]
     assert (data["good"], data["status"]) == (False, "failed in physics")
     assert data["alarm"]["measured"] == [("joint lag", "4.94°")]
+    assert data["alarm"]["lines"][0].startswith("at 9.8 s")
     assert data["alarm"]["lines"][1].startswith("slip or drop")
     assert [bar["tone"] for row in data["rows"] if row["group"] == "actors" for bar in row["bars"]].count("failed") == 1
 
@@ -117,8 +119,19 @@ def test_every_kind_of_run_says_how_it_ended(pages: dict[str, PageData]) -> None
     assert (pages["none"]["good"], pages["none"]["status"]) == (False, "unsolvable")
     assert any("An independent checker" in line for line in pages["none"]["alarm"]["lines"])
     assert pages["learned"]["learned"]["rules"]
-    assert all(data["again"].startswith(("confab run", "confab execute", "confab plan")) for data in pages.values())
+    assert all(data["again"].startswith(("confab execute", "confab plan", "confab verify")) for data in pages.values())
+    assert pages["failed"]["again"] == "confab verify beverage-serving PLAN.json"
     assert pages["none"]["again"] == "confab plan beverage-serving '--goal=cup2 LOCATION location7'"
+
+
+def test_the_title_of_a_page_is_the_title_of_the_scene_s_ontology(
+    scene: confab.Scene, pages: dict[str, PageData]
+) -> None:
+    assert pages["plan"]["title"] == scene.title == "Beverage serving"
+    rdf = rdflib.Graph().parse(data="<https://x.org/kitchen> a <http://www.w3.org/2002/07/owl#Ontology> .")
+    assert confab.load(rdf).title == "kitchen"
+    rdf.add((rdflib.URIRef("https://x.org/kitchen"), rdflib.RDFS.label, rdflib.Literal("Our kitchen")))
+    assert confab.load(rdf).title == "Our kitchen"
 
 
 def test_a_colour_means_one_thing(serving_plan: confab.Result, pages: dict[str, PageData]) -> None:

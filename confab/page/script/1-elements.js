@@ -5,7 +5,7 @@ const FEW = 40, MANY = 200; // rows shown at first, and by each further click
 const UNFOLDED = 8; // most steps of the first level that stand open, most goals and most empty places that aren't folded
 const natural = new Intl.Collator("en", { numeric: true }).compare;
 const GROUPS = {
-  levels: "steps by level", actors: "primitives by actor", changes: "facts that change", wanted: "goals about facts that don't change", fixed: "other facts that don't change",
+  levels: "steps by level", actors: "primitives by actor", changes: "facts that change", wanted: "goals about unchanged facts", fixed: "other unchanged facts",
 };
 const TONES = [
   ["action", "step"], ["planned", "step not yet executed"], ["failed", "failed"], ["start", "initial value"],
@@ -27,13 +27,14 @@ const clear = (element, ...inner) => element.replaceChildren(...inner.flat(3).fi
 const lead = (id) => id.slice(0, Math.max(0, id.lastIndexOf(".")));
 const figure = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(1)).replace(/\.0$/, "");
 
-/** The width of a word in a lane of primitives, in pixels. */
+/** The width of words in pixels, by default in the font of a lane of primitives. */
 const wide = (() => {
   const pen = document.createElement("canvas").getContext("2d"), known = new Map();
-  return (word) => {
-    pen.font = "9.6px system-ui, sans-serif";
-    if (!known.has(word)) known.set(word, pen.measureText(word).width);
-    return known.get(word);
+  return (words, font = "9.6px") => {
+    const key = `${font} ${words}`;
+    pen.font = `${font} system-ui, -apple-system, "Segoe UI", sans-serif`;
+    if (!known.has(key)) known.set(key, pen.measureText(words).width);
+    return known.get(key);
   };
 })();
 

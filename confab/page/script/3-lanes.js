@@ -107,7 +107,7 @@ class Lanes {
 
   together(bars) {
     const begin = bars[0].begin, end = bars[bars.length - 1].end, tones = [...new Set(bars.map((bar) => bar.tone))];
-    return made("div", { class: `bar many ${tones.length === 1 ? tones[0] : "start"}`, title: `${bars.length} from ${figure(begin)} to ${figure(end)} ${this.page.data.unit}; a click zooms in`,
+    return made("div", { class: `bar many ${tones.length === 1 ? tones[0] : "mixed"}`, title: `${bars.length} from ${figure(begin)} to ${figure(end)} ${this.page.data.unit}; a click zooms in`,
       "data-from": begin, "data-to": end, style: `left:${this.share(begin)};width:max(3px, ${this.share(end - begin)})` });
   }
 

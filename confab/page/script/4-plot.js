@@ -110,7 +110,7 @@ class Plot {
     labels.sort((a, b) => Number(Boolean(b.first)) - Number(Boolean(a.first)) || Number(Boolean(a.optional)) - Number(Boolean(b.optional)));
     for (const label of labels) {
       const lines = label.lines || [label.words], line = 13, half = label.size + 3;
-      const w = Math.max(...lines.map((one) => one.length)) * (label.kind === "thing-name" ? 6.9 : 6.1) + 2, h = lines.length * line;
+      const font = label.kind === "thing-name" ? "700 12px" : "11px", w = Math.max(...lines.map((one) => wide(one, font))) + 4, h = lines.length * line;
       const up = [-w / 2, -half - h, "middle"], below = [-w / 2, half, "middle"], east = [half, -h / 2, "start"], west = [-half - w, -h / 2, "end"];
       const tries = label.anchors ? [[0, -10, "start"]] : label.kind === "thing-name" ? [up, below, east, west] : [below, up, east, west];
       let chosen = null;

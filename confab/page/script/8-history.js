@@ -9,7 +9,7 @@ const history = (element, data) => {
       if (event.target.checked) { chosen.add(number); if (chosen.size > 2) chosen.delete([...chosen][0]); } else chosen.delete(number);
       rows();
       show();
-    } }), ` ${run.name}`)), made("td", {}, run.page.title), made("td", {}, run.when.slice(0, 16).replace("T", " ")), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
+    } }), ` ${run.name}`)), made("td", {}, run.scene), made("td", {}, run.when.slice(0, 16).replace("T", " ")), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
     differ.map((name) => made("td", {}, value(run, name))))));
   const show = () => {
     const two = [...chosen].sort((a, b) => a - b).map((number) => data.runs[number]);
@@ -20,7 +20,7 @@ const history = (element, data) => {
       const line = (name, a, b) => made("tr", { class: a === b ? "" : "differs" }, made("th", { scope: "row" }, name), made("td", {}, a), made("td", {}, b));
       out.append(made("section", {}, made("h2", {}, `${one.name} and ${other.name} compared`), made("div", { class: "scroll" }, made("table", {},
         made("thead", {}, made("tr", {}, ["", one.name, other.name].map((words) => made("th", { scope: "col" }, words)))),
-        made("tbody", {}, line("verdict", one.page.status, other.page.status), names.map((name) => line(name, value(one, name), value(other, name)))))),
+        made("tbody", {}, line("verdict", one.page.status, other.page.status), names.filter((name) => value(one, name) || value(other, name)).map((name) => line(name, value(one, name), value(other, name)))))),
       made("p", { class: "changes" }, gone.map((words) => made("del", {}, words)), fresh.map((words) => made("ins", {}, words)),
         !gone.length && !fresh.length && made("span", { class: "note" }, "the steps of the first level are the same"))));
     }
@@ -28,7 +28,7 @@ const history = (element, data) => {
     for (const run of two) {
       const root = made("div", { class: "run" });
       out.append(root);
-      new Page(root, two.length === 2 ? { ...run.page, title: run.name, end } : run.page, null);
+      new Page(root, two.length === 2 ? { ...run.page, title: `${run.name}: ${run.page.title}`, end } : run.page, null);
     }
   };
   element.classList.add("confab");
