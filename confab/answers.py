@@ -90,8 +90,8 @@ def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mo
     """Return a plan as an indented tree of steps, or the reason why there is no plan."""
     result = planned(scene_of(folder, name), goals, facts, mode, seconds)
     if not result.solved:
-        return "\n".join([repr(result), *map(str, result.explain().proof)])
-    return "\n".join([repr(result).splitlines()[0], *(f"{'  ' * len(s.path)}{s}" for s in result.plan.walk())])
+        return "\n".join([str(result), *map(str, result.explain().proof)])
+    return "\n".join([repr(result), *(f"{'  ' * len(s.path)}{s}" for s in result.plan.walk())])
 
 
 def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
@@ -143,7 +143,7 @@ def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: i
     with within(seconds):
         result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
         if not result.solved:
-            return repr(result)
+            return str(result)
         report = result.verify(rollouts, seed, time_limit=seconds)
     steps = ("\t".join(cell or "" for cell in row) for row in report.table())
     return "\n".join(

@@ -24,7 +24,7 @@ CLASSES = {
     "plan": "confab.planner.plan.Plan",
     "step": "confab.planner.plan.Step",
     "outcome": "confab.planner.plan.Outcome",
-    "timed": "confab.planner.timed.plan.TimedPlan",
+    "schedule": "confab.planner.timed.plan.TimedPlan",
     "labels": "confab.labels.Labels",
     "report": "confab.physics.Report",
     "execution": "confab.execution.Execution",
@@ -33,13 +33,31 @@ CLASSES = {
     "memory": "confab.memory.Memory",
     "problem": "confab.reasoner.symbols.Problem",
     "domain": "confab.reasoner.symbols.Domain",
+    "behaviour": "confab.reasoner.symbols.Behavior",
+    "situation": "confab.reasoner.symbols.SituationType",
+    "symbol": "confab.reasoner.symbols.Symbol",
+    "fact": "confab.reasoner.symbols.Fact",
+    "rollout": "confab.sim.verify.Rollout",
+    "entry": "confab.sim.verify.StepReport",
+    "verdict": "confab.sim.verdict.Verdict",
+    "reason": "confab.planner.plan.Reason",
+    "explanation": "confab.why.Because",
+    "embodiment": "confab.reasoner.embodiment.values.Embodiment",
 }
 WAYS: Mapping[str, Mapping[str, str]] = {
     "confab": {"scene": "load(SCENE)"},
-    "scene": {"result": "plan()", "report": "verify()", "execution": "execute()", "problem": "problem"},
-    "result": {"plan": "plan", "outcome": "outcome", "timed": "timed", "labels": "labels"},
+    "scene": {
+        "result": "plan()",
+        "report": "verify()",
+        "execution": "execute()",
+        "problem": "problem",
+        "embodiment": "embodiment",
+    },
+    "result": {"plan": "plan", "outcome": "outcome", "schedule": "timed", "labels": "labels"},
     "execution": {"episode": "episode"},
     "problem": {"domain": "domain"},
+    "entry": {"verdict": "verdict"},
+    "fact": {"symbol": "symbol"},
 }
 """The attribute or the call that leads from an object to another object, by the kinds of the two objects."""
 MEANINGS = """

@@ -78,6 +78,13 @@ SHOW = (
     "description summary info repr signature as_string as_text to_text"
 )
 SCENE = {
+    "title": "label name caption heading display_name labelled get_label get_title get_name comment description_text",
+    "knowledge.prefixes": "prefixes namespaces namespace prefix ns prefix_map bind namespace_manager",
+    "graph.serialize(FILE)": "serialize serialise save write dump write_ttl to_file save_as store export_owl to_owl_file "
+    "export_ttl save_scene write_file write_graph",
+    "query(TEXT), which reads inferred facts": "inferred inferred_graph infer reason reasoner run_reasoner entailments "
+    "entailed materialize materialise closure owlrl expand",
+    "query(TEXT), or plan()": "search",
     "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch question queries "
     "get_results",
     "with_fact": "add_fact set_fact set add assert_fact update change tell put set_value set_initial_value "
@@ -88,17 +95,20 @@ SCENE = {
     "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
     "clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
     "achieve_goal",
-    "graph.add(TRIPLE)": "add_triple add_object add_individual new_individual add_instance insert_object "
-    "create_object add_node remove_object remove_triple delete_object destroy_entity add_edge remove_individual "
-    "add_objects add_class add_behavior add_action spawn add_fluent remove_node add_statement add_rule add_axiom "
+    "graph.remove(TRIPLE)": "remove_object remove_triple delete_object destroy_entity remove_individual remove_node "
+    "remove_objects delete_individual destroy",
+    "graph.add(TRIPLE)": "set_pose add_triple add_object add_individual new_individual add_instance insert_object "
+    "create_object add_node add_edge "
+    "add_objects add_class add_behavior add_action spawn add_fluent add_statement add_rule add_axiom "
     "add_constraint add_location add_robot add_type add_property parse_into extend",
-    "graph": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise save write dump to_ttl to_turtle "
-    "subjects predicates_of to_owl_file store to_json json to_dict save_as write_ttl to_json_ld to_file turtle ttl "
-    "bind namespace_manager value_of triples_of statements quads to_networkx nodes edges networkx to_string "
-    "export_ttl n3 as_dict subject_objects predicate_objects knowledge_graph inferred inferred_graph axioms "
-    "neighbors neighbours labels comments annotations export_owl to_owl_xml dataset namespaces_graph "
+    "graph": "triples to_yaml yaml rdf to_rdf to_graph rdflib as_graph to_ttl to_turtle "
+    "subjects predicates_of to_json json to_dict to_json_ld turtle ttl "
+    "value_of triples_of statements quads to_networkx nodes edges networkx to_string "
+    "n3 as_dict subject_objects predicate_objects knowledge_graph axioms "
+    "neighbors neighbours labels comments annotations to_owl_xml dataset namespaces_graph "
     "property_values",
-    "plan": "solve find_plan search make_plan planner plan_to run_planner get_plan replan compute_plan plan_for "
+    "plan": "find_path plan_path plan_motion "
+    "solve find_plan make_plan planner plan_to run_planner get_plan replan compute_plan plan_for "
     "solve_for astar policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal plans "
     "plan_all possible_plans all_plans plan_with plan_tree",
     "verify": "simulate simulation check check_plan validate_plan physics rollout verify_plan rollouts test "
@@ -111,7 +121,8 @@ SCENE = {
     "objects": "individuals all_objects instances things entities get_objects instances_of objects_of_type "
     "nodes_of_type members subjects_of items object user_objects get_instances names_of_objects constants "
     "list_objects bodies search_objects get_individual get_object find_object object_names names_of",
-    "facts": "state initial initial_state init get_state observe values initial_values explicit_initial_values "
+    "facts": "start_state perceive sense "
+    "state initial initial_state init get_state observe values initial_values explicit_initial_values "
     "initial_value observation get_value initial_facts get_fact holds true_facts world_state fact value get_initial "
     "belief is_true check_fact fluent_values get_facts current_facts init_state atoms initial_defaults literals "
     "static_facts obs get_obs get_property predicate_values has_fact where get_location location_of position_of "
@@ -146,7 +157,7 @@ SCENE = {
     "embodiment.robots": "robot robots get_robot robot_model",
     "embodiment": "arms body urdf gripper joints geometry kinematics meshes poses workspace links arm agents camera "
     "cameras shapes hands sensors table",
-    "iri": "name uri base_iri namespace identifier namespaces prefixes ns base url id title label",
+    "iri": "uri base_iri identifier base url id",
     "knowledge.path": "path file filename source location folder",
     "serve": "endpoint server start_server web api host http app rest open_page browser",
     "board": "widget editor interactive gui ui dashboard notebook",
@@ -155,8 +166,7 @@ SCENE = {
     "reload loads import_file from_pddl from_ttl read_file from_json from_dict from_path from_url include reset "
     "restore undo from_name create make build new from_scene from_yaml from_owl from_text",
     "confab.validate(FILE)": "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
-    "reason sync_reasoner infer warnings check_scene inconsistent_classes validation problems consistency reasoner "
-    "run_reasoner",
+    "sync_reasoner warnings check_scene inconsistent_classes validation problems consistency",
     "confab.generate(FAMILY)": "generate random sample random_scene",
     "confab.Memory.of(scene).learn(scene, plan)": "learn memory train experience fit remember teach learn_from",
     "plan().report(FILE)": "report html page to_html write_report save_report",
@@ -184,6 +194,7 @@ SCENE = {
     "graph.update(TEXT)": "sparql_update update_query execute_update run_update insert_data delete_data",
 }
 RESULT = {
+    "scene.graph": "rdf rdflib triples turtle to_rdf to_ttl",
     "plan.steps": "steps actions action_list sequence get_steps action_names step list_actions action_sequence "
     "solution actions_sequence step_names top_level first abstract_plan to_plan first_step actions_list next_action",
     "plan.primitives": "primitives leaves low_level flat flatten primitive_actions commands motions atomic "
@@ -260,8 +271,8 @@ PLAN = {
     "to_networkx()": "graph networkx to_graph nx digraph tree edges dag as_graph hierarchy",
     "to_dot()": "dot graphviz to_graphviz draw plot render pydot png visualize visualise figure image",
     "to_dataframe()": "dataframe df to_pandas table to_table pandas",
-    "to_records()": "json to_json to_dict as_dict dict records rows to_csv dumps serialize to_dicts data as_json csv "
-    "to_yaml",
+    "json()": "to_json to_dict as_dict dict dumps serialize data as_json to_yaml asdict jsonable",
+    "to_records()": "records rows to_csv to_dicts csv",
     "index(STEP)": "find position locate index_of find_step get",
     "scene.verify(plan)": "verify simulate check validate physics rollout is_valid valid simulation test check_plan "
     "is_applicable evaluate validate_plan",
@@ -333,7 +344,7 @@ STEP = {
     "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor done "
     "execute_step completed executed started",
     "print(step)": SHOW,
-    "vars(step)": "to_dict as_dict json to_json dict asdict serialize data to_record items keys",
+    "json()": "to_dict as_dict to_json dict asdict serialize data to_record items keys",
     "step == other": COMPARE,
     "copy.deepcopy(step)": COPY,
     "plan.index(step)": "next previous next_step prev previous_step successors predecessors before after sibling "
@@ -439,20 +450,93 @@ TABLE = {
     "dataframe().to_html()": "to_html html",
 }
 PROBLEM = {
-    "domain.behaviors": "actions operators behaviors behaviours action schemas action_schemas",
-    "domain.situations": "fluents predicates situations situation_types fluent",
-    "initial": "init initial_state initial_values state explicit_initial_values facts initial_facts",
-    "goal": "goals goal_state target objective tasks goal_facts",
-    "individuals": "objects all_objects instances constants user_objects",
-    "classes": "types user_types sorts kinds",
+    "domain.behaviors": "actions operators behaviors behaviours action schemas action_schemas skills",
+    "domain.situations": "fluents predicates situations situation_types fluent properties state_variables",
+    "initial": "init initial_state initial_values state explicit_initial_values facts initial_facts start start_state",
+    "goal": "goals goal_state target objective tasks goal_facts goal_condition",
+    "individuals": "objects all_objects instances constants user_objects things",
+    "classes": "types user_types sorts kinds hierarchy",
+    "scene": "name iri title label uri",
+    "relations": "static statics static_facts",
+}
+DOMAIN = {
+    "behaviors": "actions operators behaviours action schemas action_schemas skills behavior methods",
+    "situations": "fluents predicates situation_types fluent properties types state_variables",
+    "rules": "axioms derived derived_predicates",
+    "constraints": "invariants",
 }
 BEHAVIOR = {
-    "preconditions": "conditions precondition pre requires condition requirements when",
-    "effects": "effect add_effects del_effects postconditions changes adds deletes post add del_ outcomes",
-    "parameters": "args arguments params signature inputs",
-    "cost": "price metric",
+    "preconditions": "conditions precondition pre requires condition requirements when precond guard needs",
+    "effects": "effect add_effects del_effects postconditions changes adds deletes post add del_ outcomes results "
+    "postcondition add_list delete_list",
+    "parameters": "args arguments params signature inputs parameter objects",
+    "variables": "bindings free_variables determined",
+    "cost": "price metric weight reward",
     "level": "layer depth abstraction",
     "timing": "duration time durations",
+    "name": "label iri id title",
+    "scene.affordances()": "ground instances groundings applicable is_applicable possible",
+    "scene.quantifying_query(NAME)": "query sparql",
+}
+SITUATION = {
+    "arguments": "args parameters params signature domain arity subjects objects",
+    "range": "values type codomain kind value_type options domain_of_values",
+    "name": "label iri id title",
+    "properties": "property predicate predicates",
+    "rest": "rest_value",
+    "default": "default_value initial",
+}
+SYMBOL = {
+    "situation": "predicate property name type fluent kind functor situation_type relation p",
+    "arguments": "args parameters params objects subject terms object s",
+    "scene.facts": "value values initial o",
+}
+FACT = {
+    "symbol": "fluent key variable atom lhs",
+    "symbol.situation": "predicate property name type situation fluent_name relation p",
+    "symbol.arguments": "args arguments parameters params objects subject terms s",
+    "value": "object values rhs o target",
+    "str(fact)": SHOW,
+}
+OUTCOME = {
+    "search": "statistics stats expansions nodes metrics log_messages expanded generated evaluated nodes_expanded",
+    "status": "solved success result success_code is_solved found ok",
+    "reason": "error message why explanation failure",
+    "seconds": "time duration elapsed runtime planning_time search_time",
+    "plan": "steps solution actions",
+}
+EPISODE = {
+    "done": "steps actions executed plan executed_steps performed trace",
+    "planned": "original_plan first_plan initial_plan",
+    "events": "log history observations records timeline trajectory",
+    "observed": "final_state state end_state final last_state",
+    "initial": "initial_state start_state init",
+    "status": "success succeeded reached result solved done_status outcome",
+    "reasons": "reason error why message",
+    "seconds": "time duration elapsed runtime",
+    "execution.save(FILE)": "save write dump to_file to_json json",
+    "len(episode.events)": "length size count n_steps",
+    "scene.execute()": "run execute replay resume",
+}
+ROLLOUT = {
+    "ok": "success succeeded verified passed valid status result",
+    "steps": "reports verdicts results primitives actions",
+    "failure": "error failed first_failure reason why fault",
+    "cpu_seconds": "time duration elapsed seconds runtime",
+    "state": "final_state observed facts end_state",
+    "as_json()": "json to_json to_dict as_dict",
+}
+VERDICT = {
+    "ok": "success succeeded verified passed valid status result",
+    "code": "failure_code error error_code kind failure",
+    "message": "reason why text explanation description",
+    "measured": "measurements numbers values metrics",
+    "as_json()": "json to_json to_dict as_dict",
+}
+SCHEDULE = {
+    "makespan": "duration length total_time end cost total_duration",
+    "slots": "steps actions timed_actions entries items intervals bars",
+    "bound": "lower_bound optimal",
 }
 HINTS: Mapping[str, Mapping[str, str]] = {
     "confab": MODULE,
@@ -465,7 +549,16 @@ HINTS: Mapping[str, Mapping[str, str]] = {
     "memory": MEMORY,
     "table": TABLE,
     "problem": PROBLEM,
-    "behavior": BEHAVIOR,
+    "domain": DOMAIN,
+    "behaviour": BEHAVIOR,
+    "situation": SITUATION,
+    "symbol": SYMBOL,
+    "fact": FACT,
+    "outcome": OUTCOME,
+    "episode": EPISODE,
+    "rollout": ROLLOUT,
+    "verdict": VERDICT,
+    "schedule": SCHEDULE,
 }
 """The tables of wrong names, by kind of object."""
 COMMANDS = {

@@ -166,16 +166,24 @@ def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) ->
 
     by_name = _by_name(those, names)
     shown = [those.index(by_name[name]) for name in names] or [len(those) - 1]
-    told = [{
+    told = [
+        {
             "name": run.name,
             "scene": local_name(run.page["iri"]),
             "when": run.when,
             "figures": run.figures(),
             "page": run.page,
         }
-        for run in those]
+        for run in those
+    ]
     return page_html({"title": title, "runs": told, "shown": shown}, title)
 
 
 def _text(value: object) -> str:
-    return ", ".join(map(_text, value)) if isinstance(value, list) else f"{value:g}" if isinstance(value, float) else str(value)
+    return (
+        ", ".join(map(_text, value))
+        if isinstance(value, list)
+        else f"{value:g}"
+        if isinstance(value, float)
+        else str(value)
+    )

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from confab.formats import OutcomeJson, StepJson
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
@@ -21,18 +21,7 @@ DEEPEST = 50
 
 def step_json(step: Step) -> StepJson:
     """Return a step with its sub-steps as JSON data."""
-    data: StepJson = {
-        "path": list(step.path),
-        "id": step.id,
-        "level": step.level,
-        "behavior": step.behavior,
-        "arguments": list(step.arguments),
-        "bindings": dict(step.bindings),
-        "steps": [step_json(below) for below in step.steps],
-    }
-    if step.rank is not None:
-        data["rank"] = round(step.rank, 6)
-    return data
+    return cast("StepJson", step.json())
 
 
 def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:

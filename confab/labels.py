@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from confab.planner.plan import Step
 from confab.reasoner.graph.knowledge import KnowledgeGraph, text
-from confab.reasoner.names import Names
+from confab.reasoner.names import Names, brief, known_as
 from confab.reasoner.sentences import denied, said
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
 
@@ -31,6 +31,8 @@ AT_ONCE = 400
 """Maximum number of terms in one query for labels."""
 
 
+@known_as("the labels")
+@brief
 @dataclass(frozen=True)
 class Labels:
     """Labels of terms by name (`words`), and labels of value properties by situation type (`verbs`)."""

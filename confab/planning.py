@@ -24,7 +24,7 @@ from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, LimitError, within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import RightNames, right_names
+from confab.reasoner.names import CalledFloat, RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
@@ -541,7 +541,7 @@ class Result(metaclass=RightNames):
         """
         from confab.planner.plan_costs import cost_of
 
-        return float(cost_of(self.problem, self.plan))
+        return CalledFloat(cost_of(self.problem, self.plan))
 
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.
@@ -597,6 +597,12 @@ class Result(metaclass=RightNames):
         return plan_tree(self.plan, "\n".join((summary(self.outcome), *more)))
 
     def __repr__(self) -> str:
+        """Return the outcome in one line."""
+        from confab.show import summary
+
+        return summary(self.outcome).split("\n")[0]
+
+    def __str__(self) -> str:
         """Return the summary and the first-level steps."""
         from confab.show import summary
 

@@ -19,7 +19,7 @@ from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import check
-from confab.reasoner.names import nearest
+from confab.reasoner.names import known_as, nearest
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 from confab.worded import worded_behavior, worded_fact
@@ -41,6 +41,7 @@ SHOWN = 3
 """Maximum number of listed reasons for a step."""
 
 
+@known_as("an explanation")
 @dataclass(frozen=True)
 class Because:
     """The reasons why a step is in a plan: its effects (`gives`), and the steps and goals that need these effects (`needs`).
@@ -105,6 +106,7 @@ class Because:
         )
 
 
+@known_as("an explanation")
 @dataclass(frozen=True)
 class WhyNot:
     """The reasons why an alternative isn't in the plan.
@@ -158,6 +160,7 @@ class WhyNot:
         )
 
 
+@known_as("an explanation")
 @dataclass(frozen=True)
 class Account:
     """An explanation of each step of a plan, or of the reason why there is no plan.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol, overload
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
-from confab.reasoner.names import RightNames, right_names
+from confab.reasoner.names import CalledDict, CalledTuple, RightNames, brief, known_as, right_names
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class Status(Enum):
     GAVE_UP = "gave-up"  # a limit came first
 
 
+@brief
 @right_names("a step")
 @dataclass(frozen=True)
 class Step:
@@ -58,6 +59,19 @@ class Step:
         while waiting:
             yield (step := waiting.pop())
             waiting += reversed(step.steps)
+
+    def json(self) -> dict[str, object]:
+        """Return the step with its sub-steps as JSON data (docs/command-line.md)."""
+        data: dict[str, object] = {
+            "path": list(self.path),
+            "id": self.id,
+            "level": self.level,
+            "behavior": self.behavior,
+            "arguments": list(self.arguments),
+            "bindings": dict(self.bindings),
+            "steps": [below.json() for below in self.steps],
+        }
+        return data if self.rank is None else {**data, "rank": round(self.rank, 6)}
 
     def __str__(self) -> str:
         """Return the step in the form of the paper's figures, for example ``22 B1_MOVE cup1 location7``."""
@@ -140,13 +154,25 @@ class Plan(Sequence[Step], metaclass=RightNames):
     @property
     def primitives(self) -> tuple[Step, ...]:
         """The steps without sub-steps; a robot executes these steps."""
-        return tuple(step for step in self.walk() if not step.steps)
+        return CalledTuple(step for step in self.walk() if not step.steps)
 
     @property
     def length(self) -> dict[int, int]:
         """Number of steps per level."""
         levels = [step.level for step in self.walk()]
-        return {level: levels.count(level) for level in sorted(set(levels))}
+        return CalledDict((level, levels.count(level)) for level in sorted(set(levels)))
+
+    def json(self) -> dict[str, object]:
+        """Return the plan as JSON data, which `confab.Scene.read_plan` reads from a file.
+
+        Examples
+        --------
+        >>> import json, confab
+        >>> print(json.dumps(confab.load("beverage-serving").plan().plan.json())[:62])
+        {"length": {"1": 4, "2": 10, "3": 32}, "steps": [{"path": [0],
+        """
+        lengths = {str(level): count for level, count in self.length.items()}
+        return {"length": lengths, "steps": [step.json() for step in self.steps]}
 
     def to_networkx(self) -> networkx.DiGraph[tuple[int, ...]]:
         """Return the plan as a directed graph whose nodes are the paths of the steps.
@@ -213,6 +239,7 @@ class Counts:
         self.expanded += other.expanded
 
 
+@known_as("a reason")
 @dataclass(frozen=True)
 class Reason:
     """The reason why a call returns no plan.
@@ -285,6 +312,8 @@ class Forgone:
         return f"{self.fact} (weight {written(self.weight)}; {more})"
 
 
+@known_as("an outcome")
+@brief
 @dataclass(frozen=True)
 class Outcome:
     """The result of a planning call.

@@ -5,7 +5,9 @@ from __future__ import annotations
 from abc import ABCMeta
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import MISSING, fields
 from difflib import get_close_matches
+from fractions import Fraction
 from functools import wraps
 from importlib import import_module
 from inspect import getattr_static, signature
@@ -16,6 +18,7 @@ C = TypeVar("C", bound=type)
 P = ParamSpec("P")
 R = TypeVar("R")
 V = TypeVar("V")
+W = TypeVar("W")
 
 
 class Names:
@@ -52,6 +55,10 @@ class Names:
         """The IRIs with short names."""
         return self._names.keys()
 
+    def __repr__(self) -> str:
+        """Return the number of names."""
+        return f"Names of {len(self._iris)} terms"
+
     def agree(self, other: Names) -> bool:
         """Return whether all IRIs have the same short names in another mapping."""
         return all(other._names.get(iri) == name for iri, name in self._names.items())
@@ -61,7 +68,27 @@ class Names:
         return name in self._iris
 
 
-class Named(dict[str, V]):
+class Called:
+    """A value that can also be called and then returns itself, since other libraries have methods in place of properties."""
+
+    def __call__(self: V) -> V:
+        """Return the value itself."""
+        return self
+
+
+class CalledFloat(float, Called):
+    """A number that can also be called."""
+
+
+class CalledDict(dict[V, W], Called):
+    """A dictionary that can also be called."""
+
+
+class CalledTuple(tuple[V, ...], Called):
+    """A tuple that can also be called."""
+
+
+class Named(dict[str, V], Called):
     """A mapping that can't be edited. Its `KeyError` for a missing name suggests the most similar name."""
 
     def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:
@@ -76,10 +103,6 @@ class Named(dict[str, V]):
         """Raise `AttributeError`; for a key, the message shows how its value is accessed."""
         hint = f"; use [{name!r}]" if name in self else ""
         raise AttributeError(f"a mapping of names has no attribute {name!r}{hint}")
-
-    def __call__(self) -> Named[V]:
-        """Return the mapping itself, since other libraries have methods in place of such properties."""
-        return self
 
     if not TYPE_CHECKING:
 
@@ -148,10 +171,7 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
     """
 
     def decorated(cls: C) -> C:
-        def lacking(self: object, name: str) -> NoReturn:
-            raise WrongNameError(kind, name, type(self))
-
-        type.__setattr__(cls, "_kind", kind)
+        known_as(kind)(cls)
 
         def settable(self: object, name: str, value: object) -> None:
             place = getattr_static(cls, name, None)
@@ -164,7 +184,6 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
 
         if getattr_static(cls, "__setattr__") is object.__setattr__:  # the class isn't frozen
             type.__setattr__(cls, "__setattr__", settable)
-        type.__setattr__(cls, "__getattr__", lacking)  # hidden from type checkers, which report wrong names
         if made:
             begin: Callable[..., None] = getattr(cls, "__init__")  # noqa: B009 - type checkers mistrust it of a class
 
@@ -185,6 +204,55 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
         return cls
 
     return decorated
+
+
+def known_as(kind: str) -> Callable[[C], C]:
+    """Return a class decorator that adds the correct name to errors for unknown attributes of a value.
+
+    In contrast to `right_names`, the methods and the construction of the class stay as fast as they are.
+    """
+
+    def decorated(cls: C) -> C:
+        def lacking(self: object, name: str) -> NoReturn:
+            raise WrongNameError(kind, name, type(self))
+
+        type.__setattr__(cls, "_kind", kind)
+        type.__setattr__(cls, "__getattr__", lacking)  # hidden from type checkers, which report wrong names
+        return cls
+
+    return decorated
+
+
+LONG = 60
+"""Maximum length of a field in the representation of a value by `brief`."""
+
+
+def brief(cls: C) -> C:
+    """Represent the values of a dataclass in one line: long collections by their length; empty and default fields are left out."""
+
+    def represented(self: object) -> str:
+        told = []
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            many = len(value) if isinstance(value, Collection) and not isinstance(value, str) else None
+            if (
+                not field.repr
+                or many == 0
+                or value is None
+                or (field.default is not MISSING and value == field.default)
+            ):
+                continue
+            text = "" if many is not None and many > LONG else repr(value).split("\n")[0].rstrip(":")
+            if isinstance(value, float | Fraction):
+                text = f"{float(value):.3g}"
+            if text and len(text) <= LONG:
+                told.append(f"{field.name}={text}")
+            else:
+                told.append(f"{field.name}={type(value).__name__}(…)" if many is None else f"{field.name}: {many}")
+        return f"{type(self).__name__}({', '.join(told)})"
+
+    type.__setattr__(cls, "__repr__", represented)
+    return cls
 
 
 def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:

@@ -28,11 +28,13 @@ from math import prod
 from typing import TypeAlias
 
 from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
+from confab.reasoner.names import brief, known_as
 
 TRUE = "true"
 FALSE = "false"
 
 
+@known_as("a symbol")
 @dataclass(frozen=True, order=True)
 class Symbol:
     """A situated object symbol ``<o, S>``: a situation type with its arguments, of which the first is the object."""
@@ -45,6 +47,7 @@ class Symbol:
         return f"<{', '.join((*self.arguments, self.situation))}>"
 
 
+@known_as("a fact")
 @dataclass(frozen=True, order=True)
 class Fact:
     """A situated object instance ``<o, s>``: a symbol with a value."""
@@ -80,6 +83,8 @@ class Perceived:
     special: tuple[tuple[str, str], ...] = ()
 
 
+@known_as("a situation")
+@brief
 @dataclass(frozen=True)
 class SituationType:
     """A property of objects that varies between states; the situation type is also the class of the property's values.
@@ -309,6 +314,8 @@ class Parameter:
     kind: str
 
 
+@known_as("a behaviour")
+@brief
 @dataclass(frozen=True)
 class Behavior:
     """A lifted behaviour (action schema).
@@ -473,6 +480,8 @@ class GroundBehavior:
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
+@known_as("a domain")
+@brief
 @dataclass(frozen=True)
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
@@ -498,6 +507,8 @@ class Domain:
         return tuple(b for b in self.behaviors.values() if b.level == level)
 
 
+@known_as("a problem")
+@brief
 @dataclass(frozen=True)
 class Problem:
     """A planning problem: a scene with its domain, initial state and goal.

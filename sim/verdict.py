@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypedDict
 
+from confab.reasoner.names import brief, known_as
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact
 
@@ -67,6 +68,8 @@ class RolloutJson(TypedDict):
     believed: list[str]
 
 
+@known_as("a verdict")
+@brief
 @dataclass(frozen=True)
 class Verdict:
     """The result of a step in the world.

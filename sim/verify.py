@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from confab.planner.validation import successor
 from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.names import brief, known_as
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State
 from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
@@ -19,6 +20,8 @@ LOOKS = 3
 """Maximum number of observations, with noisy perception, until a difference from the expected state counts."""
 
 
+@known_as("an entry")
+@brief
 @dataclass(frozen=True)
 class StepReport:
     """A primitive, its verdict, and its duration in simulated seconds."""
@@ -32,6 +35,8 @@ class StepReport:
         return {"path": list(self.step.path), "id": self.step.id, **self.verdict.as_json()}
 
 
+@known_as("a rollout")
+@brief
 @dataclass(frozen=True)
 class Rollout:
     """One execution of a plan.

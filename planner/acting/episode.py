@@ -8,6 +8,7 @@ from enum import Enum
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Plan, Reason, Step
+from confab.reasoner.names import brief, known_as
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
@@ -149,6 +150,8 @@ class Replan:
         return self.dropped + self.added
 
 
+@known_as("an episode")
+@brief
 @dataclass(frozen=True)
 class Episode:
     """An episode: the plan, the executed steps, the observations, the interventions, and the changes of the plan.

@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from confab.planner.plan import Plan, Step
+from confab.reasoner.names import brief, known_as
 
 THESE_STEPS = "these steps"
 """The name of a lower bound on all schedules of the same steps.
@@ -32,6 +33,8 @@ class Slot:
         return not self.slack
 
 
+@known_as("a schedule")
+@brief
 @dataclass(frozen=True)
 class TimedPlan:
     """A plan with a schedule of its primitives.

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from confab.reasoner.names import brief, known_as
+
 Vector: TypeAlias = tuple[float, float, float]
 Color: TypeAlias = tuple[float, float, float, float]
 Flaw: TypeAlias = tuple[str, str, str, str]
@@ -300,6 +302,8 @@ class PerceiverUse:
     asked: tuple[tuple[str, ...], ...] = ()
 
 
+@known_as("an embodiment")
+@brief
 @dataclass(frozen=True)
 class Embodiment:
     """The robots, furniture, objects, skills and perceivers of a scene; the keys of mappings are names in declared order."""

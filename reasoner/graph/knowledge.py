@@ -23,7 +23,7 @@ import pyoxigraph as ox
 from confab import ontology
 from confab.reasoner.graph.documents import DocumentError, document
 from confab.reasoner.limits import check
-from confab.reasoner.names import nearest
+from confab.reasoner.names import brief, nearest
 from confab.reasoner.vocabulary import CORE, OWL, PREFIXES, TYPE
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ def text(term: Term) -> str:
     return term.value if term is not None else ""
 
 
+@brief
 @dataclass
 class KnowledgeGraph:
     """A scene and all ontologies that it imports.

@@ -25,7 +25,7 @@ from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import check
-from confab.reasoner.names import Names
+from confab.reasoner.names import Names, brief
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
 from confab.reasoner.reading.frame import Frame, frame, names_of
 from confab.reasoner.reading.goals import with_task
@@ -51,6 +51,7 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 }"""
 
 
+@brief
 @dataclass(frozen=True)
 class Reading:
     """A scene as a planning problem, with the mapping from the problem's names to IRIs.

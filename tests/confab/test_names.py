@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import builtins
 import copy
+import json
 import pickle
 import re
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 import confab
 from confab.cli import main
-from confab.guessing import guessed
+from confab.guessing import CLASSES, guessed
 from confab.hints import COMMANDS, HINTS
 from confab.planner.plan import Plan
+from confab.planner.timed.plan import TimedPlan
 from confab.reasoner.symbols import Fact
+from confab.sim.verdict import Verdict
+from confab.sim.verify import Rollout, StepReport
 
 
 @pytest.fixture(scope="module")
@@ -48,24 +53,35 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
 @pytest.fixture(scope="module")
 def things(scene: confab.Scene, result: confab.Result) -> dict[str, object]:
     """One object of each kind that has a table of wrong names and is made without physics."""
+    problem, execution = scene.problem, scene.execute(result)
+    symbol = next(iter(problem.goal))
+    rollout = Rollout(0, True, (StepReport(result.plan.primitives[0], Verdict(True), 1.0),), (), 1.0, 1.0)
     return {
         "confab": confab,
         "scene": scene,
         "result": result,
         "plan": result.plan,
         "step": result.plan[0],
-        "execution": scene.execute(result),
+        "outcome": result.outcome,
+        "execution": execution,
+        "episode": execution.episode,
         "memory": confab.Memory.of(scene),
         "table": scene.query("where-is-everything"),
-        "problem": scene.problem,
-        "behavior": scene.behaviors["B1_MOVE"],
+        "problem": problem,
+        "domain": problem.domain,
+        "behaviour": scene.behaviors["B1_MOVE"],
+        "situation": problem.domain.situations[symbol.situation],
+        "symbol": symbol,
+        "fact": Fact(symbol, problem.goal[symbol]),
+        "report": confab.Report(result.plan, problem.goal, (rollout,)),
+        "rollout": rollout,
+        "verdict": Verdict(True),
+        "schedule": TimedPlan(Plan(()), ()),
     }
 
 
 def test_each_wrong_name_in_a_table_says_the_right_one(things: dict[str, object]) -> None:
     for kind, there in things.items():
-        if kind in ("problem", "behavior"):  # they are reached through other objects
-            continue
         for right, names in HINTS[kind].items():
             for name in names.split():
                 if not hasattr(there, name):
@@ -133,7 +149,7 @@ GUESSED = {
     "scene": "replan:plan plan_for:plan remove_fact:with_fact initial_facts:facts get_fact:facts "
     "behavior:behaviors schema:behaviors relations:problem.relations to_turtle:graph validate:confab.validate why:explain "
     "report:plan().report monte_carlo:verify "
-    "map:picture namespaces:iri step_through:execute learn:Memory.of(scene).learn",
+    "map:picture namespaces:knowledge.prefixes step_through:execute learn:Memory.of(scene).learn",
     "result": "makespan:timed schedule:timed plan_length:plan.length expanded:outcome.search planning_time:seconds "
     "is_optimal:outcome.bound visualise:report policy:plan",
     "plan": "num_steps:length save:result.save cost:result.cost makespan:result.timed subplans:steps",
@@ -319,3 +335,29 @@ def test_an_unknown_option_names_another_one_an_argument_or_a_command(
     refused: Refused, line: list[str], said: str
 ) -> None:
     assert said in refused(line)
+
+
+def test_each_class_with_known_wrong_names_has_a_description(things: dict[str, object]) -> None:
+    kinds = {getattr(type(there), "_kind").split()[-1] for there in things.values() if there is not confab}  # noqa: B009
+    assert kinds - set(CLASSES) == set()
+    assert set(HINTS) == set(things)
+
+
+def test_values_are_represented_in_one_short_line(things: dict[str, object]) -> None:
+    texts = {kind: repr(there) for kind, there in things.items() if kind not in ("plan", "table")}
+    assert {kind: text for kind, text in texts.items() if "\n" in text or len(text) > 300} == {}
+    assert texts["behaviour"].startswith("Behavior(name='B1_MOVE', level=1, parameters: 2")
+    assert texts["domain"].startswith("Domain(situations: 5, behaviors: 12")
+
+
+def test_properties_that_other_libraries_have_as_methods_can_be_called(result: confab.Result) -> None:
+    assert result.cost() == result.cost  # type: ignore[operator]
+    assert result.plan.length() == result.plan.length  # type: ignore[operator]
+    assert result.plan.primitives() == result.plan.primitives  # type: ignore[operator]
+    assert type(pickle.loads(pickle.dumps(result.cost)) + 1) is float
+
+
+def test_a_plan_is_json_that_a_scene_reads(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
+    file = tmp_path / "plan.json"
+    file.write_text(json.dumps(result.plan.json()))
+    assert scene.read_plan(file) == result.plan

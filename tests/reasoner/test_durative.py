@@ -118,7 +118,7 @@ def test_a_scene_with_time_is_planned_with_its_schedule(tmp_path: Path) -> None:
     result = confab.load(str(path)).plan(time_limit=20)
     assert result.timed is not None
     assert result.json()["schedule"]["makespan"] == float(result.timed.makespan)
-    assert "makespan" in repr(result)
+    assert "makespan" in str(result)
 
 
 @pytest.mark.parametrize(
