@@ -1,10 +1,11 @@
 """Checker of certificates of unsolvability; the checker shares no code with any search.
 
-The checker examines only the lowest level of the task, because a failure of an upper level proves nothing. Behaviours and
-conditions are evaluated by `confab.planner.possibilities`. The checker verifies three properties of the certificate's set of
-states. First, the set contains the initial state. Second, no behaviour of the lowest level leads out of the set. For this test,
-each case of the certificate is expanded with all applicable behaviours. Third, the set contains no final state. In a final
-state, the goal holds, and each symbol with a rest value has its rest value or its initial value.
+The checker examines only the lowest level of the task, because a failure of an upper level proves nothing. Behaviours
+and conditions are evaluated by `confab.planner.possibilities`. The checker verifies three properties of the
+certificate's set of states. First, the set of states contains the initial state. Second, no behaviour of the lowest
+level leads out of the set of states; the checker expands each case of the certificate with all applicable behaviours.
+Third, the set of states contains no final state. In a final state, the goal holds, and each symbol with a rest value
+has its rest value or its initial value.
 
 A plan of several levels is a sequence of behaviours of the lowest level that ends in a final state (docs/levels.md).
 """
@@ -49,11 +50,11 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
-                return f"it speaks of {symbol}, which this task doesn't know"
+                return f"it mentions {symbol}, which this task doesn't have"
             if symbol.situation in problem.domain.rules:
-                return f"it speaks of {symbol}, which is defined by rules"
+                return f"it mentions {symbol}, which is defined by rules"
         if not certificate.unmet:
-            return "it doesn't say what of the goal can't hold"
+            return "it doesn't state which goals can't hold"
         for fact in certificate.unmet:
             if fact.symbol.situation not in problem.domain.situations or not wanted_in_the_end(problem, fact):
                 return f"{fact} isn't wanted in this task"

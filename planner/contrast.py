@@ -228,7 +228,7 @@ def _refined(
     domain = replace(problem.domain, behaviors={behavior.name: forced, **lower})
     outcome = ask(replace(problem, domain=domain, initial=state, goal=goal))
     if outcome.plan is None or [s.behavior for s in outcome.plan.steps] != [behavior.name]:
-        return None, outcome.reason or Reason(f"no steps of the level below do what {step} says")
+        return None, outcome.reason or Reason(f"no steps of the level below have the effects of {step}")
     return replace(outcome.plan.steps[0], id=step.id), None
 
 

@@ -1,8 +1,8 @@
 """Conditions of a level that a plan violates while steps of a lower level replace steps of this level (docs/levels.md).
 
-If a level has no plan with refinements, steps of the level below replace the steps of the level. The lower-level steps satisfy
-the conditions of their level, but may violate conditions of the level above, such as "a filled cup isn't moved". This module
-lists the violations.
+If a level has no plan with refinements, steps of the level below replace the steps of the level. The lower-level steps
+satisfy the conditions of their level, but may violate conditions of the level above, such as "a filled cup isn't
+moved". This module lists the violated conditions.
 
 A level sees a change if a symbol of the level gets another value of the level. A level doesn't see intermediate values of lower
 levels, such as a cup in a hand. Each visible change that persists requires an applicable behaviour of the level that makes the
@@ -118,7 +118,7 @@ class _Watch:
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level makes this change")
 
     def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
-        """Return the bindings with which an effect makes a change, or None if there are none."""
+        """Return the bindings with which an effect makes a change, or None if there are no such bindings."""
         kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None

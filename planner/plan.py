@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 
 class Status(Enum):
-    """How a planning call ended."""
+    """The way in which a planning call ended."""
 
     SOLVED = "solved"
-    UNSOLVABLE = "unsolvable"  # proved: no plan exists
-    GAVE_UP = "gave-up"  # a limit came first
+    UNSOLVABLE = "unsolvable"  # a proof shows that no plan exists
+    GAVE_UP = "gave-up"  # a limit was reached before a plan or a proof was found
 
 
 @brief
@@ -355,10 +355,11 @@ class Outcome:
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call, unless it is None. In the paper's mode, `expansions` limits each search. In the other
-    modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals together.
-    `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states times
-    operators, about a microsecond each. With `brief`, a plan is shortened with little work, and with `seconds` not at all.
+    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In
+    the other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for
+    all goals together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of
+    `work` is states times operators, about a microsecond each. With `brief`, a plan is shortened with little work, and
+    with `seconds` not at all.
     """
 
     expansions: int = 200_000

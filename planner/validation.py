@@ -1,8 +1,9 @@
 """The plan checker; it shares no code with any search.
 
-The preconditions of a behaviour hold if *some* individuals, as the variables of the behaviour, satisfy all of them. The checker
-compiles each conjunction once into a list of tests and choices, the most determined condition first. Therefore the time to
-check a plan grows with the length of the plan, and not with the size of the world.
+The preconditions of a behaviour hold if *some* individuals, as the variables of the behaviour, satisfy all
+preconditions. The checker compiles each conjunction once into a list of tests and choices, the most determined
+condition first. Therefore the time to check a plan grows with the length of the plan, and not with the size of the
+world.
 
 docs/levels.md defines the meaning of a plan with several levels. After the refinement of a step, the symbols that the step's
 level sees have the values that the step states. Changed symbols of the level below that have a rest value are at rest. The next
@@ -206,7 +207,7 @@ class _Check:
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
         if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
             return False
-        totals = self.problem.domain.aggregates  # a level determines no total that it doesn't see
+        totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
         said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
         for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
@@ -327,7 +328,7 @@ class Facts:
             self._holders[situation].setdefault(value, {})[arguments] = None
 
     def since(self, mark: int) -> dict[Cell, str]:
-        """Return the cells that have changed since the log had the length `mark`, with their earlier values."""
+        """Return the symbols that have changed since the log had the length `mark`, with their earlier values."""
         before: dict[Cell, str] = {}
         for situation, arguments, old in self.log[mark:]:
             before.setdefault((situation, arguments), old)
@@ -419,7 +420,7 @@ class BehaviorReader:
         return None
 
     def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
-        """Return the price of a behaviour in the current state, or None if it has no price or isn't applicable."""
+        """Return the price of a behaviour in the current state, or None if the behaviour has no price or isn't applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         return read.price(facts.value, values) if read.price and all_hold(read.preconditions, facts, values) else None
@@ -427,7 +428,7 @@ class BehaviorReader:
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
-        """Return bindings of the variables with which all conditions hold, or None if there are none.
+        """Return bindings of the variables with which all conditions hold, or None if there are no such bindings.
 
         `terms` contains the variables that are already bound.
         """

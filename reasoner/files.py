@@ -115,7 +115,7 @@ def check_replaceable(path: Path, kind: str) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise `FileNotFoundError` if more than the last folder of a path to be written is missing; a name may be a typing error."""
+    """Raise `FileNotFoundError` if more than the last folder of a path is missing, because a folder's name may be mistyped."""
     above = _behind(path).parent.parent
     try:
         above.stat()

@@ -142,7 +142,7 @@ def _ontology_name(iri: str) -> str:
 
 
 FEW_NAMES = 40
-"""Maximum number of names that are listed in an error if no name is similar to the wrong one."""
+"""Maximum number of names that are listed in an error if no name is similar to the wrong name."""
 GUESSING: list[str] = []
 """Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one module."""
 

@@ -158,7 +158,7 @@ class _Run:
         if missing := open_goals(self.belief.problem):
             self.request_replan(f"{missing[0]} doesn't hold yet")
             return
-        if self.goals.put_off and self.try_anew("the rest is done"):
+        if self.goals.put_off and self.try_anew("all other goals are handled"):
             return
         if self.goals.put_off:
             record.status = End.GAVE_UP
@@ -388,9 +388,9 @@ class _Run:
         self.set_aside(dict(vanished(self.belief.problem, self.world.why_unplaced)))
 
     def on_no_plan(self, outcome: Outcome | None, limits: Limits) -> None:
-        """Handle a failure of planning: look for free spots.
+        """Handle a failure of planning: look for free spots, drop or postpone goals, retry, or end the episode.
 
-        Otherwise drop or postpone the goals that are unreachable one by one; otherwise retry, or end the episode.
+        Each unreachable goal is dropped or postponed. If no goal is unreachable, planning is tried again, or the episode ends.
 
         A goal that needs facts in doubt is postponed until all other goals are handled.
         """
@@ -413,11 +413,11 @@ class _Run:
                 symbol: (goal[symbol], blamed(self.record, symbol, goal[symbol])) for symbol in hopeless
             }
             belief.want({s: v for s, v in goal.items() if s not in hopeless})
-            self.request_replan("what can't be reached is put off")
+            self.request_replan("unreachable goals are postponed")
         elif hopeless:
             self.set_aside(hopeless)
-            self.request_replan("what can't be reached is set aside")
-        elif not (belief.doubted and self.try_anew("no other way is left")):
+            self.request_replan("unreachable goals are dropped")
+        elif not (belief.doubted and self.try_anew("no alternative is left")):
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
     def make_room(self) -> bool:

@@ -330,7 +330,7 @@ def chosen(
 
 
 def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
-    """Yield a case of a rule instance for the rule, and for each fact about the individuals in the rule's roles."""
+    """Yield a tally for the rule of an instance, and for each fact about the individuals in the rule's roles."""
     return ((c.rule, fact, tally) for fact in (ITSELF, *reader.facts(c.rule, c.roles)))
 
 

@@ -251,7 +251,7 @@ def _alone(bit: Bit, state: int) -> int:
 
 def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
     own = sum(bit.mask for bit in part)
-    ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # by their required bits of other parts
+    ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # alternatives by bits of other parts
     for bit in part:
         for way in bit.alternatives:
             ways[way & ~own].append((tuple(_single(way & own)), bit.mask))

@@ -136,7 +136,7 @@ def heuristic(task: Task) -> Evaluate:
 
 
 def cost_left(task: Task) -> Callable[[int], float]:
-    """Return a function of a state: the cost of a relaxed plan with the cheapest supporters.
+    """Return a function from a state to the cost of a relaxed plan with the cheapest supporters.
 
     The cost is infinite if there is no relaxed plan.
     """

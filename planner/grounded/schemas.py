@@ -154,7 +154,7 @@ def schemas(
     for position, effect in both:
         if effect.when:
             own = set().union(*map(mentions, effect.when)) - set(base.terms)
-            names = {name: f"?*{name[1:]}" for name in own}  # distinct from variables of the same name in preconditions
+            names = {name: f"?*{name[1:]}" for name in own}  # unlike the names of variables in preconditions
             compile_.kinds |= {names[name]: kinds[name] for name in sorted(own)}
             conditions = (*preconditions, *(substituted(c, names) for c in effect.when))
             arguments = tuple(names.get(a, a) for a in effect.arguments)

@@ -158,7 +158,7 @@ def ways(task: Task) -> Bound:
     while True:
         total, old = least[after] + costs, least.copy()
         np.minimum.at(least, before[stated], total[stated])
-        anyhow = np.full(len(wanted) + 1, np.inf)  # from any value; the last entry is for bits of other symbols
+        anyhow = np.full(len(wanted) + 1, np.inf)  # least costs from any value; last: bits of other symbols
         np.minimum.at(anyhow, symbol[after[~stated]], total[~stated])
         np.minimum(least, anyhow[symbol], out=least)
         if np.array_equal(least, old):

@@ -20,9 +20,9 @@ Waiting = tuple[int, list[int], int]
 class SuccessorTree:
     """A node of a decision tree that tests one symbol.
 
-    `mask` contains the bits of the symbol. `by_value` maps each value of the symbol to a subtree. `otherwise` is the subtree of
-    operators without a test of the symbol. `operators` need no further test. `waiting` contains operators that aren't in a subtree
-    yet.
+    `mask` contains the bits of the symbol. `by_value` maps each value of the symbol to a subtree. `otherwise` is the
+    subtree of operators without a test of the symbol. `operators` are the operators that need no further test.
+    `waiting` contains operators that aren't in a subtree yet.
     """
 
     __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")

@@ -62,7 +62,7 @@ class Nogoods:
             kept = keep((symbol.situation, key_of(symbol.arguments)), value)
             arguments = tuple([lifted(a) for a in symbol.arguments])
             held.append((symbol.situation, arguments, lifted(value), None if kept is None else lifted(kept)))
-        held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # the most specific facts first
+        held.sort(key=lambda one: not any(isinstance(a, int) for a in one[1]))  # the most specific facts come first
         self.known.setdefault(self.key(level, targets, roles, budget), []).append(held)
 
     def key(self, level: int, targets: Mapping[Cell, str], roles: Mapping[str, int], budget: SearchBudget) -> object:

@@ -44,7 +44,7 @@ FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
 NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
-"""Share of the time limit that is used for search; the rest of the time is for releasing memory."""
+"""Share of the time limit that is used for search; the other time is for releasing memory."""
 
 
 def alone(call: Call) -> None:

@@ -223,9 +223,9 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a target or a changed symbol without its required value, or None if there is none.
+        """Return a target or a changed symbol without its required value, or None if there is no such symbol.
 
-        Changed symbols are those that were set since a mark.
+        Changed symbols are symbols that were set since a marked state.
         """
         now = self.table.now
         for cell, first in self.table.before(mark).items():
@@ -259,7 +259,7 @@ class Refiner:
         return steps
 
     def pruned(self, steps: list[RefinedStep], mark: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep]:
-        """Return the steps applied since a mark without superfluous steps.
+        """Return the steps applied since a marked state, without superfluous steps.
 
         Superfluous steps are single steps, or pairs of steps that undo each other.
         """
@@ -271,7 +271,7 @@ class Refiner:
         return steps
 
     def _replayed(self, steps: Sequence[RefinedStep], mark: int) -> bool:
-        """Replace the steps applied since a mark by other steps; return whether all of these steps are applicable."""
+        """Replace the steps applied since a marked state by other steps; return whether all of these steps are applicable."""
         self.table.undo(mark)
         return all(self.replay_checked(step) is not None for step in steps)
 

@@ -77,7 +77,8 @@ class Scope:
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
-            # A symbol that isn't at rest may stay unchanged. The caller detects steps that change such a symbol.
+            # A symbol that isn't at rest may stay unchanged. The caller detects steps that change a symbol which isn't
+            # at rest.
             if wanted is not None and meets(value, wanted):
                 goal.setdefault(symbol, wanted)
         for cell in space.defined:

@@ -296,7 +296,7 @@ class Subgoals:
         return self._possibles[id(condition)][0]
 
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
-        """Return whether a condition is static, whether the condition compares individuals, its variables, and the condition.
+        """Return whether a condition is static, whether it compares individuals, the condition's variables, and the condition.
 
         The cache stores the condition, because Python could otherwise reuse the `id` of the condition.
         """

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""Number of level-1 steps that a shortened plan may lose for each saved primitive of mean cost; it must lose fewer steps."""
+"""Number of level-1 steps that a shortened plan may lose for each saved primitive of mean cost; the plan must lose
+fewer steps."""
 KEPT = 1.5
 """Factor by which the cost must decrease if primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500

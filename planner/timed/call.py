@@ -132,7 +132,7 @@ def in_time(
             if not faults:
                 return Timed(timed)
         if not choices.of and until:
-            until = 0.0  # keeps the turns of the plan in the plan's order
+            until = 0.0  # no search: the turns keep the plan's order
             continue
         if not choices.of:
             said = faults[0].text if timed is not None else "its steps have no order"

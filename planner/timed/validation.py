@@ -246,11 +246,13 @@ class _Clock:
                     return
         for cell in (read | set(changed)) if self.separation else ():
             if cell in self.since and self.last.get(cell) != one.number and time - self.since[cell] < self.separation:
-                yield Fault(one.slot.step.path, f"{one.slot.step}: {cell[0]} of {', '.join(cell[1])} changed just then")
+                yield Fault(
+                    one.slot.step.path, f"{one.slot.step}: {cell[0]} of {', '.join(cell[1])} changed immediately before"
+                )
                 return
             asked_by_another = cell in changed and self.read_by.get(cell, one.number) != one.number
             if asked_by_another and time - self.asked[cell] < self.separation:
-                yield Fault(one.slot.step.path, f"{one.slot.step}: {cell[0]} was asked for just then")
+                yield Fault(one.slot.step.path, f"{one.slot.step}: {cell[0]} was read immediately before")
                 return
         for cell in read if self.separation else ():
             self.asked[cell], self.read_by[cell] = time, one.number

@@ -54,7 +54,7 @@ class Pddl:
 
     domain: str = "domain"
     problem: str = "problem"
-    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # the direct supertypes
+    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # direct supertypes by type
     predicates: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     objects: dict[str, str] = field(default_factory=dict)  # objects with their types; constants come first

@@ -189,7 +189,7 @@ class Lowering:
                 holds = both([*guards, self.all_of(rule.conditions, terms, scope)])
                 if holds != NEVER:
                     inside = {term.name for term in head.terms}
-                    left = [term for term in terms.values() if term.name not in inside]  # PDDL has no world
+                    left = [term for term in terms.values() if term.name not in inside]  # the head lacks the world
                     yield head, head.terms, some(left, holds)
 
     # ---------------------------------------------------------------------------------------------------- actions

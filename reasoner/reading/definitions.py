@@ -432,7 +432,7 @@ class Definitions:
         if OWL + "datatypeComplementOf" in said:
             return (_negation(self._data_range(prop, amount, said[OWL + "datatypeComplementOf"][0])),)
         raise KnowledgeError(
-            f"a definition says of {local_name(prop)} what no number is compared with; use decimal[>= 2]"
+            f"a definition restricts {local_name(prop)} by more than comparisons with numbers; use decimal[>= 2]"
         )
 
     @staticmethod

@@ -3,7 +3,7 @@
 The query has one sub-select per parameter, which yields the individuals of the parameter's class. The ID of a
 quantified behaviour follows from the declared order of behaviours, then of parameters, then of individuals (PAPER.md
 section 4). `quantify` calculates the IDs without an ORDER BY clause, which makes the query ten times as fast and lets a
-time limit stop the query. Applicability isn't tested: M is the number of all quantified behaviours.
+time limit stop the query. Applicability isn't tested: the number M in the paper counts all quantified behaviours.
 """
 
 from __future__ import annotations

@@ -177,7 +177,9 @@ class UpdateCompiler:
         if prop and prop not in self.scope.vocabulary.relations:
             return
         what = (
-            f"{one.predicate} is a relation, which nothing changes" if prop else "what is of which class doesn't change"
+            f"{one.predicate} is a relation, which nothing changes"
+            if prop
+            else "the class of an individual doesn't change"
         )
         raise UpdateError(what, "use the property of a situation type", one.predicate.at)
 

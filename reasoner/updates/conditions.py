@@ -161,7 +161,7 @@ class Conditions:
         alternatives = []
         for group in groups:
             if not group:
-                raise UpdateError("an alternative says nothing", "take it out, or say what has to hold", at)
+                raise UpdateError("an alternative is empty", "take it out, or say what has to hold", at)
             if len(group) == 1:
                 alternatives.append(group[0])
                 continue
@@ -206,7 +206,7 @@ class Conditions:
         at = one.subject.at
         if one.predicate == A:
             if not isinstance(one.object, Word) or one.object.variable:
-                raise UpdateError("a class isn't looked for", "name the class", one.predicate.at)
+                raise UpdateError("a class can't be a variable", "name the class", one.predicate.at)
             term, kind = self.scope.put(one.subject, known, at), self.scope.iri(one.object)
             return self.nodes.condition("ClassCondition", at, class_properties(term, kind))
         prop, vocabulary = self.scope.iri(one.predicate), self.scope.vocabulary
@@ -224,7 +224,7 @@ class Conditions:
         at = one.predicate.at
         if said and isinstance(said[-1], Truth):
             if not said[-1].value:
-                raise UpdateError("a relation isn't said to be false", "write FILTER NOT EXISTS { … true }", at)
+                raise UpdateError("a relation can't be stated to be false", "write FILTER NOT EXISTS { … true }", at)
             said = said[:-1]
         return [self.scope.put(each, known, at) for each in (one.subject, *said)]
 

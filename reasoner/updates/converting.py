@@ -302,13 +302,13 @@ def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> boo
 def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
     """Return the reason why an update isn't equivalent to the behaviour; an empty text for an equivalent update."""
     if behavior.price is not None:
-        return "a price that is calculated stays with individuals"
+        return "an update can't express a calculated price"
     if spans_of(behavior):
-        return "a condition or an effect at the start or the end stays with individuals"
+        return "an update can't express a condition or an effect at the start or the end"
     again = compiled_again(graph, iri, written, prefixes)
     if isinstance(again, str):
         return again
-    return "" if plainly(again) == plainly(behavior) else "its update would say something else"
+    return "" if plainly(again) == plainly(behavior) else "its update would have another meaning"
 
 
 def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapping[str, str]) -> Behavior | str:

@@ -109,7 +109,7 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
     write = "write DELETE { … } INSERT { … } WHERE { … }"
     tree = _tree("UpdateUnit", text, "update", write)[0]
     if not tree.request:
-        raise UpdateError("the update says nothing", write, 0)
+        raise UpdateError("the update is empty", write, 0)
     return _prefixes(tree.prologue or ()), [_operation(request, text) for request in tree.request or ()]
 
 

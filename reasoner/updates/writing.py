@@ -147,7 +147,7 @@ class _Writer:
         if effect.operation == "assign":
             match effect.amount:
                 case Calculation(sign, left, _) if left == own and sign in CHANGES.values():
-                    raise ValueError("it assigns an amount what another effect would be written by")
+                    raise ValueError("its assignment to an amount would be read as an increase or another change")
             after = by
         else:
             by = f"{before} {CHANGES[effect.operation]} {by}"
@@ -252,7 +252,7 @@ class _Writer:
             case Fraction():
                 said = written(expression)
                 if "/" in said:
-                    raise ValueError(f"{said} isn't said by a decimal number")
+                    raise ValueError(f"{said} isn't a decimal number")
                 return said
             case Calculation(sign, left, right):
                 return f"({self.number(left, patterns, given)} {sign} {self.number(right, patterns, given)})"
