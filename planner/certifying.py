@@ -262,7 +262,7 @@ class Relaxed:
                     if after is None:
                         continue
                     low, high = max(after[0].low, min(least, now.low)), min(after[0].high, max(most, now.high))
-                    if not constant:  # in one step to the farthest reachable amount
+                    if not constant:  # widen the range in one step to the farthest reachable amount
                         low = min(least, now.low) if low < now.low else low
                         high = max(most, now.high) if high > now.high else high
                     now = now.hull(Range(low, high))

@@ -76,8 +76,7 @@ class Total:
     Parameters
     ----------
     rules : Source
-        What conditions are read with.
-    The context for reading conditions.
+        The context for reading conditions.
     """
 
     def __init__(self, rules: Source, aggregate: Aggregate) -> None:

@@ -72,7 +72,7 @@ class Range:
 
 
 LOOKS = 256
-"""Number of tests between two looks at the clock."""
+"""Number of tests between two readings of the clock."""
 ANYTHING = Range(-math.inf, math.inf, True)
 
 

@@ -102,7 +102,7 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
     inner = [c for c in clauses if c.startswith("some ") and c.endswith(f" {mark}") and c.count(mark) == 1]
     if which == "no" and len(inner) == 1 < len(clauses) and words is not str:
         rest = [_relative(mark, clause) for clause in clauses if clause != inner[0]]
-        if None not in rest:  # "no item is at a place that is full"
+        if None not in rest:  # for example, "no item is at a place that is full"
             return (
                 f"no {inner[0].removeprefix('some ').removesuffix(mark)}{an(kind)} {' and '.join(filter(None, rest))}"
             )

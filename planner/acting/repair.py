@@ -1,14 +1,11 @@
 """Repair of a plan: steps that are still valid are kept, and the other steps are planned again.
 
-The remaining steps of the plan are replayed on a state table from the present situation. A step is
-
-dropped     if its purpose holds already, or is no longer a goal
-kept        if its primitives still have their effects; otherwise refined again (for another hand, for instance)
-put off     if it isn't applicable yet; later steps about the same individuals are then put off, too
-
-Inapplicable steps are postponed and tried again after each successful step. The default planner then achieves the
-remaining goals, on the same table. If a hand is in the middle of a step, the step is finished first, or the hand is
-brought to rest.
+The remaining steps of the plan are replayed on a state table from the present situation. A step is dropped if its
+purpose holds already, or is no longer a goal. A step is kept if its primitives still have their effects; otherwise the
+step is refined again (for another hand, for instance). A step is put off if the step isn't applicable yet; later steps
+about the same individuals are then put off, too. The steps that were put off are tried again after each successful
+step. The default planner then achieves the remaining goals, on the same table. If a hand is in the middle of a step,
+the step is finished first, or the hand is brought to rest.
 
 `confab.planner.validation` checks every repaired plan.
 """

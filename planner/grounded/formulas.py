@@ -92,7 +92,7 @@ class Formulas:
         self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
         self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # alternatives of disjunctions, by bit
         self.asked = 0
-        self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # by part and individuals bound outside
+        self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # formulas by part and individuals
         self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Part]]]] = {}
         self._relations: dict[tuple[str, int, int, tuple[int, ...]], dict[tuple[str, ...], dict[str, None]]] = {}
         self._members: dict[str, dict[str, None]] = {}

@@ -13,7 +13,7 @@ from time import perf_counter
 from confab.planner.grounded.task import Task, bits_of
 
 LOOK = 1_000
-"""Number of operators between two looks at the clock."""
+"""Number of operators between two readings of the clock."""
 
 
 def landmarks(task: Task, deadline: float | None = None) -> int:

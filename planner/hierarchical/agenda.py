@@ -1,12 +1,12 @@
 """The agenda: the planner achieves the goals one after another on one table and keeps the achieved goals.
 
-open:    goals that the planner tries to achieve in one step of the most abstract level
-asleep:  blocked goals; a goal wakes when a symbol that it waits for changes
-kept:    achieved goals; later steps may violate achieved goals temporarily, but must restore them
-before:  ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is filled)
+open:    goals that the planner tries to achieve in one step of the most abstract level.
+asleep:  blocked goals; a goal wakes when a symbol changes for which the goal waits.
+kept:    achieved goals; later steps may violate achieved goals temporarily, but must restore the goals.
+before:  ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is filled).
 
 If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed
-attempt is repeated only after a symbol that the goal depends on has changed. Each step is refined and applied as soon
+attempt is repeated only after a symbol on which the goal depends has changed. Each step is refined and applied as soon
 as the step is found.
 """
 

@@ -1,11 +1,11 @@
 """The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
 
-table:    the current values of all symbols; changes are made in place and can be undone
-forward:  for each behaviour, a function of its arguments that returns its changes, or None if the behaviour isn't applicable
-achieve:  for each effect, a function of a symbol and a value that yields the arguments with which the effect achieves the value
-keep:     a function of a symbol and its first value that returns the required final value, or None if any value is allowed
+table:    the current values of all symbols; changes are made in place and can be undone.
+forward:  for each behaviour, a function of its arguments that returns its changes, or None if the behaviour isn't applicable.
+achieve:  for each effect, a function of a symbol and a value that yields the arguments with which the effect achieves the value.
+keep:     a function of a symbol and its first value that returns the required final value, or None if any value is allowed.
 budget:   the work of all searches, in units of about a microsecond; a search of a scope costs states times operators, and an
-          expansion costs 100
+          expansion costs 100.
 """
 
 from __future__ import annotations

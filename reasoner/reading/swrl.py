@@ -124,7 +124,7 @@ class _Imp:
         body = self._atoms("body")
         self._numbers(body)
         for atom in sorted(body, key=lambda atom: (len(atom[1]) != 1, self.definitions.changes(atom[0]))):
-            self._said(*atom)  # class atoms first, because class atoms determine variables' classes
+            self._said(*atom)  # class atoms come first and determine the classes of variables
         for predicate, said in self._atoms("head"):
             yield self._concluded(predicate, said)
 
