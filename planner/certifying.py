@@ -6,8 +6,9 @@ in the relaxed task never holds.
 
 If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then the
 cases are searched; a case is a combination of the distinguished values. A path through the cases to the goal is
-executed on the original task. If the execution fails, the values that the path assumed wrongly are also distinguished.
-The second step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a plan.
+executed on the original task. If the execution fails, the cases also distinguish the values on which the execution
+failed. The second step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a
+plan.
 
 The last step distinguishes all values, so that each case is a state. A choice of distinguished values may have infinitely
 many cases, while another choice has only few cases. Therefore each choice is tried first with a small work limit, and then

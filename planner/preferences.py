@@ -91,7 +91,7 @@ class _Choices:
     def outcome(self, kept: Goals) -> Outcome:
         """Return the outcome of planning for a choice.
 
-        If a limit ends a search, the outcome is that the planner gave up. The first search raises `LimitError` instead.
+        If a limit ends a search, the outcome has the status "gave up". The first search raises `LimitError` instead.
         """
         if kept not in self.outcomes:
             try:

@@ -32,7 +32,7 @@ MATCHING = 5
 Roles: TypeAlias = "tuple[str, ...]"
 Goal: TypeAlias = "tuple[Cell, str]"
 Query: TypeAlias = "tuple[int, Goal, bool]"
-"""A level, a goal, and whether individuals that the state doesn't suggest may fill roles."""
+"""A request for rule instances: a level, a goal, and whether the roles may have any individuals or only suggested individuals."""
 
 
 class RuleInstance(NamedTuple):

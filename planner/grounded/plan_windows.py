@@ -419,7 +419,7 @@ class _Windows:
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
         """Return the task of a window with all bits of the whole task.
 
-        A state with amounts contains the number of a tuple above the bits of the whole task.
+        In a state with amounts, the number of the tuple of amounts is stored above the bits of the whole task.
         """
         task, of = self.task, amounts.moves
         place = {operator: i for i, operator in enumerate(operators)}

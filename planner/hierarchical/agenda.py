@@ -51,7 +51,8 @@ class Agenda:
     ----------
     call : Call
     levels : tuple of int, optional
-        Levels whose steps may be used, by default all levels. Goals that the first level doesn't see allow steps of any level.
+        Levels whose steps may be used, by default all levels. For goals that the first level doesn't see, steps of all
+        levels may be used.
     quickly : bool
         Whether the agenda tries only relevant steps and small scopes.
     solvable : bool
@@ -76,7 +77,7 @@ class Agenda:
 
     @property
     def too_large(self) -> Reason | None:
-        """The reason why the lowest level can't be grounded, or None unless grounding was tried and failed."""
+        """The reason why grounding of the lowest level failed, or None before such a failure."""
         return self._lowest if isinstance(self._lowest, Reason) else None
 
     # ------------------------------------------------------------------------------------------------- one goal after another

@@ -7,8 +7,9 @@ arguments, and in the value before or after the effect. The number of a candidat
 behaviour (`confab.reasoner.afterwards`), and subtracted if the conditions hold only before the behaviour. A tuple that is a
 candidate of several pairs is counted for the first pair only.
 
-If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount is added to
-the total for every tuple that satisfies the conditions after the behaviour. The changes are independent of each other.
+If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount
+is added to the total. The change is added for every tuple that satisfies the conditions after the behaviour. The
+changes are independent of each other.
 
 If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
 Therefore, nothing is subtracted from a count with maximum 0, and a tuple may be counted for several pairs. A tuple that only loses
@@ -336,7 +337,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return the conditions of a contribution: constant conditions, and changing conditions before and after a behaviour."""
+        """Return the conditions for a contribution of a tuple: constant conditions, and changing conditions before and after."""
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]

@@ -658,7 +658,7 @@ class _Variables:
     def nested(
         self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
     ) -> tuple[Condition, ...]:
-        """Return conditions that are true if some individuals satisfy all pieces (conjuncts with their words).
+        """Return conditions that are true if some individuals satisfy all conjuncts in `pieces`.
 
         Each existential quantifier is moved as far inward as possible. A search for "a car and a place such that …" then doesn't
         enumerate all pairs unless a conjunct mentions both variables.

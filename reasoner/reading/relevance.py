@@ -207,7 +207,7 @@ class _Doing:
     def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
         """Add the routes from each effect to all individuals of the behaviour, and to all symbols that the behaviour changes."""
         if not self.spanned:
-            for scope in self.asks[1:]:  # negated conditions, and alternatives
+            for scope in self.asks[1:]:  # scopes of negated conditions and of alternatives
                 _span(scope, self.step, set(), known, found, looked_up)
             for _, (first, *groups), named in self.effects:
                 _span(first, self.step, named, known, found, looked_up)

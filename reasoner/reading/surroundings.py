@@ -28,7 +28,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""Situation types or relations as IRIs, each with a flag per argument: whether the argument is the looked-up individual."""
+"""Conditions, each as the IRI of a situation type or relation with a flag per argument; a flag marks the looked-up individual."""
 
 
 class Surroundings:

@@ -173,7 +173,7 @@ class _Exclusive:
                     pass
 
     def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether an effect's value is in a state before the behaviour and not after the behaviour."""
+        """Return whether an effect's value has the state `way` before the behaviour and not after the behaviour."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)
