@@ -1,4 +1,4 @@
-"""Comparison of whole calls with an earlier commit; calls of both commits alternate, so that machine load affects both.
+"""Comparison of whole calls with an earlier commit; calls of both commits alternate, so that machine load affects both commits.
 
 python -m benchmarks before
 CONFAB_BEFORE=f43f953 …      the commit, whose files are extracted from Git into a temporary folder

@@ -49,7 +49,7 @@ LEARNING = ("learn", "execute", "run")
 
 
 class Ended(NamedTuple):
-    """The end of a process: exit code (negative for a signal), CPU seconds, and number of calls if they were counted."""
+    """The end of a process: exit code (negative for a signal), CPU seconds, and number of calls if the calls were counted."""
 
     code: int
     seconds: float

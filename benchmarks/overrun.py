@@ -7,9 +7,9 @@
 Each call is tried with the longest limit in several scenes, until a call reaches the limit. The other limits are tried in this
 scene. If a call ends before its limit, the cell of the table is "before".
 
-Limits are in seconds of the wall clock. Another process reads the CPU time of a call and its child processes at the limit and
-at the end of the call. The difference is the overrun. It is measured in CPU time, which depends little on the load of the
-machine.
+Limits are in seconds of the wall clock. Another process reads the CPU time of a call and its child processes at the
+limit and at the end of the call. The difference is the overrun. The overrun is measured in CPU time, which depends
+little on the load of the machine.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SCENES = {
     "full shelves": ("full", "--objects", "60"),
     "1,000 in each other's way": ("blocked", "--objects", "1000"),
 }
-"""Generated scenes. In most of them, planning takes more than five seconds."""
+"""Generated scenes. In most of these scenes, planning takes more than five seconds."""
 VALIDATED = ("1,000 objects", "10,000 objects")
 EASY, TABLE = "200 objects", "the paper's table"
 SERVED = (EASY, "1,000 objects", "10,000 objects")

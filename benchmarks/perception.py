@@ -42,8 +42,8 @@ Truth = dict[Symbol, str | None]
 class Tally:
     """Counts by situation type and level of noise.
 
-    `looks` counts observations of a symbol, `wrong` counts observed values that aren't true, and `missed` counts true values
-    that were not observed. A false value in place of a true value counts as both.
+    `looks` counts observations of a symbol, `wrong` counts observed values that aren't true, and `missed` counts true
+    values that were not observed. A false value in place of a true value counts as wrong and as missed.
     """
 
     looks: Counter[tuple[str, float]] = field(default_factory=Counter)

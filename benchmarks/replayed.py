@@ -2,11 +2,11 @@
 
     python -m benchmarks.replayed FROM TO [SCENE …]
 
-A plan is executed with each seed, and its trajectories are exported as JSON. If the rollout is verified, the exported text is
-replayed in a new world with the same deviations. The replay reads only the text and the names of joints. The replay uses
-neither skills, planners, touch nor the controllers of the folder `sim`. As in ROS, the path between two points is the cubic with
-their positions and velocities. The tracking error is the largest distance of a hand's tip from its position
-at the commanded posture, both from PyBullet's kinematics.
+A plan is executed with each seed, and its trajectories are exported as JSON. If the rollout is verified, the exported
+text is replayed in a new world with the same deviations. The replay reads only the text and the names of joints. The
+replay uses neither skills, planners, touch nor the controllers of the folder `sim`. As in ROS, the path between two
+points is the cubic with their positions and velocities. The tracking error is the largest distance of a hand's tip from
+its position at the commanded posture. PyBullet's kinematics computes both positions.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Execution of exported behaviour trees, run by ``python -m benchmarks.trees [--runner RUNNER] [--disturbances N]``.
 
-The trees of ten plans are ticked by py_trees. With a runner (the compiled ``benchmarks/btcpp/runner.cpp``), they are also
-ticked by BehaviorTree.CPP. Then changed facts are undone at random during executions by py_trees and by Confab.
+The trees of ten plans are ticked by py_trees. With a runner (the compiled ``benchmarks/btcpp/runner.cpp``), the trees
+are also ticked by BehaviorTree.CPP. Then changed facts are undone at random during executions by py_trees and by
+Confab.
 """
 
 from __future__ import annotations

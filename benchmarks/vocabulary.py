@@ -1,4 +1,4 @@
-"""The page docs/vocabulary.md, which `make vocabulary` writes from the ontology files and a test compares with them."""
+"""The page docs/vocabulary.md, which `make vocabulary` writes from the ontology files and a test compares with these files."""
 
 from __future__ import annotations
 

@@ -611,7 +611,7 @@ COMMANDS = {
     "plan --memory FILE": "use-memory plan-with-memory",
     "python -c 'import confab'": "shell repl console ipython python interactive-shell",
 }
-"""Names of commands, and other words for them."""
+"""Names of commands, and other words for each command."""
 OPTIONS = {
     "time_limit seconds": "timeout max_time deadline limit time max_seconds time_out budget t duration "
     "max_planning_time overall_time_limit search_time_limit max_runtime wall_time seconds sec timelimit",

@@ -67,7 +67,7 @@ class Known(metaclass=RightNames):
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying. Cached values are left out; they are read from the graph again."""
+        """Return the state for pickling and copying. Cached values are left out, and are later read from the graph again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 

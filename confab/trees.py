@@ -87,7 +87,7 @@ class Tree:
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
-    """Return the behaviour tree of a valid plan (`confab.planner.behavior_tree`) with nodes that both libraries support."""
+    """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
     lowering = _Lowering(problem)
     lowering.lowered(tree_of(problem, plan))
     return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
@@ -169,7 +169,7 @@ def _mark(path: tuple[int, ...]) -> str:
 
 
 def _identifier(name: str) -> str:
-    """Return an identifier of letters, digits and underscores that is valid in both libraries and not reserved."""
+    """Return an identifier of letters, digits and underscores that BehaviorTree.CPP and py_trees accept and don't reserve."""
     found = re.sub(r"\W+", "_", name).strip("_")
     found = f"_{found}" if found[:1].isdigit() else found
     return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found

@@ -34,7 +34,7 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres to obstacles on short straight motions, less than `MARGIN`, since the load may slip before them."""
+"""Margin in metres to obstacles on short straight motions, less than `MARGIN`, since the load may slip."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""

@@ -211,7 +211,7 @@ def box(fixture: Fixture) -> Solid:
 def read_mover(model: UrdfModel, arm: Arm, openings: Mapping[str, float]) -> Mover:
     """Return an arm with the spheres of its moving links, with finger joints at `openings` (metres).
 
-    The links between the first and the second joint are left out: they turn on the spot and touch the mount of the arm.
+    The links between the first and the second joint are left out: these links turn on the spot and touch the mount of the arm.
     """
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():

@@ -1,8 +1,8 @@
 """Concurrent execution of skills by several hands in one world.
 
-A skill requests simulation steps from the world. Every skill runs in its own thread and waits for each step. When all running
-skills wait, the world makes one step for all of them. Only one thread runs at any time, and the threads run in a fixed order, so
-that equal calls give equal results.
+A skill requests simulation steps from the world. Every skill runs in its own thread and waits for each step. When all
+running skills wait, the world makes one step for all skills. Only one thread runs at any time, and the threads run in a
+fixed order, so that equal calls give equal results.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ def _shut(run: Run, phase: Phase) -> None:
 
 
 def _grasp(run: Run, phase: Phase) -> None:
-    """Close the fingers until both have pressed for a while; centre a hand that holds a link."""
+    """Close the fingers until both fingers have pressed for a while; centre a hand that holds a link."""
     world, hand, name = run.world, run.attempt.hand, run.roles["object"]
     hand.close()
     pressed, waited = 0, 0

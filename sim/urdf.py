@@ -72,7 +72,7 @@ class UrdfModel:
 
     @cached_property
     def chains(self) -> Mapping[str, tuple[Joint, ...]]:
-        """The joints, including fixed ones, from the base to each link that has spheres."""
+        """The joints, including fixed joints, from the base to each link that has spheres."""
         return {link: self.chain(link) for link in self.spheres}
 
     def chain(self, link: str) -> tuple[Joint, ...]:
