@@ -189,7 +189,7 @@ class _Choices:
     def result(
         self, kept: Goals, least: Fraction | None = None, finish: Search | None = None
     ) -> tuple[Problem, Outcome]:
-        """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each.
+        """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each goal.
 
         `least` is a lower bound on the total cost of any choice. `finish` plans for the task of the choice. The additional costs
         are differences between plans of `search`.

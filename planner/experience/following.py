@@ -265,7 +265,7 @@ class RulePolicy:
         call.space.expand(level)
         effort = call.space.effort
         step = call.refiner.do(level, *instance.ground)
-        self.allowance.spend(EXPANSION if step is not None else call.space.effort - effort)  # a failed search counts
+        self.allowance.spend(EXPANSION if step is not None else call.space.effort - effort)  # also a failed search
         return None if step is None else [*steps, step]
 
     def achieve_condition(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:

@@ -81,7 +81,7 @@ def _solution(
             name += "_"
         terms[one.name] = name
         variables.append(Parameter(name, one.kind))
-    members = (ClassCondition(p.name, p.kind) for p in aggregate.parameters)  # only members have the amount
+    members = (ClassCondition(p.name, p.kind) for p in aggregate.parameters)  # only members have this amount
     asked = (*members, *aggregate.conditions, *existing(aggregate))
     conditions = tuple(substituted(condition, terms) for condition in asked)
     return conditions, put_in(aggregate.amount, terms), tuple(variables)

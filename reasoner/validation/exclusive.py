@@ -162,7 +162,7 @@ class _Exclusive:
         )
 
     def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
-        """Yield the states that an effect's value leaves by the same behaviour."""
+        """Yield the states of an effect's value that the same behaviour ends."""
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
