@@ -20,6 +20,7 @@ from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
     CandidateSchedule,
     Choices,
+    TurnId,
     durations_with,
     least,
     shortest,
@@ -112,6 +113,7 @@ def in_time(
         return Timed(reason=Reason(str(error)))
     network = network_of(order, separation)
     choices = choices_of(problem, plan, order, network) if events is None else Choices()
+    proved: int | None = None
     while True:
         bound = least(order, network, choices)
         found = shortest(order, network, choices, until, bound)
@@ -123,11 +125,12 @@ def in_time(
 
             found, bound = shorter(order, network, choices, found, bound, until - perf_counter())
             scheduler = "CP-SAT"
+        proved = bound if proved is None else min(bound, proved)  # the first choices allow the most schedules
         if found.begins.late:
             return Timed(reason=_late(problem, order, network, choices, found))
-        timed = _timed(problem, plan, order, network, choices, found)
+        timed = timed_plan(problem, plan, order, network, choices, found)
         if timed is not None:
-            timed = replace(timed, bound=bound * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
+            timed = replace(timed, bound=proved * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
             faults = validate_timed(problem, timed, separation)
             if not faults:
                 return Timed(timed)
@@ -137,7 +140,8 @@ def in_time(
         if not choices.of:
             said = faults[0].text if timed is not None else "its steps have no order"
             return Timed(reason=Reason(f"the schedule is no plan in time: {said}"))
-        choices = Choices()  # a plan with required concurrency keeps its actors
+        moved = {turn for resource, line in enumerate(found.turns) for turn in line if turn[0] != resource}
+        choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
 
 
 def _late(problem: Problem, order: Order, network: Network, choices: Choices, found: CandidateSchedule) -> Reason:
@@ -156,7 +160,7 @@ def _late(problem: Problem, order: Order, network: Network, choices: Choices, fo
             missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
     for symbol, by in times.deadlines.items():
         late = any((end if which == END else begin) > order.latest.get((i, which), end) for which in (BEGIN, END))
-        if late and symbol in problem.goal and (symbol.situation, symbol.arguments) in _changed(one):
+        if late and symbol in problem.goal and (symbol.situation, symbol.arguments) in changed_by(one):
             missed.append(f"{Fact(symbol, problem.goal[symbol])} is a goal by {float(by):g} s")
     if one.at is not None and begin > one.at:
         missed.append(f"it happens at {float(one.at):g} s")
@@ -167,7 +171,7 @@ def _late(problem: Problem, order: Order, network: Network, choices: Choices, fo
     )
 
 
-def _changed(activity: Activity) -> set[Cell]:
+def changed_by(activity: Activity) -> set[Cell]:
     """Return the symbols that an activity changes."""
     return {cell for access in activity.accesses for cell in access.changes}
 
@@ -178,21 +182,26 @@ def _written(window: tuple[Fraction, Fraction | None]) -> str:
     return f"from {float(low):g} s on" if high is None else f"from {float(low):g} to {float(high):g} s"
 
 
-def _timed(
+def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dict[str, str]]:
+    """Return the new name of each actor whose turn another actor takes, by the number of the activity."""
+    renamed: dict[int, dict[str, str]] = {}
+    for resource, line in enumerate(turns):
+        for own, number in line:
+            one, other = order.resources[own].actor, order.resources[resource].actor
+            if own != resource and one is not None and other is not None:
+                for member in order.resources[own].turns[number].members:
+                    renamed.setdefault(member, {})[one] = other
+    return renamed
+
+
+def timed_plan(
     problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
 ) -> TimedPlan | None:
     """Return a schedule as a timed plan with the actors of its turns.
 
     Return None if the steps of some level have no sequential order.
     """
-    renamed: dict[int, dict[str, str]] = {}
-    for resource, line in enumerate(found.turns):
-        for own, number in line:
-            if own != resource:
-                one, other = order.resources[own].actor, order.resources[resource].actor
-                if one is not None and other is not None:
-                    for member in order.resources[own].turns[number].members:
-                        renamed.setdefault(member, {})[one] = other
+    renamed = renamed_by(order, found.turns)
     durations = durations_with(network, choices, found.turns)
     edges = (*network.edges, *turn_edges(order, found.turns))
     arcs = network.arcs(edges, durations)

@@ -45,6 +45,8 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
         return Choices()
     rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     whole = _whole_steps(plan, order)
+    steps = {step.path: step for step in plan.walk()}
+    above = [[steps[step.path[:depth]] for depth in range(1, len(step.path))] for step in plan.primitives]
     of: dict[TurnId, tuple[int, ...]] = {}
     lasts: dict[tuple[TurnId, int], dict[int, int]] = {}
     for actor, resource in actors.items():
@@ -52,9 +54,13 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
             if turn.reading or not whole(actor, turn.members):
                 continue
             able = [resource]
+            upper = {step.path: step for member in turn.members for step in above[member]}
             for other in every[actor]:
-                durations = _durations(problem, rules, facts, order, network, turn.members, {actor: other})
-                if durations is not None:
+                names = {actor: other}
+                durations = _durations(problem, rules, facts, order, network, turn.members, names)
+                if durations is not None and all(
+                    _terms(problem, rules, facts, step, names) is not None for step in upper.values()
+                ):
                     able.append(actors[other])
                     lasts[(resource, number), actors[other]] = durations
             if len(able) > 1:
@@ -143,6 +149,20 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
     return whole
 
 
+def _terms(
+    problem: Problem, rules: BehaviorReader, facts: Facts, step: Step, names: Mapping[str, str]
+) -> dict[str, str] | None:
+    """Return the individuals of a step's terms with other actors, or None if static facts don't allow these actors."""
+    behavior = problem.domain.behaviors[step.behavior]
+    arguments = tuple(names.get(a, a) for a in step.arguments)
+    given = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
+    given |= {f"?{v}": names.get(value, value) for v, value in step.bindings.items()}
+    static = [c for c in behavior.preconditions if _static(c)]
+    if not rules.fits(behavior, arguments):
+        return None
+    return None if static and rules.satisfied(static, given, behavior.kinds, facts) is None else given
+
+
 def _durations(
     problem: Problem,
     rules: BehaviorReader,
@@ -160,12 +180,8 @@ def _durations(
         if arguments == step.arguments:
             continue
         behavior = problem.domain.behaviors[step.behavior]
-        given = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
-        given |= {v: names.get(value, value) for v, value in step.bindings.items()}
-        static = [c for c in behavior.preconditions if _static(c)]
-        if not rules.fits(behavior, arguments):
-            return None
-        if static and rules.satisfied(static, given, behavior.kinds, facts) is None:
+        given = _terms(problem, rules, facts, step, names)
+        if given is None:
             return None
         terms = (*arguments, *(given.get(v.name, v.name) for v in pieces_of(problem, behavior).fixed))
         seconds = duration_of(problem, behavior, terms, facts)

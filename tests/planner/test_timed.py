@@ -19,9 +19,23 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import within
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.symbols import (
+    TRUE,
+    Behavior,
+    Domain,
+    Parameter,
+    Problem,
+    SituationType,
+    Span,
+    Symbol,
+    Times,
+    Timing,
+    ValueCondition,
+    ValueEffect,
+)
 from confab.reasoner.timing import only_during
 from confab.timing import scheduled
+from worlds.families import family
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
 
@@ -54,6 +68,38 @@ def test_every_step_spans_its_refinement() -> None:
                 <= intervals[below.path][1]
                 <= intervals[step.path][1]
             )
+
+
+def test_turns_go_to_another_hand_only_if_it_reaches_the_places_of_the_steps_above() -> None:
+    problem = family("swap", 6, 1)
+    found = plan(problem).plan
+    assert found is not None
+    timed = in_time(problem, found).plan
+    assert timed is not None
+    assert [timed.makespan, timed.bound] == [Fraction(30), Fraction(30)]
+
+
+def test_the_checker_rejects_an_actor_of_a_variable_that_is_in_two_steps_at_once() -> None:
+    names, it = ("a", "b"), Parameter("?it", "Thing")
+    owns, made = ValueCondition("OWNER", ("?it",), "?owner"), ValueEffect("DONE", ("?it",), TRUE)
+    timing = Timing(Fraction(1), ("?owner",), ((Span.THROUGHOUT, owns),), ((Span.THROUGHOUT, made),))
+    make = Behavior("MAKE", 1, (it,), (Parameter("?owner", "Owner"),), (owns,), (made,), timing=timing)
+    situations = {
+        "OWNER": SituationType("OWNER", ("Thing",), "Owner"),
+        "DONE": SituationType("DONE", ("Thing",), "Truth", boolean=True),
+    }
+    goal = {Symbol("DONE", (one,)): TRUE for one in names}
+    classes = {"Thing": names, "Owner": ("o",)}
+    problem = Problem(
+        "urn:owners", Domain(situations, {"MAKE": make}), classes, {}, {Symbol("OWNER", (n,)): "o" for n in names}, goal
+    )
+    found = solve(Request(problem)).plan
+    assert found is not None
+    timed = in_time(problem, found).plan
+    assert timed is not None
+    assert timed.makespan == 2
+    both = tuple(replace(slot, begin=Fraction(0), end=Fraction(1)) for slot in timed.slots)
+    assert any("o is in" in fault.text for fault in validate_timed(problem, replace(timed, slots=both)))
 
 
 @pytest.mark.parametrize("number", range(0, 32, 5))
