@@ -68,13 +68,18 @@ class Network:
         found += [high for low, high in self.windows[i] if high is not None and low <= begin and begin + lasts <= high]
         return found if fixed is None else [*found, fixed + lasts]
 
-    def arcs(self, edges: Iterable[Edge], durations: Sequence[int]) -> list[list[tuple[int, int]]]:
-        """Return the successors of each activity, each with the minimum time between the two begins."""
+    def arcs(
+        self, edges: Iterable[Edge], durations: Sequence[int], shortest: Sequence[int] | None = None
+    ) -> list[list[tuple[int, int]]]:
+        """Return the successors of each activity, each with the minimum time between the two begins.
+
+        If `shortest` is given, the arcs hold for all durations from `shortest` to `durations`.
+        """
         found: list[dict[int, int]] = [{} for _ in durations]
+        shortest = durations if shortest is None else shortest
         for i, high, j, low in edges:
-            apart = (
-                (durations[i] if high == END else 0) - (durations[j] if low == END else 0) + self.least(i, high, j, low)
-            )
+            apart = (durations[i] if high == END else 0) - (shortest[j] if low == END else 0)
+            apart += self.least(i, high, j, low)
             if found[i].get(j, apart) <= apart:
                 found[i][j] = apart
         return [list(after.items()) for after in found]
@@ -138,7 +143,12 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
     )
 
 
-def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[int] | None = None) -> Begins | None:
+def earliest(
+    network: Network,
+    edges: Iterable[Edge] = (),
+    durations: Sequence[int] | None = None,
+    shortest: Sequence[int] | None = None,
+) -> Begins | None:
     """Return the earliest begins that satisfy the edges of a network and additional edges, or None if the edges form a cycle.
 
     Activities may miss their latest times, windows or fixed times (`Begins.late`).
@@ -150,9 +160,11 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
         Additional edges.
     durations : sequence of int, optional
         Durations that replace the durations of the network.
+    shortest : sequence of int, optional
+        The least durations; the begins satisfy the edges with all durations from `shortest` to `durations`.
     """
     lasts = network.durations if durations is None else durations
-    arcs = network.arcs((*network.edges, *edges), lasts)
+    arcs = network.arcs((*network.edges, *edges), lasts, shortest)
     count = len(lasts)
     begins, waits = [0] * count, [-1] * count
     for i in range(count):
@@ -168,12 +180,35 @@ def earliest(network: Network, edges: Iterable[Edge] = (), durations: Sequence[i
             if not before[j]:
                 ready.append(j)
             _move(network, lasts, begins, waits, i, j, apart)
-    if len(ready) < count and not _settled(network, lasts, arcs, begins, waits):
+    if len(ready) < count and (
+        _only_forward(arcs, set(range(count)).difference(ready)) or not _settled(network, lasts, arcs, begins, waits)
+    ):
         return None
     makespan = max((b + d for b, d, at in zip(begins, lasts, network.at, strict=True) if at is None), default=0)
     late = [_lateness(network, i, begins[i], lasts[i]) for i in range(count)]
     worst = max(range(count), key=late.__getitem__, default=-1)
     return Begins(begins, waits, makespan, sum(late), worst if worst >= 0 and late[worst] else -1)
+
+
+def _only_forward(arcs: Sequence[Sequence[tuple[int, int]]], cyclic: set[int]) -> bool:
+    """Return whether all arcs between activities of cycles require a later begin, so that no begins satisfy a cycle.
+
+    `cyclic` contains the activities of cycles and all activities after them.
+    """
+    before: dict[int, list[int]] = {i: [] for i in cyclic}
+    left = dict.fromkeys(cyclic, 0)
+    for i in cyclic:
+        for j, _ in arcs[i]:
+            before[j].append(i)
+            left[i] += 1
+    done = [i for i in cyclic if not left[i]]
+    for j in done:  # the loop appends activities to the list
+        for i in before[j]:
+            left[i] -= 1
+            if not left[i]:
+                done.append(i)
+    inside = cyclic.difference(done)
+    return all(apart > 0 for i in inside for j, apart in arcs[i] if j in inside)
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:

@@ -7,9 +7,10 @@ problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improve
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import inf
 from time import perf_counter
 
 from confab.planner.timed.network import Begins, Network, earliest
@@ -77,6 +78,33 @@ def shortest(
     return search.improved(min(found, key=lambda one: one.begins.cost), until, bound)
 
 
+def rescheduled(
+    order: Order,
+    network: Network,
+    choices: Choices,
+    turns: Sequence[Sequence[TurnId]],
+    fixed: Container[TurnId],
+    work: int,
+) -> CandidateSchedule | None:
+    """Return the best schedule that exchanges of turns find from a given order of turns, or None if the order has no schedule.
+
+    Parameters
+    ----------
+    order : Order
+    network : Network
+    choices : Choices
+    turns : sequence of sequence of (int, int)
+        The first order of the turns of each resource.
+    fixed : container of (int, int)
+        Turns that keep their actors and their places in the order.
+    work : int
+        Maximum number of arcs that the exchanges process.
+    """
+    search = _Search(order, network, choices, fixed, work)
+    start = search.evaluated([list(line) for line in turns])
+    return None if start is None else search.improved(start, inf, 0)
+
+
 def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
     """Yield the edges that order the turns of each resource; turns that only read a symbol may overlap."""
     for line in turns:
@@ -105,8 +133,15 @@ def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[
 
 
 class _Search:
-    def __init__(self, order: Order, network: Network, choices: Choices) -> None:
-        self.order, self.network, self.choices = order, network, choices
+    def __init__(
+        self,
+        order: Order,
+        network: Network,
+        choices: Choices,
+        fixed: Container[TurnId] = (),
+        work: int = MOST_ARCS,
+    ) -> None:
+        self.order, self.network, self.choices, self.fixed, self.work = order, network, choices, fixed, work
         self.turns_of: list[list[TurnId]] = [[] for _ in order.activities]
         for resource, one in enumerate(order.resources):
             for number, turn in enumerate(one.turns):
@@ -165,7 +200,7 @@ class _Search:
     def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
         """Return the best schedule after exchanges of turns on the critical path."""
         now, barren = best, 0
-        left = MOST_ARCS // (1 + len(self.network.edges) + len(self.network.durations))
+        left = self.work // (1 + len(self.network.edges) + len(self.network.durations))
         tabu: dict[tuple[TurnId, TurnId], int] = {}
         step = 0
         while best.begins.cost > (0, bound) and barren < ROUNDS and left > 0 and perf_counter() < until:
@@ -196,10 +231,12 @@ class _Search:
         critical = set(self.critical(now))
         for resource, line in enumerate(now.turns):
             for i, (one, other) in enumerate(pairwise(line)):
+                if one in self.fixed or other in self.fixed:
+                    continue
                 if self.meets(one, critical) and self.meets(other, critical):
                     yield (one, other), self.replaced(now, {resource: [*line[:i], other, one, *line[i + 2 :]]})
             for turn in line:
-                able = self.choices.of.get(turn, ())
+                able = () if turn in self.fixed else self.choices.of.get(turn, ())
                 if able and self.meets(turn, critical):
                     for target in able:
                         if target != resource:
@@ -217,9 +254,10 @@ class _Search:
             return min(now.begins.begins[member] for member in its.members)
 
         there = now.turns[target]
-        place = sum(begin(one) <= begin(turn) for one in there)
+        first = max((i + 1 for i, one in enumerate(there) if one in self.fixed), default=0)
+        place = max(sum(begin(one) <= begin(turn) for one in there), first)
         left = [one for one in now.turns[resource] if one != turn]
-        for at in range(max(place - 1, 0), min(place + 1, len(there)) + 1):
+        for at in range(max(place - 1, first), min(place + 1, len(there)) + 1):
             yield self.replaced(now, {resource: left, target: [*there[:at], turn, *there[at:]]})
 
     def replaced(self, now: CandidateSchedule, lines: Mapping[int, list[TurnId]]) -> list[list[TurnId]]:

@@ -1,0 +1,333 @@
+"""Execution of a timed plan whose primitives take shorter or longer than expected.
+
+A primitive begins when all events that its begin must follow have happened and a window allows it. So a delay shifts only the
+primitives that depend on the late one. The end of a primitive isn't controlled. If an end must follow another event, the
+primitive begins only if this order holds for all durations within the stated spread; otherwise it is held back. After each end
+at another time than expected, turns that haven't begun are exchanged to keep deadlines and to shorten the makespan.
+
+Networks whose durations are observed, not controlled, are described by Vidal and Fargier, "Handling contingency in temporal
+constraint networks", Journal of Experimental and Theoretical Artificial Intelligence 11 (1999).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil, floor, inf
+
+from confab.planner.plan import Step
+from confab.planner.timed.activities import EventKind, StepEvent, activities
+from confab.planner.timed.call import changed_by, renamed_by, timed_plan
+from confab.planner.timed.exchange import choices_of, exchanged
+from confab.planner.timed.network import Begins, Network, earliest, network_of
+from confab.planner.timed.order import BEGIN, END, Edge, order_of
+from confab.planner.timed.plan import Slot, TimedPlan
+from confab.planner.timed.schedules import (
+    CandidateSchedule,
+    Choices,
+    TurnId,
+    durations_with,
+    rescheduled,
+    turn_edges,
+)
+from confab.planner.timed.validation import validate_timed
+from confab.reasoner.symbols import Problem, Symbol, Times
+
+UNIT = Fraction(1, 1000)
+"""The unit of observed times, in seconds; observed times are rounded up."""
+WORK = 20_000
+"""Maximum number of arcs that the exchanges of turns process after the end of a primitive."""
+
+
+@dataclass(frozen=True)
+class Late:
+    """A goal that is expected after its deadline, in seconds.
+
+    `certain` states whether the goal is late even if all remaining primitives take their shortest durations.
+    """
+
+    goal: Symbol
+    expected: Fraction
+    deadline: Fraction
+    certain: bool
+
+
+class Dispatch:
+    """The execution of a timed plan.
+
+    The caller begins the primitives that `ready` returns, and reports each begin and each end.
+
+    Parameters
+    ----------
+    problem : Problem
+    timed : TimedPlan
+        A timed plan of the problem that the checker accepts.
+    spread : Fraction
+        The greatest relative deviation of a duration from the expected duration.
+    """
+
+    def __init__(self, problem: Problem, timed: TimedPlan, spread: Fraction = Fraction(0)) -> None:
+        self.problem, self.plan, self.spread = problem, timed.plan, spread
+        steps, events = timed.plan.primitives, list(_events(timed))
+        self.order = order_of(problem, activities(problem, steps, events), events)
+        self.network = network_of(self.order, more=(UNIT,))
+        self.turns: list[list[TurnId]] = [
+            [(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)
+        ]
+        every = [*self.network.edges, *turn_edges(self.order, self.turns)]
+        self.controlled = all(low == BEGIN for *_, low in every)
+        self.choices = choices_of(problem, timed.plan, self.order, self.network) if self.controlled else Choices()
+        times = problem.times or Times()
+        self._untimed = replace(problem, times=Times(events=times.events))
+        self.begun: dict[int, int] = {}
+        self.over: dict[int, int] = {}
+        self._settle()
+
+    def step(self, number: int) -> Step:
+        """Return a primitive with the actors of its turn."""
+        renamed = renamed_by(self.order, self.turns)
+        return (exchanged(self.problem, self.plan, renamed) if renamed else self.plan).primitives[number]
+
+    def expected(self, number: int) -> Fraction:
+        """Return the expected duration of a primitive with the actors of its turn, in seconds."""
+        return self.lasts[number] * self.network.unit
+
+    def ready(self, now: Fraction) -> list[int]:
+        """Return the numbers of the primitives that can begin now."""
+        time = self._units(now)
+        safe = self._safe(time)
+        return [i for i in self.waiting if self._possible(i, time, safe) <= time]
+
+    def wakes(self, now: Fraction) -> Fraction | None:
+        """Return the next time at which a primitive can begin although no primitive ends before, or None."""
+        time = self._units(now)
+        safe = self._safe(time)
+        later = [at for i in self.waiting if time < (at := self._possible(i, time, safe)) < inf]
+        return int(min(later)) * self.network.unit if later else None
+
+    @property
+    def waiting(self) -> list[int]:
+        """The numbers of the primitives that haven't begun."""
+        return [i for i in range(len(self.lasts)) if i not in self.begun]
+
+    def begin(self, number: int, now: Fraction) -> None:
+        """Report that a primitive begins."""
+        self.begun[number] = self._units(now)
+
+    def end(self, number: int, now: Fraction) -> None:
+        """Report that a primitive ends; turns that haven't begun may be exchanged."""
+        time = self.over[number] = self._units(now)
+        if self.controlled and time - self.begun[number] != self.lasts[number]:
+            self._exchange(time)
+
+    def late(self, now: Fraction) -> list[Late]:
+        """Return the goals that are expected after their deadlines."""
+        if not self.order.latest:
+            return []
+        time, deadlines = self._units(now), (self.problem.times or Times()).deadlines
+        slow, fast = self._expected(time), self._expected(time, -self.spread)
+        found = []
+        for (i, which), by in self.order.latest.items():
+            at = [one.begins[i] + (lasts[i] if which == END else 0) for lasts, one in (slow, fast)]
+            if at[0] * self.network.unit > by:
+                found += [
+                    Late(goal, at[0] * self.network.unit, by, at[1] * self.network.unit > by)
+                    for goal, its in deadlines.items()
+                    if its == by and (goal.situation, goal.arguments) in changed_by(self.order.activities[i])
+                ]
+        return found
+
+    def timed(self, now: Fraction) -> TimedPlan | None:
+        """Return the plan with the times of the begins and ends so far, and with the expected times of the others.
+
+        Return None if the steps of some level have no sequential order.
+        """
+        lasts, begins = self._expected(self._units(now))
+        return self._plan(CandidateSchedule(self.turns, begins), lasts)
+
+    # ------------------------------------------------------------------------------------------------------ conditions
+
+    def _units(self, now: Fraction) -> int:
+        return ceil(now / self.network.unit)
+
+    def _settle(self) -> None:
+        """Compute the durations, and the edges into and out of each primitive, from the order of the turns."""
+        self.lasts = durations_with(self.network, self.choices, self.turns)
+        self.edges = [*dict.fromkeys((*self.network.edges, *turn_edges(self.order, self.turns)))]
+        self.into: dict[int, list[Edge]] = defaultdict(list)
+        self.out_of: dict[int, list[Edge]] = defaultdict(list)
+        for edge in self.edges:
+            self.into[edge[2]].append(edge)
+            self.out_of[edge[0]].append(edge)
+
+    def _lasting(self, time: int, more: Fraction) -> list[int]:
+        """Return the durations of all primitives if the remaining durations deviate by the factor 1 + `more`."""
+        found = []
+        for i, lasts in enumerate(self.lasts):
+            if i in self.over:
+                found.append(self.over[i] - self.begun[i])
+                continue
+            its = ceil(lasts * (1 + more)) if more > 0 else floor(lasts * (1 + more))
+            found.append(max(its, time - self.begun.get(i, time)))
+        return found
+
+    def _rest(self, time: int, edges: Sequence[Edge]) -> Network:
+        """Return the network with the given edges and the begins so far; the other primitives begin now or later."""
+        count = range(len(self.lasts))
+        return replace(
+            self.network,
+            edges=tuple(edge for edge in edges if edge[2] not in self.begun),
+            at=[None if i in self.begun else self.network.at[i] for i in count],
+            windows=[
+                ((self.begun[i], None),)
+                if i in self.begun
+                else tuple(
+                    (max(low, time), high) for low, high in self.network.windows[i] if high is None or high > time
+                )
+                or self.network.windows[i]
+                for i in count
+            ],
+        )
+
+    def _expected(self, time: int, more: Fraction = Fraction(0)) -> tuple[list[int], Begins]:
+        """Return durations and begins if the remaining durations deviate by the factor 1 + `more`."""
+        lasts = self._lasting(time, more)
+        begins = earliest(self._rest(time, self.edges), (), lasts)
+        assert begins is not None  # the order of the turns has a schedule
+        return lasts, begins
+
+    def _safe(self, time: int) -> Callable[[int], float]:
+        """Return a function from a primitive to the time from which on its end follows all events that it must follow.
+
+        The time holds for all durations within the spread.
+        """
+        if self.controlled:
+            return lambda i: 0
+        most, least = self._lasting(time, self.spread), self._lasting(time, -self.spread)
+        begins = earliest(self._rest(time, self.edges), (), most, least)
+        if begins is None:  # no begins are safe for all durations
+            tied = {i for edge in self.edges if edge[3] == END for i in (edge[0], edge[2])}
+            return lambda i: inf if i in tied else 0
+
+        def safe(i: int) -> float:
+            for _, high, k, low in self.out_of[i]:
+                at = self.network.at[k]
+                its = time + (most[i] if high == END else 0) + self.network.least(i, high, k, low)
+                by = at if at is not None else self.begun[k] + least[k] if k in self.begun and low == END else inf
+                if its > by:
+                    return inf
+            return begins.begins[i]
+
+        return safe
+
+    def _possible(self, i: int, time: int, safe: Callable[[int], float]) -> float:
+        """Return the first time at which a primitive can begin if no primitive ends before; `inf` if there is none."""
+        at = self.network.at[i]
+        if at is not None:
+            return max(at, time)
+        if any(k not in (self.over if high == END else self.begun) for k, high, _, low in self.into[i] if low == BEGIN):
+            return inf
+        first = max(time, safe(i))
+        for low, high in self.network.windows[i] if first < inf else ():
+            begin = max(first, low)
+            if high is None or begin + self.lasts[i] <= high:
+                return begin
+        return inf
+
+    # ------------------------------------------------------------------------------------------------------- exchanges
+
+    def _exchange(self, time: int) -> None:
+        """Exchange turns that haven't begun if this keeps more deadlines or shortens the makespan."""
+        fixed = {
+            turn
+            for line in self.turns
+            for turn in line
+            if any(m in self.begun for m in self.order.resources[turn[0]].turns[turn[1]].members)
+        }
+        known = {m for turn in fixed for m in self.order.resources[turn[0]].turns[turn[1]].members}
+        lasts, begins = self._expected(time)
+        base = [lasts[i] if i in known else its for i, its in enumerate(self.network.durations)]
+        network = replace(self._rest(time, self.network.edges), durations=base)
+        choices = Choices(
+            {turn: able for turn, able in self.choices.of.items() if turn not in fixed},
+            {key: {} if key[0] in fixed else its for key, its in self.choices.lasts.items()},
+        )
+        found = rescheduled(self.order, network, choices, self.turns, fixed, WORK)
+        if found is None or found.begins.cost >= begins.cost:
+            return
+        plan = self._plan(found, durations_with(network, choices, found.turns))
+        if plan is not None and not validate_timed(self._untimed, plan, executed=True):
+            self.turns = found.turns
+            self._settle()
+
+    def _plan(self, found: CandidateSchedule, lasts: Sequence[int]) -> TimedPlan | None:
+        """Return the plan with the begins of a schedule and with the given durations."""
+        choices = Choices({}, {key: {} for key in self.choices.lasts})
+        return timed_plan(
+            self.problem, self.plan, self.order, replace(self.network, durations=list(lasts)), choices, found
+        )
+
+
+def _events(timed: TimedPlan) -> Iterator[StepEvent]:
+    """Yield the begins and ends of the primitives in the order of their times; at the same instant, ends come first."""
+    found = list[tuple[Fraction, int, int, EventKind]]()
+    for number, slot in enumerate(timed.slots):
+        if slot.begin == slot.end:
+            found.append((slot.begin, 1, number, EventKind.WHOLE))
+        else:
+            found += [(slot.begin, 1, number, EventKind.BEGIN), (slot.end, 0, number, EventKind.END)]
+    yield from ((number, kind) for _, _, number, kind in sorted(found, key=lambda one: one[:3]))
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated execution.
+
+    `timed` is the plan with its actual times, or None if primitives remain; `slots` contains the begun primitives in the order of
+    the plan; `waiting` contains the primitives that were held back; `said` maps each goal that was late or expected to be late
+    to the first time at which this was known.
+    """
+
+    timed: TimedPlan | None
+    slots: tuple[Slot, ...]
+    waiting: tuple[Step, ...]
+    said: Mapping[Symbol, Fraction]
+
+
+def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -> Run:
+    """Execute a plan in a simulation.
+
+    Parameters
+    ----------
+    dispatch : Dispatch
+        A new execution.
+    actual : callable
+        Returns the actual duration of a primitive from its number and its expected duration.
+    """
+    now, running = Fraction(0), list[tuple[Fraction, int]]()
+    begins: dict[int, tuple[Fraction, Fraction]] = {}
+    said: dict[Symbol, Fraction] = {}
+    while True:
+        while ready := dispatch.ready(now):
+            for number in ready:
+                end = now + actual(number, dispatch.expected(number))
+                begins[number] = now, end
+                dispatch.begin(number, now)
+                heapq.heappush(running, (end, number))
+            while running and running[0][0] == now:
+                dispatch.end(heapq.heappop(running)[1], now)
+        for one in dispatch.late(now):
+            said.setdefault(one.goal, now)
+        times = [running[0][0]] if running else []
+        times += [at] if (at := dispatch.wakes(now)) is not None else []
+        if not times:
+            break
+        now = min(times)
+        while running and running[0][0] == now:
+            dispatch.end(heapq.heappop(running)[1], now)
+    slots = tuple(Slot(dispatch.step(i), *begins[i]) for i in sorted(begins))
+    waiting = tuple(map(dispatch.step, dispatch.waiting))
+    return Run(None if waiting else dispatch.timed(now), slots, waiting, said)
