@@ -737,6 +737,6 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
         (urdf, 5),
     )
 }
-"""The doors with their functions, and their relative numbers of cases; slow doors have fewer cases."""
+"""The doors (kinds of input) with their functions, and their relative numbers of cases; slow doors have fewer cases."""
 TARGETS = {"memory.ttl", "broken.ttl", "out", "out.ttl", "out.svg"}
 """Names of the files that a command may change."""

@@ -345,4 +345,4 @@ DOORS: dict[str, tuple[Callable[[random.Random, Path], Arguments], int]] = {
     door.__name__: (door, share)
     for door, share in ((defined, 40), (amounts, 40), (updates, 40), (numbers, 60), (edited, 30), (meshes, 3))
 }
-"""The doors with their functions, and their relative numbers of cases, in addition to `benchmarks.broken_inputs`."""
+"""The doors (kinds of input) with their functions and relative numbers of cases, in addition to `benchmarks.broken_inputs`."""

@@ -63,7 +63,7 @@ class Load:
     answers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     async def request(self, kind: str, content: bytes, leave: float | None = None, pause: float = 0.0) -> None:
-        """Send a request, byte by byte with a `pause`, and record the answer; with `leave`, disconnect after this time."""
+        """Send a request, byte by byte with a `pause`, and record the answer; with `leave`, disconnect after `leave` seconds."""
         begin = perf_counter()
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         try:

@@ -2,8 +2,8 @@
 
     python -m benchmarks ontology
 
-The table has medians of three runs in wall and CPU seconds, including Java. Validation is measured from the file, and
-the other functions are measured from a loaded graph.
+The table has medians of three runs in wall and CPU seconds, including the Java process. Validation is measured from the
+file, and the other functions are measured from a loaded graph.
 """
 
 from __future__ import annotations

@@ -44,8 +44,9 @@ class Why:
 class Explanation:
     """An explanation of the preference for the behaviour `chosen` over the behaviour `other`.
 
-    Each of the `reasons` has a weight, which is a difference of ln odds. `lead` is the sum of the weights. `rule` is the
-    learned rule as a sentence, and `behind` names the episodes with the rule. `note` is a remark if memory has no advice.
+    Each of the `reasons` has a weight, which is a difference of natural log odds. `lead` is the sum of the weights.
+    `rule` is the learned rule as a sentence, and `behind` names the episodes with the rule. `note` is a remark if
+    memory has no advice.
     """
 
     chosen: str

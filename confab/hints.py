@@ -680,7 +680,8 @@ OPTIONS = {
     "behavior": "action operator skill behaviour name",
     "from_observed": "initial_state input start",
 }
-"""Names of parameters in Python, and other words for each parameter. Options have the same names, with ``--`` and ``-``.
+"""Names of parameters in Python, and other words for each parameter. The option of a parameter has the parameter's
+name, with ``--`` before the name and ``-`` in place of ``_``.
 
 If a key contains several names, the first name that the function or command has is used.
 """

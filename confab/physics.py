@@ -334,7 +334,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout of a seed, and film it, show it on the screen, or both."""
+    """Execute the rollout of a seed; film the rollout, show the rollout on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:

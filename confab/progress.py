@@ -53,7 +53,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Advance]:
 
 
 def progress_bar() -> Progress:
-    """Return a rich progress bar on stderr, which is erased when it stops."""
+    """Return a rich progress bar on stderr, which is erased when the bar stops."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,

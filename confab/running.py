@@ -64,7 +64,7 @@ class Job:
 
 
 def run(job: Job) -> int:
-    """Validate a scene, plan, verify the plan in physics, learn from it, print the results, and write files.
+    """Validate a scene, plan, verify the plan in physics, learn from the plan, print the results, and write files.
 
     Without a robot's body in the scene, the plan isn't executed in physics. If PyBullet isn't installed, the plan isn't
     executed either, a remark states the reason, and the exit code is 2.

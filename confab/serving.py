@@ -211,7 +211,7 @@ class Guard:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request to the application, or refuse it with an HTTP status."""
+        """Pass a request to the application, or refuse the request with an HTTP status."""
         headers = Headers(scope=scope)
         host, origin = headers.get("Host", "localhost"), headers.get("Origin", "")
         if named := TARGET.fullmatch(scope["path"]):

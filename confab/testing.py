@@ -19,7 +19,7 @@ from confab.planner.validation import successor
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LOOKS = 5
-"""Number of observations of which the latency is measured."""
+"""Number of observations whose latency is measured."""
 
 SOON = 1.0
 """Maximum duration of an observation, and of `stop`, in seconds."""

@@ -27,8 +27,8 @@ DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 class Arm:
     """An arm with its hand, at the zero posture in world coordinates, and its rest posture `home`.
 
-    `wrist` is the intersection of the two axes before the last one. In an arm without a closed form of the inverse kinematics,
-    `wrist` is the origin of the last joint.
+    `wrist` is the intersection of the two axes before the last axis. In an arm without a closed form of the inverse
+    kinematics, `wrist` is the origin of the last joint.
     """
 
     joints: tuple[str, ...]
@@ -207,7 +207,7 @@ def turn_about(vectors: Array) -> Array:
 
 
 def _turned(crosses: Array, squares: Array, angle: Array) -> Array:
-    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given their cross-product matrices and squares."""
+    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes with given cross-product matrices and squares."""
     sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     matrices: Array = EYE + sin * crosses + (1 - cos) * squares
     return matrices

@@ -40,7 +40,7 @@ TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Distance in metres that is no true distance beyond the reach, but marks a pose in which the hand would not be level."""
+"""Distance in metres beyond the reach above which a pose was marked as impossible, since the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
@@ -241,7 +241,7 @@ class Attempt:
         return reached[0]
 
     def _withdraw(self, q: Array) -> None:
-        """Move back along the postures that the arm passed before it was stopped."""
+        """Move back along the postures that the arm passed before the stop."""
         now = self.hand.measured()
         self.hand.command(now)
         passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
@@ -280,8 +280,8 @@ class Attempt:
     ) -> None:
         """Move along the first collision-free path among `poses` and `others`, or until `stop` returns true.
 
-        With `partly`, a path with a collision-free beginning suffices, and the noise reduces the margin, since contact ends the
-        motion. Raise `SkillError` if all paths are blocked.
+        With `partly`, a path with a collision-free beginning suffices, and the noise of perception reduces the margin,
+        since contact ends the motion. Raise `SkillError` if all paths are blocked.
         """
         with self.planning():
             reacher = self.reacher(*ignored, margin=CLOSE - 2 * self.world.noise if partly else CLOSE)

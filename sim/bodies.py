@@ -246,7 +246,7 @@ def center_height(shape: Shape) -> float:
 
 
 def _body(client: int, shape: Shape, collision: int, visual: int, position: Array, orientation: Array) -> int:
-    """Create a body in PyBullet's maximal coordinates, which are three times as fast as a multibody, and set its friction."""
+    """Create a body with friction in PyBullet's maximal coordinates, which are three times as fast as a multibody."""
     body = pybullet.createMultiBody(
         baseMass=shape.mass,
         baseCollisionShapeIndex=collision,

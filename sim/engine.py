@@ -365,7 +365,7 @@ class Engine:
         return self.shifts.get(mechanic.body, np.zeros(3))
 
     def carrier(self, name: str, sensed: bool = False) -> tuple[Array, Array]:
-        """Return the frame, true or `sensed`, of a link or body that carries places; an empty name means the frame of the world."""
+        """Return the true or, with `sensed`, perceived frame of a link or body with places; an empty name means the world."""
         if not name:
             return np.eye(3), np.zeros(3)
         if name not in self.links:

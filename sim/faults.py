@@ -117,7 +117,7 @@ def hidden_wall(
 def stranger(
     world: Engine, point: tuple[float, float, float], size: tuple[float, float, float] = (0.06, 0.06, 0.12)
 ) -> None:
-    """Put a box at a point; the robot perceives the box, but no fact mentions it."""
+    """Put a box at a point; the robot perceives the box, but no fact mentions the box."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", mass=1.0, grasp_height=size[2] / 2, numbers=numbers)
     body = KINDS["box"].make(world.client, shape, np.array(point), np.array(UPRIGHT))
@@ -153,7 +153,7 @@ def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1,
 
 @fault
 def knocked(world: Engine, body: str, step: int, seconds: float, speed: float = 1.5) -> None:
-    """Hit an object's rim so that it falls over."""
+    """Hit an object's rim so that the object falls over."""
 
     def hit(world: Engine) -> None:
         thing = world.bodies[body]

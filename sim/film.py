@@ -53,7 +53,7 @@ ABOVE = 0.01
 """Height in metres above a place, or above the top of an object, of the point that must be visible for a name to be shown."""
 
 NEARLY = 0.97
-"""Minimum share of a ray from the camera to a handle at which a hit counts as a hit of the handle."""
+"""Minimum share of the distance from the camera to a handle at which a ray's first hit counts as a hit of the handle."""
 
 STACKED = 3
 """Number of rows in which names are stacked if they would overlap."""

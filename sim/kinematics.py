@@ -82,7 +82,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return angles (n, 3) of the spherical joint from joint `first` on; parallel outer axes get angles far from limits."""
+    """Return angles (n, 3) of the spherical joint from joint `first` on; with parallel outer axes, the angles far from limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:
@@ -96,8 +96,9 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
     """Return postures with the last joint at its middle plus `swivel` and the hand's roll, and flags of reachable postures.
 
     The last angle determines the wrist (w) and the direction of the sixth axis (e). The distance from shoulder to wrist
-    determines the elbow's angle. The angle between w and e determines the angle of the fifth joint. The directions w and e
-    determine the shoulder's rotation.
+    determines the elbow's angle. The angle between the directions of the wrist and of the sixth axis determines the
+    angle of the fifth joint. The directions of the wrist and of the sixth axis together determine the shoulder's
+    rotation.
     """
     shoulder, fourth, fifth, sixth = arm.shoulder, arm.axes[3], arm.axes[4], arm.axes[5]
     hand = r @ arm.tip_rotation.T
@@ -148,7 +149,7 @@ def _phase(axis: Array, a: Array, b: Array) -> float:
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
     """Return both angles (n, 2) about an axis at which `b` (3,) has a given dot product with `a` (n, 3), and flags.
 
-    The flag of two angles is true if the absolute cosine that determines them is below `most`.
+    The flag of two angles is true if the absolute cosine that determines the angles is below `most`.
     """
     cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ cross(axis, b)
     reach = np.maximum(np.hypot(cosine, sine), 1e-9)

@@ -104,7 +104,7 @@ class LiveWorld:
         return "" if self.lookout is None else self.lookout.why_unplaced(individual)
 
     def execute(self, step: Step) -> Verdict:
-        """Execute a primitive; stop it when an intervention changes one of its objects."""
+        """Execute a primitive; stop the primitive when an intervention changes one of the primitive's objects."""
         self.concerned = {*step.arguments, *step.bindings.values()}
         held = [self.world.held(hand) for hand in step.arguments if hand in self.world.hands]
         self.concerned |= {body for body in held if body is not None}
@@ -121,7 +121,7 @@ class LiveWorld:
         self.stopping = bool(self.concerned)
 
     def take_stock(self) -> None:
-        """Take the present postures and grasps as the reference after a failure.
+        """Take the present postures and grasps as the reference for later checks after a failure.
 
         The present posture of a blocked arm becomes its command, so that the arm stops pressing. The present grasp of a held
         object becomes the reference from which slip is measured.

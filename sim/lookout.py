@@ -30,7 +30,7 @@ REST = 0.05
 """Speed in metres per second below which an object is at rest."""
 
 BESIDE = 0.3
-"""Maximum distance in metres between a spot and the place whose static facts it shares."""
+"""Maximum distance in metres between a spot and the place whose static facts the spot shares."""
 
 GRID = 0.08
 """Distance in metres between the points on furniture that are tested for free room."""
@@ -92,7 +92,7 @@ class Lookout:
     def _meet(self, name: str) -> None:
         """Discover an object.
 
-        The object belongs to the class of objects that have places. An object too wide for every hand is fixed.
+        The object belongs to the class of objects that have places. An object too wide for every hand counts as fixed.
         """
         world, problem = self.world, self.problem
         uses = world.embodiment.perceivers
@@ -145,7 +145,7 @@ class Lookout:
         return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
 
     def _covered(self, name: str, own: str) -> tuple[str, ...]:
-        """Return the places, except `own`, at which no other object fits beside a thing with the margins of motion planning."""
+        """Return the places, except `own`, at which a thing leaves motion planning no room for another object."""
         world = self.world
         base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
         least = (

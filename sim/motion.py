@@ -78,7 +78,7 @@ class Traveller(Protocol):
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among obstacles, which decides which paths are possible.
+    """An arm among obstacles, with tests whether paths are possible.
 
     The arm keeps `margin` metres from the obstacles. Every joint keeps `joint_margin` radians from its limits, and the elbow
     keeps `fold` radians from the stretched arm.
@@ -251,7 +251,7 @@ def leave(reacher: Reacher, start: Array) -> Array | None:
 def _rrt_connect(
     reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int
 ) -> Array | None:
-    """Grow a tree of poses from the start and one from every goal towards each other (Kuffner and LaValle 2000)."""
+    """Grow a tree of poses from the start and a tree from every goal towards each other (Kuffner and LaValle 2000)."""
     ends = np.stack([start, *goals])
     low, high = ends.min(0) - reacher.spread, ends.max(0) + reacher.spread
     trees: list[tuple[list[Array], list[int]]] = [([start], [-1]), (list(goals), [-1] * len(goals))]
@@ -290,7 +290,7 @@ def _extend(
 
 
 def _first(good: Flags) -> int:
-    """Return the number of true values before the first false one."""
+    """Return the number of true values before the first false value."""
     return len(good) if good.all() else int(np.argmin(good))
 
 

@@ -267,9 +267,9 @@ class _Servo:
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
         """Roll on slowly while there is no flow, and wait while beverage flows; return whether the amount `enough` was poured.
 
-        The function `poured` returns the amount so far. The expected flow in the `lag` seconds in which the hand rolls back is
-        added to the amount. If the flow stops, the amount `nearly` suffices. The result is False if nothing flows for a while at
-        the steepest angle.
+        The function `poured` returns the amount so far. The expected flow in the `lag` seconds in which the hand rolls
+        back is added to the amount. If the flow stops early, the smaller amount `nearly` suffices. The result is False
+        if nothing flows for a while at the steepest angle.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))

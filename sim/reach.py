@@ -1,8 +1,8 @@
 """The places within reach of each hand, computed from the geometry of URDF, furniture and shapes, without a physics engine.
 
-Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose for every such height.
-Approach, grasp and lift must be within the joints' limits, and free of contact with furniture and the robot's trunk. Below an
-obstacle, a hand lifts less high.
+Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose for every such
+height. Approach, grasp and lift must be within the joints' limits, and free of contact with furniture and the robot's
+trunk. Below an obstacle, a hand lifts an object less high.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
 from confab.sim.urdf import Spheres, UrdfModel
 
 VERSION = "2"
-"""Version of the method, which is part of the fingerprint. A stored result of another version counts as outdated."""
+"""Version of the computation of reach, which is part of the fingerprint of the inputs. A stored result of another
+version counts as outdated."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""

@@ -127,7 +127,7 @@ class Manipulator:
         self.closing = True
 
     def drive(self) -> None:
-        """Drive closing fingers for one simulation step with equal forces; the leading finger yields."""
+        """Drive closing fingers for one simulation step with equal forces; the leading finger gives way."""
         if not self.closing:
             return
         (first, *_), (second, *_) = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)

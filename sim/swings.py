@@ -58,7 +58,7 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
 
 
 def refuted(world: Engine, symbols: Iterable[Symbol], link: str) -> tuple[Refutation, ...]:
-    """Return refutations of the motions of a link; each refutation holds while a body is at a place where it blocks the link."""
+    """Return refutations of the motions of a link; each refutation holds while a body blocks the link from its place."""
     found = [fact for symbol in symbols for fact in _in_the_way(world, symbol, link)]
     return tuple(
         Refutation(

@@ -92,7 +92,7 @@ def _centre(run: Run) -> None:
 
 
 def _shift(run: Run, shift: Array) -> bool:
-    """Shift the hand by a vector (3,) in metres if the arm can reach the new pose; return whether it can."""
+    """Shift the hand by a vector (3,) in metres if the arm can reach the new pose; return whether the arm can."""
     hand = run.attempt.hand
     pose = hand.pose
     pose[:3] += shift

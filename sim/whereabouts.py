@@ -42,7 +42,7 @@ def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]
 
 
 def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
-    """Store the named position of a hand after a motion; motions of links and relative to the hand don't change the position."""
+    """Store the named position of a hand after a motion; motions of links and motions relative to the hand change no position."""
     if motion in RAISED:
         world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
     elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):

@@ -1,6 +1,6 @@
 """Comparison of planners on a world with each other and with an exhaustive search.
 
-The search visits all states of the lowest level. A function gives the successors of a state.
+The search visits all states of the lowest level. The caller provides the function from a state to its successors.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Random PDDL tasks with axioms.
 
-Derived predicates are arranged in strata. An axiom may use predicates of its own stratum, and the truth or negation of lower
-predicates. Axioms, preconditions, conditions of effects and goals contain random formulas over constants, equality and
-predicates with up to two arguments. A task is text, so that every planner parses it with its own parser. `Plain` evaluates the
-tasks directly by the semantics of PDDL. `Plain` selects reachable goals, and serves as an independent reference.
+Derived predicates are arranged in strata. An axiom may use predicates of its own stratum, and the truth or negation of
+predicates of lower strata. Axioms, preconditions, conditions of effects and goals contain random formulas over
+constants, equality and predicates with up to two arguments. A task is text, so that every planner parses it with its
+own parser. `Plain` evaluates the tasks directly by the semantics of PDDL. `Plain` selects reachable goals, and serves
+as an independent reference.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ def random_steps(meant: Interpreter, rng: Random) -> Plan:
 
 
 def numbered(plan: Plan, problem: Problem) -> Plan:
-    """Return a plan whose steps have the IDs that the problem gives them."""
+    """Return a plan whose steps have the IDs that the problem determines."""
 
     def those(steps: tuple[Step, ...]) -> Iterator[Step]:
         for step in steps:

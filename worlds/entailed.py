@@ -86,7 +86,7 @@ DEFINED = {
 }  # fmt: skip
 """Situation types that hold of the members of a class (`holdsOf`), with the definition of the class."""
 CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched", "SOUGHT": ":Sought"}
-"""Situation types that hold of the members of a class whose members SWRL rules conclude."""
+"""Situation types that hold of the members of a class, where SWRL rules conclude the members."""
 PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked", "leadsTo", "endsOn")
 LOGIC = f"""
 :Place a owl:Class . :Thing a owl:Class . :Floor a owl:Class . :Hand a owl:Class . :Cleanliness a owl:Class .
@@ -121,8 +121,9 @@ LOGIC = f"""
 """
 """Definitions of every kind that planning supports: class expressions, chains, transitivity, recursion, numbers and SWRL rules.
 
-A SWRL rule concludes a transitive property, a property chain uses the transitive property, and another rule uses the classes
-defined by them. No rule body contains a transitive property, since HermiT's entailments are then incomplete.
+A SWRL rule concludes a transitive property, a property chain uses the transitive property, and another rule uses a
+class that is defined by the transitive property. No rule body contains a transitive property, since HermiT's
+entailments are then incomplete.
 """
 
 THINGS = ("box1", "box2", "box3", "cup1", "cup2", "cup3")

@@ -29,7 +29,7 @@ from worlds.phrases import ANYONE, EACH
 from worlds.shrinking import without_individual
 
 MOST = 2_000
-"""Maximum number of nodes of the search of a world without a feature."""
+"""Maximum number of nodes in the search of a world from which a feature is removed."""
 
 
 def _kept(conditions: tuple[Condition, ...], drop: Callable[[Condition], bool]) -> tuple[Condition, ...]:

@@ -47,7 +47,7 @@ Terms = Mapping[str, str]
 State = tuple[Any, ...]
 Node = tuple[State, frozenset[int]]
 NOTHING = math.nan
-"""The missing number, for which comparisons are false and calculations give the missing number again."""
+"""The value of a missing number: a comparison with a missing number is false, and a calculation gives a missing number."""
 
 
 class TooManyStatesError(Exception):
@@ -488,4 +488,4 @@ def aggregated(function: str, numbers: Sequence[Any]) -> Any:
 
 
 NAMES: dict[str, Any] = {"nan": NOTHING, "divided": divided, "Fraction": Fraction}
-"""Names that expressions may contain besides the state."""
+"""Names that generated expressions may contain besides the state."""

@@ -465,7 +465,7 @@ class _Draft(Vocabulary):
         return replace(problem, domain=replace(problem.domain, situations=situations))
 
     def constrained(self, problem: Problem) -> Problem:
-        """Return the problem; for a share of the worlds, add a constraint that holds initially."""
+        """Return the problem; in a share of the worlds, the problem gets a constraint that holds initially."""
         own = Random(f"constraints {self.seed}")
         if own.random() >= self.prevented:
             return problem

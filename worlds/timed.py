@@ -79,7 +79,7 @@ class TimedWorld:
         return max([0, *(by for _, by in self.deadlines), *(high for *_, high in self.windows)])
 
     def kept(self, facts: frozenset[int], time: int) -> bool:
-        """Return whether the goals whose deadlines are over hold."""
+        """Return whether every goal with an expired deadline holds."""
         over = {fact for fact, by in self.deadlines if by <= time}
         return all((fact in facts) is value for fact, value in self.goal if fact in over)
 
@@ -179,7 +179,7 @@ def least_makespan(world: TimedWorld) -> int | None:
 
 
 def _next(world: TimedWorld, state: State, time: int) -> Iterator[tuple[int, State]]:
-    """Yield each successor with the seconds until it holds: an action begins (0), or a second passes (1)."""
+    """Yield each successor with the seconds until the successor holds: an action begins (0), or a second passes (1)."""
     facts, running = state
     for number in range(len(world.actions)):
         after = _begun(world, facts, running, number)

@@ -33,7 +33,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
         raise KnowledgeError(MISSING) from error
 
     class Board(anywidget.AnyWidget):
-        """The widget. Python sets the content `data` and query results `rows`; the page sets changes `turned`, queries `asked`."""
+        """The widget, whose synchronised properties have the content, the user's changes, the queries and their results."""
 
         _esm = script()
         _css = asset("page.css")
