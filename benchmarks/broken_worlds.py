@@ -1,4 +1,4 @@
-"""Further doors (`benchmarks.broken_inputs`): definitions, amounts, SPARQL updates, numbers in PDDL, rules and meshes."""
+"""Further kinds of input for `benchmarks.broken_inputs`: definitions, amounts, SPARQL updates, numbers in PDDL, rules, meshes."""
 
 from __future__ import annotations
 

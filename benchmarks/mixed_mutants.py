@@ -115,7 +115,7 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
 
 
 def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
-    """Judge worlds in one mode until `enough` is true for a complaint; return the complaints and call results."""
+    """Judge worlds in one mode until `enough` is true for a complaint (a found fault); return the complaints and call results."""
     from worlds import judging
 
     judging.SECONDS = WAITING

@@ -8,8 +8,8 @@ Each call is tried with the longest limit in several scenes, until a call reache
 scene. If a call ends before its limit, the cell of the table is "before".
 
 Limits are in seconds of the wall clock. Another process reads the CPU time of a call and its child processes at the
-limit and at the end of the call. The difference is the overrun. The overrun is measured in CPU time, which depends
-little on the load of the machine.
+limit and at the end of the call. The difference of both CPU times is the overrun. The overrun is measured in CPU time,
+which depends little on the load of the machine.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ def query(
     iri: str | None,
     as_json: bool,
 ) -> None:
-    """Query a scene in SPARQL, or list the behaviours that its objects afford."""
+    """Query a scene in SPARQL, or list its affordances."""
     from confab.reasoner.graph.query_process import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
