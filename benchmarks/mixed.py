@@ -36,7 +36,7 @@ SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
 SAMPLE = 25
-"""Interval of the seeds of worlds that are examined for the effects of their features."""
+"""Sampling interval: one of this number of worlds is examined for the effects of its features."""
 
 
 def signature(one: Complaint) -> str:

@@ -166,7 +166,7 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 
 
 def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) -> dict[str, str]:
-    """Return the shipped queries by name, optionally without queries on episodes; a graph must declare a query's prefixes."""
+    """Return the shipped queries by name, without queries whose prefixes `graph` lacks and optionally without episode queries."""
     from confab.reasoner.graph.query_process import unknown_prefixes
 
     files = sorted((ontology.ROOT / "questions").glob("**/*.rq" if episodes else "*.rq"))

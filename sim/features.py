@@ -51,7 +51,7 @@ class FeatureFrame:
         return np.array([angle for angle in self.level() if self.low - 1e-6 <= angle <= self.high + 1e-6])
 
     def level(self) -> tuple[float, float]:
-        """Return the two angles about z at which x is horizontal, for a z that isn't vertical."""
+        """Return the two angles of a turn about the feature's z axis at which the hand points horizontally, if z isn't vertical."""
         angle = float(np.arctan2(-self.rotation[2, 0], self.rotation[2, 1]))
         return angle, float(np.angle(np.exp(1j * (angle + np.pi))))
 

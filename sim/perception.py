@@ -187,7 +187,7 @@ def measure_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Open the link, or leave it shut."""
+    """Open the link, or leave the link shut."""
     draft.opened[arguments[0]] = value == use.values.get("opened", "true")
 
 

@@ -182,7 +182,7 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
 
 
 def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
-    """Return, for each joint value, the poses (n, 6) of hands that hold a feature while its joint moves from the first value.
+    """Return, for each joint value, the poses (n, 6) of hands that hold a feature while the feature's joint moves there.
 
     The hand keeps its pose in the feature's frame, except that the hand may turn about the feature's z axis.
     """
@@ -364,7 +364,7 @@ MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "over": _over,
     "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
-"""The functions that execute motions, except that `_free` executes ``free``."""
+"""The function that executes each kind of motion; the function `_free` executes the motion ``free``."""
 
 
 WITHDRAWING = ("free", "home")

@@ -21,7 +21,7 @@ from confab.reasoner.symbols import (
 
 
 def has(situation: str, *terms: str) -> ValueCondition:
-    """Return the condition that a situation type has the last term as its value for the other terms."""
+    """Return the condition that a situation type, with all terms but the last as arguments, has the last term as its value."""
     return ValueCondition(situation, terms[:-1], terms[-1])
 
 
