@@ -18,9 +18,13 @@ class _Step(TypedDict):
 
 
 class StepJson(_Step, total=False):
-    """A step with its sub-steps, and in paper mode its cogency rank `rank`."""
+    """A step with its sub-steps, and in paper mode its cogency rank `rank`.
+
+    `joined` are further steps that the sub-steps refine together with this step.
+    """
 
     rank: float
+    joined: list[StepJson]
 
 
 class ReasonJson(TypedDict):

@@ -161,8 +161,9 @@ def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem
         hint = nearest(data["behavior"], problem.domain.behaviors)
         raise KnowledgeError(f"{where}: the scene has no behaviour '{data['behavior']}'{hint}")
     said, bound, below = data.get("arguments", []), data.get("bindings", {}), data.get("steps", [])
-    number, rank = data.get("id"), data.get("rank")
-    for name, value, kind in (("arguments", said, list), ("bindings", bound, dict), ("steps", below, list)):
+    number, rank, joined = data.get("id"), data.get("rank"), data.get("joined", [])
+    lists = {"arguments": said, "steps": below, "joined": joined}
+    for name, value, kind in (*((key, one, list) for key, one in lists.items()), ("bindings", bound, dict)):
         if not isinstance(value, kind):
             wanted = "an object" if kind is dict else "a list"
             raise KnowledgeError(f"{where}: '{name}' is {json.dumps(value)[:40]}; wanted {wanted}")
@@ -181,4 +182,5 @@ def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem
         bindings={str(k): str(v) for k, v in bound.items()},
         rank=rank if isinstance(rank, float) and isfinite(rank) else None,
         steps=tuple(step_from(step, (*position, i), path, problem) for i, step in enumerate(below)),
+        joined=tuple(step_from(other, position, path, problem) for other in joined),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from confab.planner.plan import Outcome, Plan, Step
@@ -69,7 +69,8 @@ def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:
 def _grow(tree: Tree, step: Step, notes: Notes) -> None:
     from rich.text import Text
 
-    branch = tree.add(Text.assemble(*_label(step, notes)))
+    lines = [Text.assemble(*label) for label in (_label(step, notes), *map(_label_of_joined, step.joined))]
+    branch = tree.add(Text("\n+ ").join(lines))
     for below in step.steps:
         _grow(branch, below, notes)
 
@@ -77,12 +78,15 @@ def _grow(tree: Tree, step: Step, notes: Notes) -> None:
 def _drawn(steps: Sequence[Step], notes: Notes, indent: str) -> Iterator[str]:
     for count, step in enumerate(steps, 1):
         last = count == len(steps)
+        below = indent + ("    " if last else "│   ")
         yield f"{indent}{'└' if last else '├'}── {''.join(text for text, _ in _label(step, notes))}"
-        yield from _drawn(step.steps, notes, indent + ("    " if last else "│   "))
+        for one in step.joined:
+            yield f"{below[:-2]}+ {''.join(text for text, _ in _label_of_joined(one))}"
+        yield from _drawn(step.steps, notes, below)
 
 
 def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
-    """Return the line for a step as pieces of text, each with its style in rich."""
+    """Return the line for one step as pieces of text, each with its style in rich."""
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
     label = [(f"{step.id:>2} ", "dim"), (step.behavior, style), (" " + " ".join(step.arguments), "")]
     if step.bindings and not step.steps:
@@ -90,6 +94,11 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
     if step.path in notes:
         label.append(("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green"))
     return label
+
+
+def _label_of_joined(step: Step) -> list[tuple[str, str]]:
+    """Return the line for a step that is refined together with the step of the line before."""
+    return _label(replace(step, bindings={}), {})
 
 
 def lengths(plan: Plan) -> str:

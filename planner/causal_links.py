@@ -184,16 +184,37 @@ class _Course:
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the changes of a step in the current state, or None if the step isn't applicable."""
-        behavior = self.problem.domain.behaviors[step.behavior]
-        found = self.rules.changes(behavior, step.arguments, self.facts)
-        return None if found is None else {(situation, key): value for situation, key, value in found}
+        """Return the changes of a step in the current state, or None if the step isn't applicable.
+
+        Steps that are refined together make their changes one after another.
+        """
+        found: dict[Cell, str] = {}
+        applicable = True
+        for _, made in self.in_turn(step):
+            applicable = made is not None
+            found |= made or {}
+        return found if applicable else None
+
+    def in_turn(self, step: Step) -> Iterator[tuple[Step, dict[Cell, str] | None]]:
+        """Yield each of the steps that are refined together, in the state after the steps before it, with its changes.
+
+        The changes of an inapplicable step are None, and no step follows it. At the end the facts are as before.
+        """
+        mark = len(self.facts.log)
+        for one in step.together:
+            found = self.rules.changes(self.problem.domain.behaviors[one.behavior], one.arguments, self.facts)
+            yield one, None if found is None else {(situation, key): value for situation, key, value in found}
+            if found is None:
+                break
+            for change in found if step.joined else ():
+                self.facts.put(*change)
+        self.facts.undo(mark)
 
     def needs_of(
         self, step: Step
     ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
         """Yield the steps that a step needs, with the conditions or symbols that would differ without the needed step."""
-        facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
+        facts = self.facts
         facts.cells, facts.of_value = {}, {}
         before = self.changes(step) or {}
         read = dict.fromkeys(cell for cell in facts.cells if cell in self.written)
@@ -204,8 +225,7 @@ class _Course:
             if (old := facts.value(*cell)) is not None and old != value:
                 given.append(FactChange(Fact(Symbol(*cell), value), old))
         self.gives[step.path] = tuple(given)
-        terms = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
-        bound = self.rules.satisfied(behavior.preconditions, terms, behavior.kinds, facts) or terms
+        bound = [self.bindings(one) for one, _ in self.in_turn(step)]
         by: dict[int, list[Cell]] = {}
         for cell in read:
             by.setdefault(self.written[cell].by, []).append(cell)
@@ -218,24 +238,33 @@ class _Course:
             for changes, conditions, differs in alone:
                 yield writer, changes, conditions, differs
 
+    def bindings(self, step: Step) -> Mapping[str, str]:
+        """Return the individuals of the parameters of a step, and of its variables in the current state."""
+        behavior = self.problem.domain.behaviors[step.behavior]
+        terms = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
+        return self.rules.satisfied(behavior.preconditions, terms, behavior.kinds, self.facts) or terms
+
     def failures_without(
-        self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
+        self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Sequence[Mapping[str, str]]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
         """Return the conditions of a step that fail if the given symbols have their previous values.
 
-        Return None if the previous values don't affect the step.
+        `bound` are the bindings of each of the steps that are refined together. Return None if the previous values don't affect the
+        step.
         """
         check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
         now = {cell: str(facts.value(*cell)) for cell in cells}
         for cell in cells:
             facts.put(*cell, self.written[cell].before)
-        after = self.changes(step)
-        preconditions = self.problem.domain.behaviors[step.behavior].preconditions
+        after: dict[Cell, str] | None = {}
         broken: list[Condition] = []
-        if after is None:
-            grounded = [substituted(condition, bound) for condition in preconditions]
-            broken = [c for c in grounded if self.rules.satisfied([c], {}, {}, facts) is None]
+        for (one, made), terms in zip(self.in_turn(step), bound, strict=False):
+            after = None if after is None or made is None else after | made
+            if made is None:
+                preconditions = self.problem.domain.behaviors[one.behavior].preconditions
+                grounded = [substituted(condition, terms) for condition in preconditions]
+                broken = [c for c in grounded if self.rules.satisfied([c], {}, {}, facts) is None]
         for cell, value in now.items():
             facts.put(*cell, value)
         del facts.log[mark:]

@@ -86,8 +86,9 @@ def instead_of(
     places = [i for i, step in enumerate(course) if place is None or step.path == place.path]
     states = _states(problem, course)
     for i in places:
-        if course[i].behavior == behavior.name and given.items() <= _terms(behavior, course[i].arguments).items():
-            return Contrast(before, behavior.name, course[i].arguments, course[i])
+        for one in course[i].together:
+            if one.behavior == behavior.name and given.items() <= _terms(behavior, one.arguments).items():
+                return Contrast(before, behavior.name, one.arguments, course[i])
     possible: list[tuple[int, tuple[str, ...]]] = []
     for i in places:
         found = rules.satisfied(behavior.preconditions, given, behavior.kinds, Facts(problem, states[i]))
@@ -227,7 +228,9 @@ def _refined(
     goal = {symbol: value for symbol, value in after.items() if state.get(symbol) != value}
     domain = replace(problem.domain, behaviors={behavior.name: forced, **lower})
     outcome = ask(replace(problem, domain=domain, initial=state, goal=goal))
-    if outcome.plan is None or [s.behavior for s in outcome.plan.steps] != [behavior.name]:
+    if outcome.plan is None or [one.behavior for step in outcome.plan.steps for one in step.together] != [
+        behavior.name
+    ]:
         return None, outcome.reason or Reason(f"no steps of the level below have the effects of {step}")
     return replace(outcome.plan.steps[0], id=step.id), None
 

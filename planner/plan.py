@@ -41,7 +41,8 @@ class Step:
 
     `path` is the position of the step in the tree. `bindings` are the individuals that the situation assigns to the variables of
     the behaviour, for example the object that GRASP grasps. `rank` is the cogency ranking score c_m of eq. (4) at the time when
-    the planner chose the behaviour. `rank` is None if the score wasn't computed.
+    the planner chose the behaviour. `rank` is None if the score wasn't computed. `joined` are further steps of the level that
+    `steps` refine together with this step, in order (docs/levels.md); they have the path of this step, and no sub-steps.
     """
 
     path: tuple[int, ...]
@@ -52,9 +53,18 @@ class Step:
     bindings: Mapping[str, str] = field(default_factory=dict, hash=False)
     rank: float | None = None
     steps: tuple[Step, ...] = ()
+    joined: tuple[Step, ...] = ()
+
+    @property
+    def together(self) -> tuple[Step, ...]:
+        """The steps that the sub-steps refine together: usually this step alone, otherwise this step and `joined`."""
+        return (self, *self.joined)
 
     def walk(self) -> Iterator[Step]:
-        """Yield the step and all steps below it; each step comes before its sub-steps."""
+        """Yield the step and all steps below it; each step comes before its sub-steps.
+
+        Steps that are refined together are one step of the tree.
+        """
         waiting = [self]
         while waiting:
             yield (step := waiting.pop())
@@ -71,11 +81,18 @@ class Step:
             "bindings": dict(self.bindings),
             "steps": [below.json() for below in self.steps],
         }
-        return data if self.rank is None else {**data, "rank": round(self.rank, 6)}
+        if self.rank is not None:
+            data["rank"] = round(self.rank, 6)
+        if self.joined:
+            data["joined"] = [other.json() for other in self.joined]
+        return data
 
     def __str__(self) -> str:
-        """Return the step in the form of the paper's figures, for example ``22 B1_MOVE cup1 location7``."""
-        return " ".join((str(self.id), self.behavior, *self.arguments))
+        """Return the step in the form of the paper's figures, for example ``22 B1_MOVE cup1 location7``.
+
+        A plus sign separates steps that are refined together.
+        """
+        return " + ".join(" ".join((str(step.id), step.behavior, *step.arguments)) for step in self.together)
 
 
 @right_names("a plan", "scene.plan() or scene.read_plan(FILE)")
@@ -148,8 +165,8 @@ class Plan(Sequence[Step], metaclass=RightNames):
             yield from step.walk()
 
     def at_level(self, level: int) -> tuple[Step, ...]:
-        """Return the steps of one level in the order of execution."""
-        return tuple(step for step in self.walk() if step.level == level)
+        """Return the steps of one level in the order of execution; steps that are refined together follow each other."""
+        return tuple(step for node in self.walk() if node.level == level for step in node.together)
 
     @property
     def primitives(self) -> tuple[Step, ...]:
@@ -158,8 +175,8 @@ class Plan(Sequence[Step], metaclass=RightNames):
 
     @property
     def length(self) -> dict[int, int]:
-        """Number of steps per level."""
-        levels = [step.level for step in self.walk()]
+        """Number of steps per level; each of several steps that are refined together counts."""
+        levels = [step.level for node in self.walk() for step in node.together]
         return CalledDict((level, levels.count(level)) for level in sorted(set(levels)))
 
     def json(self) -> dict[str, object]:
@@ -193,7 +210,7 @@ class Plan(Sequence[Step], metaclass=RightNames):
     def to_records(self) -> list[dict[str, object]]:
         """Return a record for each step, with its path, level, ID, behaviour, arguments and bindings.
 
-        Each step comes before its sub-steps.
+        Each step comes before its sub-steps. Steps that are refined together have the same path.
         """
         return [
             {
@@ -204,7 +221,8 @@ class Plan(Sequence[Step], metaclass=RightNames):
                 "arguments": " ".join(step.arguments),
                 "bindings": " ".join(f"{variable}={individual}" for variable, individual in step.bindings.items()),
             }
-            for step in self.walk()
+            for node in self.walk()
+            for step in node.together
         ]
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -419,9 +437,23 @@ def changed(before: State, after: State) -> list[Fact]:
     return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)
 
 
+def separated(steps: Iterable[Step]) -> Iterator[Step]:
+    """Yield steps in which the sub-steps of steps that are refined together replace these steps; paths are unchanged."""
+    for step in steps:
+        if step.joined:
+            yield from separated(step.steps)
+        else:
+            yield replace(step, steps=tuple(separated(step.steps)))
+
+
 def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
     """Return steps with new paths; the first step below the path `above` has the number `first`."""
     return tuple(
-        replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
+        replace(
+            step,
+            path=(*above, i),
+            steps=renumbered(step.steps, 0, (*above, i)),
+            joined=tuple(replace(one, path=(*above, i)) for one in step.joined),
+        )
         for i, step in enumerate(steps, first)
     )

@@ -7,7 +7,8 @@ world.
 
 docs/levels.md defines the meaning of a plan with several levels. After the refinement of a step, the symbols that the step's
 level sees have the values that the step states. Changed symbols of the level below that have a rest value are at rest. The next
-step begins in the state after the refinement.
+step begins in the state after the refinement. Several steps that are refined together are applied one after another in what
+their level sees; together they state the resulting values.
 """
 
 from __future__ import annotations
@@ -55,11 +56,12 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
 
     The faults are wrong IDs of steps, and the faults that `carried_out` finds.
     """
-    numbered = {step.path: problem.id_of(step.behavior, step.arguments) for step in plan.walk() if _fits(problem, step)}
+    steps = [step for node in plan.walk() for step in node.together if _fits(problem, step)]
+    numbered = [(step, problem.id_of(step.behavior, step.arguments)) for step in steps]
     wrong = [
-        Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {numbered[step.path]}")
-        for step in plan.walk()
-        if numbered.get(step.path, step.id) != step.id
+        Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {number}")
+        for step, number in numbered
+        if number != step.id
     ]
     return carried_out(problem, plan) + wrong
 
@@ -183,10 +185,66 @@ class _Check:
 
     def step(self, step: Step) -> bool:
         """Execute one step with its refinement; return whether the step and its sub-steps were applicable."""
+        if step.joined and not self.joinable(step):
+            return False
+        mark = len(self.facts.log)
+        wanted = self.stated(step)
+        if wanted is None:
+            return False
+        level = self.problem.domain.behaviors[step.behavior].level
+        if not step.steps:
+            for (situation, arguments), value in wanted.items():
+                self.facts.put(situation, arguments, value)
+            if level < self.depth and self.facts.since(mark):
+                self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
+            return self.within_bounds(step)
+        if not self.carried_out(step.steps, level, step.path, step, inside=True):
+            return False
+        totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
+        said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
+        for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
+            symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
+            if (cell in wanted and cell[0] not in totals) or self.problem.sees(level, symbol, said[cell]):
+                self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
+        return True
+
+    def joinable(self, step: Step) -> bool:
+        """Return whether steps that are refined together are of one level and have common sub-steps; record a fault."""
+        behaviors = [self.problem.domain.behaviors.get(one.behavior) for one in step.together]
+        levels = {behavior.level for behavior in behaviors if behavior is not None}
+        if step.steps and len(levels) <= 1 and not any(one.steps or one.joined for one in step.joined):
+            return True
+        self.fault(
+            step.path, f"{step}: steps that are refined together have one level and one common sequence of steps"
+        )
+        return False
+
+    def stated(self, step: Step) -> dict[Cell, str] | None:
+        """Return the values that a step states, or that steps which are refined together state; the facts are unchanged.
+
+        Steps that are refined together are applied one after another. Return None if one isn't applicable.
+        """
+        mark, exceptions = len(self.facts.log), dict(self.exceptions)
+        wanted: dict[Cell, str] = {}
+        made, last = self.changes(step), step
+        for one in step.joined if made is not None else ():
+            wanted |= made or {}
+            for (situation, arguments), value in wanted.items():
+                self.facts.put(situation, arguments, value)
+            allowed = self.within_bounds(last, self.problem.domain.behaviors[last.behavior].level)
+            made, last = self.changes(one) if allowed else None, one
+            if made is None:
+                break
+        self.facts.undo(mark)
+        self.exceptions = exceptions
+        return None if made is None else wanted | made
+
+    def changes(self, step: Step) -> dict[Cell, str] | None:
+        """Return the values that a step gives to symbols in the current state; record a fault if it isn't applicable."""
         behavior = self.problem.domain.behaviors.get(step.behavior)
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
-            return False
+            return None
         changes = self.rules.changes(behavior, step.arguments, self.facts)
         if changes is None:
             beyond = self.rules.beyond(behavior, step.arguments, self.facts)
@@ -196,33 +254,21 @@ class _Check:
                 else "its preconditions don't hold in the state before it"
             )
             self.fault(step.path, f"{step}: {why}")
-            return False
-        mark = len(self.facts.log)
-        if not step.steps:
-            for situation, arguments, value in changes:
-                self.facts.put(situation, arguments, value)
-            if behavior.level < self.depth and self.facts.since(mark):
-                self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
-            return self.within_bounds(step)
-        wanted = {(situation, arguments): value for situation, arguments, value in changes}
-        if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
-            return False
-        totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
-        said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
-        for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
-            symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
-            if (cell in wanted and cell[0] not in totals) or self.problem.sees(behavior.level, symbol, said[cell]):
-                self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
-        return True
+            return None
+        return {(situation, arguments): value for situation, arguments, value in changes}
 
-    def within_bounds(self, step: Step) -> bool:
+    def within_bounds(self, step: Step, level: int | None = None) -> bool:
         """Return whether all totals are within their bounds and no constraint is violated after a step; record a violation.
+
+        If a level is given, only the totals and constraints that the level sees count.
 
         The initial state may have exceptions to a constraint. A step violates the constraint if the number of exceptions grows.
         """
         constraints = self.problem.domain.constraints
         for name in self.rules.bounded:
             kind = self.problem.domain.situations[name]
+            if level is not None and kind.level > level:
+                continue
             for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
                 got = self.facts.value(name, arguments)
                 if got is None or kind.quantity is None:
@@ -326,6 +372,12 @@ class Facts:
         if situation in self._holders:
             self._holders[situation].get(old, {}).pop(arguments, None)
             self._holders[situation].setdefault(value, {})[arguments] = None
+
+    def undo(self, mark: int) -> None:
+        """Undo all changes since the log had the length `mark`."""
+        for situation, arguments, old in reversed(self.log[mark:]):
+            self.put(situation, arguments, old)
+        del self.log[mark:]
 
     def since(self, mark: int) -> dict[Cell, str]:
         """Return the symbols that have changed since the log had the length `mark`, with their earlier values."""

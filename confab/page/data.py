@@ -197,7 +197,7 @@ def _steps(timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], s
             "id": id_of(step.path),
             "number": number_of[step.path],
             "what": labels.step(step),
-            "name": f"{step.behavior} #{step.id}",
+            "name": " + ".join(f"{one.behavior} #{one.id}" for one in step.together),
         }
         if (bar := bars.get(step.path)) is not None:
             data |= {"begin": round(bar.begin, 3), "end": round(bar.end, 3)}

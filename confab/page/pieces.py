@@ -33,11 +33,13 @@ def tree(
 
     def item(step: Step) -> Markup:
         note = (notes or {}).get(step.path, "")
-        head = [
-            tag("span", labels.step(step) if labels else " ".join((step.behavior, *step.arguments)), class_="what"),
-            " ",
-            tag("small", f"{number_of[step.path]} · {step.behavior} #{step.id}"),
-        ]
+        names = " + ".join(f"{one.behavior} #{one.id}" for one in step.together)
+        said = (
+            labels.step(step)
+            if labels
+            else "; ".join(" ".join((one.behavior, *one.arguments)) for one in step.together)
+        )
+        head = [tag("span", said, class_="what"), " ", tag("small", f"{number_of[step.path]} · {names}")]
         if note:
             head += [" ", tag("span", note, class_="bad" if "✗" in note else "note")]
         body = why[step.path].reasons() if step.path in why else []

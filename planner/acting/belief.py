@@ -11,6 +11,7 @@ from confab.planner.acting.episode import Surprise
 from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import Compiled, compiled
+from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
@@ -114,9 +115,14 @@ class Belief:
         self.problem = replace(self.problem, initial=now)
         return tuple(surprises)
 
-    def could_begin(self, behavior: str, arguments: tuple[str, ...], state: State) -> bool:
-        """Return whether a behaviour is applicable in a state with the given arguments."""
-        return successor(self.problem, self.problem.domain.behaviors[behavior], arguments, state) is not None
+    def could_begin(self, step: Step, state: State) -> bool:
+        """Return whether a step is applicable in a state; steps that are refined together are applied one after another."""
+        for one in step.together:
+            after = successor(self.problem, self.problem.domain.behaviors[one.behavior], one.arguments, state)
+            if after is None:
+                return False
+            state = after
+        return True
 
     # ------------------------------------------------------------------------------------------------- knowledge of the scene
 

@@ -279,7 +279,7 @@ class _Run:
         done = self.record.done
         gone = set(done) - {step.path for step in all_steps(self.agenda.steps[:1])}
         first = self.belief.problem.domain.levels[0]
-        finished = {done[path].id for path in gone if done[path].level == first}
+        finished = {one.id for path in gone if done[path].level == first for one in done[path].together}
         due = [i for i in self.waiting if (i.after in finished if isinstance(i.after, int) else i.after in gone)]
         due += [i for i in self.waiting if i.at is not None and not i.of_world and i.at <= self.world.seconds]
         for intervention in due:
@@ -325,7 +325,7 @@ class _Run:
         for step in first_chain(self.agenda.steps)[:-1]:
             if step.path in self.agenda.begun:
                 as_if = {s: v for s, v in {**self.agenda.begun[step.path], **changes}.items() if v is not None}
-                self.agenda.sound = self.agenda.sound and self.belief.could_begin(step.behavior, step.arguments, as_if)
+                self.agenda.sound = self.agenda.sound and self.belief.could_begin(step, as_if)
 
     # --------------------------------------------------------------------------------------------------- repairing
 

@@ -99,7 +99,8 @@ def refuted_by(
         effects. Refutations that `likewise` implies are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
-    for step in chain if facts and not any(one.covers(exact) for one in likewise) else ():
+    steps = chain if facts and not any(one.covers(exact) for one in likewise) else ()
+    for step in (one for node in steps for one in node.together):
         if {*exact.arguments} <= {*step.arguments} and _seen(problem, step.behavior, facts):
             found.append(replace(exact, behavior=step.behavior, arguments=step.arguments))
     behaviors = {one.behavior for one in likewise}
@@ -144,15 +145,19 @@ def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
     If the primitive relied on no static fact, return the static facts of its nearest ancestor that relied on static facts.
     """
     for step in reversed(chain):
-        behavior = problem.domain.behaviors[step.behavior]
-        env = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
-        env |= {f"?{name}": value for name, value in step.bindings.items()}
-        found = [
-            (c.relation, tuple(env.get(a, a) for a in c.arguments))
-            for c in behavior.preconditions
-            if isinstance(c, RelationCondition) and not c.negated
-        ]
-        found = [(name, row) for name, row in found if row in problem.relations.get(name, ())]
+        found = [static for one in step.together for static in _static_of(problem, one)]
         if found:
             return found
     return []
+
+
+def _static_of(problem: Problem, step: Step) -> Iterator[Static]:
+    """Yield the static facts that the preconditions of a step require."""
+    behavior = problem.domain.behaviors[step.behavior]
+    env = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
+    env |= {f"?{name}": value for name, value in step.bindings.items()}
+    for condition in behavior.preconditions:
+        if isinstance(condition, RelationCondition) and not condition.negated:
+            row = tuple(env.get(a, a) for a in condition.arguments)
+            if row in problem.relations.get(condition.relation, ()):
+                yield condition.relation, row

@@ -23,6 +23,7 @@ from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.search_budget import ONE_STEP
 from confab.planner.hierarchical.unsolvability import impossible
+from confab.planner.hierarchical.windows import refined
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -147,9 +148,10 @@ def repair(
     if not solved:
         return None
     costs = costs_of_steps(call.problem, call.tree().steps)
-    needed = {i for i in kept if touched.isdisjoint(call.steps[i][2])} | _last_steps(call)
+    named = [{argument for one in step.together for argument in one.arguments} for step in call.steps]
+    needed = {i for i in kept if touched.isdisjoint(named[i])} | _last_steps(call)
     for individual in sorted(touched):  # one step might replace all steps about the individual
-        together = [i for i in needed if individual in call.steps[i][2]]
+        together = [i for i in needed if individual in named[i]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
 
@@ -257,7 +259,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
 
 def _restore(call: Call, pending: Sequence[Step]) -> None:
     """Achieve the disturbed goals first: the open goals that no pending step achieves and that one step can achieve."""
-    planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
+    planned = {cell for step in pending for cell in _effects(call, step)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
     before = order(call) if orphans else {}
     for cell in orphans:
@@ -270,12 +272,14 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
     progress, whole = True, True
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
-        for step in pending:
+        steps = pending[::-1]
+        while steps:
+            step = steps.pop()
             call.space.check_time()
-            if not waiting.isdisjoint(step.arguments):
+            if any(not waiting.isdisjoint(one.arguments) for one in step.together):
                 put_off.append(step)
                 continue
-            effects = _effects(call, step.behavior, step.arguments, step.bindings)
+            effects = _effects(call, step)
             if _useless(call, effects, wanted):
                 _achieve_instead(call, effects)
                 whole = False
@@ -283,7 +287,12 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
             if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
                 whole = False
                 continue
-            done = _redo(call, step) or call.refiner.do(step.level, step.behavior, step.arguments)
+            done = _redo(call, step)
+            if done is None and step.joined:  # each step is refined alone
+                steps += [replace(one, steps=(), joined=()) for one in reversed(step.together)]
+                whole = False
+                continue
+            done = done or call.refiner.do(step.level, step.behavior, step.arguments)
             if done is None:
                 put_off.append(step)
                 waiting.update(individual for _, key in effects for individual in arguments_of(key))
@@ -301,13 +310,11 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     its effects.
     """
     mark = len(call.table.trail)
-    applicable = call.space.forward[step.behavior](*step.arguments)
-    if applicable is None and not (begun and step.steps):
-        return None
-    if not step.steps:
-        assert applicable is not None
-        call.space.apply(applicable[1])
-        return RefinedStep(step.level, step.behavior, step.arguments, applicable[0], ())
+    one = refined(call, (step,))[0]._replace(steps=())
+    applicable, stated = call.refiner.stated(one)
+    if not step.steps or (applicable is None and not begun):
+        return applicable if not step.steps else None
+    call.table.undo(mark)
     below = []
     for child in step.steps:
         done = _redo(call, child, begun)
@@ -316,12 +323,10 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
             return None
         below.append(done)
     now = call.table.now
-    if not begun and applicable is not None and any(now[s].get(k, FALSE) != value for s, k, value in applicable[1]):
+    if not begun and any(now[s].get(k, FALSE) != value for (s, k), value in stated.items()):
         call.table.undo(mark)
         return None
-    names = call.program.variables[step.behavior]
-    bindings = tuple(step.bindings.get(name, "") for name in names) if applicable is None else applicable[0]
-    return RefinedStep(step.level, step.behavior, step.arguments, bindings, tuple(below))
+    return (applicable or one)._replace(steps=tuple(below))
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
@@ -341,16 +346,18 @@ def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
     )
 
 
-def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapping[str, str]) -> dict[Cell, str]:
+def _effects(call: Call, step: Step) -> dict[Cell, str]:
     """Return the values that a step would give to symbols, whether or not the step is applicable."""
-    lifted = call.problem.domain.behaviors[behavior]
-    env = {p.name: argument for p, argument in zip(lifted.parameters, arguments, strict=True)}
-    env |= {f"?{name}": value for name, value in bindings.items()}
-    return {
-        (effect.situation, key_of(tuple(env.get(a, a) for a in effect.arguments))): env.get(effect.value, effect.value)
-        for effect in lifted.effects
-        if not effect.when
-    }
+    found: dict[Cell, str] = {}
+    for one in step.together:
+        lifted = call.problem.domain.behaviors[one.behavior]
+        env = {p.name: argument for p, argument in zip(lifted.parameters, one.arguments, strict=True)}
+        env |= {f"?{name}": value for name, value in one.bindings.items()}
+        for effect in lifted.effects:
+            if not effect.when:
+                key = key_of(tuple(env.get(a, a) for a in effect.arguments))
+                found[effect.situation, key] = env.get(effect.value, effect.value)
+    return found
 
 
 def _last_steps(call: Call) -> set[int]:
@@ -358,14 +365,14 @@ def _last_steps(call: Call) -> set[int]:
 
     Consecutive steps below the first level count as one group.
     """
-    start, variables, first = call.problem.initial, call.program.variables, call.program.levels[0]
+    start, first = call.problem.initial, call.program.levels[0]
     last: dict[Cell, int] = {}
     together: dict[int, set[int]] = {}
     before: set[int] = set()
-    for position, (level, name, arguments, bindings, _) in enumerate(call.steps):
-        for cell in _effects(call, name, arguments, dict(zip(variables[name], bindings, strict=False))):
+    for position, step in enumerate(call.tree().steps):
+        for cell in _effects(call, step):
             last[cell] = position
-        before = {*before, position} if level > first else set()
+        before = {*before, position} if step.level > first else set()
         together[position] = before or {position}
     found: set[int] = set()
     for symbol, value in call.problem.goal.items():

@@ -123,8 +123,8 @@ def live(
 
 
 def grounds(steps: Sequence[Step]) -> list[Ground]:
-    """Return each step as the name of its behaviour and its arguments."""
-    return [(step.behavior, step.arguments) for step in steps]
+    """Return each step as the name of its behaviour and its arguments, also each of steps that are refined together."""
+    return [(one.behavior, one.arguments) for step in steps for one in step.together]
 
 
 def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Change]]:
@@ -224,10 +224,16 @@ def rules_and_methods(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
 
 
 def refined(call: Call, steps: Iterable[Step]) -> Lesson:
-    """Apply steps; return, for each refined step, the method, the individuals in the method's roles, and the rules."""
+    """Apply steps; return, for each refined step, the method, the individuals in the method's roles, and the rules.
+
+    The refinement of several steps together is no method and no rule of any of them.
+    """
     lesson = Lesson()
     for step in steps:
         check("learning")
+        if step.joined:
+            lesson += refined(call, step.steps)
+            continue
         mark = len(call.table.trail)
         bindings, made = changes(call, (step.behavior, step.arguments))
         if not step.steps:
@@ -298,8 +304,8 @@ def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Metho
     """
     method = methods.lifted(step.behavior, grounds(step.steps), own)
     filled = dict(zip(range(len(own)), own, strict=True))
-    for (_, places), inner in zip(method.steps, step.steps, strict=True):
-        filled.update(zip(places, inner.arguments, strict=True))
+    for (_, places), (_, arguments) in zip(method.steps, grounds(step.steps), strict=True):
+        filled.update(zip(places, arguments, strict=True))
     determined = {place for place, role in enumerate(method.open, len(own)) if role.source is not None}
     return method, tuple(
         [None if place in determined else filled[place] for place in range(len(own) + len(method.open))]
@@ -309,23 +315,29 @@ def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Metho
 def chosen(
     rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
 ) -> Lesson:
-    """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules."""
+    """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules.
+
+    Steps that are refined together are applied, but aren't compared with other instances.
+    """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call, also=rules)
     reader = FactReader(using.program, call.table, call.goal)
-    later = grounds(steps)
     lesson = Lesson()
-    for number, ground in enumerate(later):
+    for number, step in enumerate(steps):
         check("learning")
+        ground = step.behavior, step.arguments
+        if step.joined:
+            carry_out(call, step)
+            continue
         open_ = policy.open() if problem.domain.behaviors[ground[0]].level == policy.first else {}
         ready = {cell: value for cell, value in open_.items() if not policy.waits(cell)}
         applicable = list(policy.every(ready)) or list(policy.every(open_))
         done = [c for c in applicable if c.ground == ground]
         if done:
-            rest = set(later[number + 1 :])
+            rest = set(grounds(steps[number + 1 :]))
             passed = {c.ground: c for c in applicable if c.ground != ground and c.ground not in rest}
             lesson += compared(reader, done, list(passed.values()))
-        carry_out(call, steps[number])
+        carry_out(call, step)
     return lesson
 
 
@@ -366,7 +378,8 @@ def lesson_of_failure(
     """Return the lesson of a step whose sub-step with the given path failed.
 
     The lesson counts a failure of the rules that would have chosen the step, of the facts about the individuals in the
-    rules' roles, and of the individuals in the step's refinement.
+    rules' roles, and of the individuals in the step's refinement. Steps that are refined together teach nothing, since
+    any of them may have caused the failure.
     """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call)
@@ -376,12 +389,12 @@ def lesson_of_failure(
     lesson = Lesson()
     wanted = (step.behavior, step.arguments)
     for c in policy.every(policy.open()):
-        if c.ground == wanted:
+        if c.ground == wanted and not step.joined:
             lesson.counted += counts_of(reader, c, FAILED)
             lesson.personal += [(c.rule, fact, PASSED) for fact in reader.individuals(c.rule, c.roles)]
     for number in (*path, 0):
         done = call.space.forward[step.behavior](*step.arguments)
-        if done is None or number >= len(step.steps):
+        if done is None or step.joined or number >= len(step.steps):
             break
         method, roles = method_of(call.refiner.methods, step, (*step.arguments, *done[0]))
         failed = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]

@@ -67,7 +67,7 @@ def plan(
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)
-    flat = () if found is None else (under_the_levels_above(problem, found), found)
+    flat = () if found is None else (under_the_levels_above(problem, found, using), found)
     plan = next((plan for plan in flat if not validate(problem, plan)), best.plan)
     status = Status.SOLVED if plan is not None else best.status
     return replace(

@@ -182,10 +182,11 @@ class Call:
         id_of, variables = self.program.problem.id_of, self.program.variables
 
         def step(done: RefinedStep, path: tuple[int, ...]) -> Step:
-            level, name, arguments, bindings, below = done
+            level, name, arguments, bindings, below, joined = done
             bound = dict(zip(variables[name], bindings, strict=True)) if bindings else {}
             inner = tuple([step(child, (*path, i)) for i, child in enumerate(below)])
-            return Step(path, id_of(name, arguments), level, name, arguments, bound, None, inner)
+            others = tuple([step(other, path) for other in joined])
+            return Step(path, id_of(name, arguments), level, name, arguments, bound, None, inner, others)
 
         return Plan(tuple([step(done, (i,)) for i, done in enumerate(self.steps)]))
 

@@ -148,7 +148,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     flat = lowest_alone(call, limits, BITS * limits.work)
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
-    plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest)
+    plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
     plan = next((plan for plan in plans if plan is flat.plan or not validate(problem, plan)), None)
     if plan and upper and all(step.level == upper[0] for step in plan.steps):
         call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up

@@ -32,13 +32,22 @@ ATTEMPTS, FEW_ATTEMPTS = 40, 4
 
 
 class RefinedStep(NamedTuple):
-    """An applied step; `bindings` are the individuals of its variables, and `steps` are its refinement."""
+    """An applied step; `bindings` are the individuals of its variables, and `steps` are its refinement.
+
+    `joined` are further steps, without sub-steps, that `steps` refine together with this step.
+    """
 
     level: int
     behavior: str
     arguments: tuple[str, ...]
     bindings: tuple[str, ...]
     steps: tuple[RefinedStep, ...]
+    joined: tuple[RefinedStep, ...] = ()
+
+    @property
+    def together(self) -> tuple[RefinedStep, ...]:
+        """The steps that the sub-steps refine together: this step and `joined`."""
+        return (self, *self.joined)
 
 
 class RefinementTask(NamedTuple):
@@ -297,26 +306,41 @@ class Refiner:
         Return None and leave the table unchanged if the step or a sub-step isn't applicable, or if the refinement doesn't have the
         effect of the step.
         """
-        level, name, arguments, _, below = step
-        done = self.space.forward[name](*arguments)
-        if done is None:
-            return None
-        if not below:
-            self.space.apply(done[1])
-            return RefinedStep(level, name, arguments, done[0], ())
         mark = len(self.table.trail)
-        targets = self.targets(level, done[1])
+        bound, targets = self.stated(step)
+        if bound is None:
+            return None
+        if not step.steps:
+            return bound
+        self.table.undo(mark)
         inner = []
-        for child in below:
+        for child in step.steps:
             again = self.replay_checked(child)
             if again is None:
                 self.table.undo(mark)
                 return None
             inner.append(again)
-        if self.wrong_value(mark, targets, self.space.refining(level)) is not None:
+        if self.wrong_value(mark, targets, self.space.refining(step.level)) is not None:
             self.table.undo(mark)
             return None
-        return RefinedStep(level, name, arguments, done[0], tuple(inner))
+        return bound._replace(steps=tuple(inner))
+
+    def stated(self, step: RefinedStep) -> tuple[RefinedStep | None, dict[Cell, str]]:
+        """Apply the effects of a step, and of the steps joined to it, without the refinement.
+
+        Return the step with its current bindings and without sub-steps, and the values that it states. If the step isn't
+        applicable, return None and leave the table unchanged.
+        """
+        mark, targets, bound = len(self.table.trail), dict[Cell, str](), list[RefinedStep]()
+        for level, name, arguments, *_ in step.together:
+            done = self.space.forward[name](*arguments)
+            if done is None:
+                self.table.undo(mark)
+                return None, {}
+            targets |= self.targets(level, done[1])
+            self.space.apply(done[1])
+            bound.append(RefinedStep(level, name, arguments, done[0], ()))
+        return bound[0]._replace(joined=tuple(bound[1:])), targets
 
     def replay(self, step: RefinedStep) -> bool:
         """Apply the primitives of a step without checks of its effect; return whether all primitives were applicable."""

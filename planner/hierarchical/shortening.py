@@ -22,7 +22,6 @@ from time import perf_counter
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.windows import improves, primitives, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
@@ -85,11 +84,15 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
         reordered(call, work, advised, random)
         windowed(call, levels[0], work)
-    if aside and leave_levels:
+    several = len(call.steps) > 1
+    if (aside or several) and leave_levels:
         for level in levels[1:-1]:
             windowed(call, level, work)
+    if aside and leave_levels:
         drop_detours(call, levels[-2])
-    if leave_levels and (drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1 or lasting(call)):
+    if leave_levels and (
+        drop_detours(call, levels[-1]) or several or call.given_up or len(levels) == 1 or lasting(call)
+    ):
         windowed(call, levels[-1], work)
 
 
@@ -109,24 +112,25 @@ def puts_aside(call: Call) -> bool:
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
-    for level, name, arguments, bindings, below in call.steps:
+    for step in call.steps:
         call.space.check_time()
         mark = len(table.trail)
-        call.refiner.replay(RefinedStep(level, name, arguments, bindings, below))
+        call.refiner.replay(step)
         touched = {
             (situation, key)
             for situation, key, _ in table.trail[mark:]
-            if problem.domain.situations[situation].level <= level
+            if problem.domain.situations[situation].level <= step.level
         }
         if not idle.isdisjoint(touched):
             table.undo(0)
             return True
-        behavior = problem.domain.behaviors[name]
-        terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
-        terms |= dict(zip((f"?{variable}" for variable in names[name]), bindings, strict=True))
-        for asked in behavior.preconditions:
-            if isinstance(asked, ValueCondition) and not asked.negated:
-                idle.discard((asked.situation, key_of(tuple(terms.get(a, a) for a in asked.arguments))))
+        for _, name, arguments, bindings, *_ in step.together:
+            behavior = problem.domain.behaviors[name]
+            terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
+            terms |= dict(zip((f"?{variable}" for variable in names[name]), bindings, strict=True))
+            for asked in behavior.preconditions:
+                if isinstance(asked, ValueCondition) and not asked.negated:
+                    idle.discard((asked.situation, key_of(tuple(terms.get(a, a) for a in asked.arguments))))
         idle |= touched
     table.undo(0)
     return False

@@ -11,13 +11,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, fresh_call
+from confab.planner.hierarchical.call import Call, Compiled, fresh_call
 from confab.planner.hierarchical.detours import parts
 from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
-from confab.planner.plan import Plan, Step, UngroundableError
+from confab.planner.plan import Plan, Step, UngroundableError, renumbered, separated
 from confab.planner.plan_costs import compared
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
@@ -48,7 +48,7 @@ def windowed(call: Call, level: int, work: int) -> None:
     if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
         Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
     problem, old = call.problem, call.tree()
-    for plan in regroupings(problem, other.tree(), level):
+    for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan):
             call.steps = refined(call, plan.steps)
             return
@@ -59,16 +59,20 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
 
     Return None if no cheaper sequence is found, or if the level is too large.
     """
-    steps = [part for step in call.steps for part in parts(step, level)]
+    steps = [one for step in call.steps for part in parts(step, level) for one in part.together]
     if any(step.level != level for step in steps):
         return None
     from confab.planner.grounded.plan_windows import shorter
     from confab.planner.grounded.shortest import least
 
-    between = level not in (call.program.levels[0], call.program.levels[-1])
-    problem = replace(call.problem, domain=binding(call.problem, level)) if between else call.problem
-    task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
-    operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
+    first, last = call.program.levels[0], call.program.levels[-1]
+    bound = [replace(call.problem, domain=binding(call.problem, level))] if level > first else []
+    unbound = [call.problem] if level in (first, last) else []
+    for problem in (*bound, *unbound):
+        task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
+        operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
+        if operators is not None:
+            break
     if task is None or operators is None:
         return None
     if level == call.program.levels[-1]:
@@ -91,7 +95,7 @@ def small(problem: Problem, level: int, deadline: float | None, most: int) -> Ta
     return task if isinstance(task, Task) else None
 
 
-def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
+def regroupings(problem: Problem, plan: Plan, level: int, using: Compiled) -> tuple[Plan, ...]:
     """Return two versions of a plan of one level: grouped under steps of the upper levels, and ungrouped.
 
     For a plan of the most abstract level, return only this plan.
@@ -100,7 +104,7 @@ def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
         return (plan,)
     from confab.planner.hierarchical.regrouping import under_the_levels_above
 
-    return under_the_levels_above(problem, plan), plan
+    return under_the_levels_above(problem, plan, using), plan
 
 
 def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
@@ -111,8 +115,9 @@ def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
             step.level,
             step.behavior,
             step.arguments,
-            tuple(step.bindings[name] for name in names[step.behavior]) if step.bindings else (),
+            tuple(step.bindings.get(name, "") for name in names[step.behavior]) if step.bindings else (),
             tuple(refined(call, step.steps)),
+            tuple(refined(call, step.joined)),
         )
         for step in steps
     ]
@@ -132,7 +137,7 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     first, last = problem.domain.levels[0], problem.domain.levels[-1]
-    lost = sum(step.level == first for step in old.steps) - sum(step.level == first for step in new.steps)
+    lost = len(old.at_level(first)) - len(new.at_level(first)) if any(step.level > first for step in new.steps) else 0
     dear = lost > 0 and first != level == last and all(step.level == first for step in old.steps)
     return (
         before > price * (KEPT if dear else 1.0)
@@ -142,5 +147,8 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
 
 
 def broken(problem: Problem, plan: Plan) -> int:
-    """Return the number of changes of a plan that violate a condition of an upper level."""
-    return sum(len(left.broken) for left in levels_left(problem, plan))
+    """Return the number of changes of a plan that violate a condition of an upper level.
+
+    A change by steps that several steps of a level refine together also violates a condition if the level couldn't make it.
+    """
+    return sum(len(left.broken) for left in levels_left(problem, Plan(renumbered(separated(plan.steps)))))

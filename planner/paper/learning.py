@@ -43,12 +43,17 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
 def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Links, constants: PaperConstants) -> Values:
     state = start
     for step in steps:
-        applied = model.apply(GroundBehavior(step.id, step.behavior, step.arguments), state)
-        if applied is None:
-            raise LearningError(f"step {'.'.join(map(str, step.path))} ({step}): its preconditions don't hold there")
-        conclusion = (step.behavior, step.arguments)
-        reinforce(links, conclusion, model.state(state), model.problem, step.level, constants.learning)
-        state = _learn_steps(model, step.steps, state, links, constants) if step.steps else applied.after
+        now = state
+        for one in step.together:
+            applied = model.apply(GroundBehavior(one.id, one.behavior, one.arguments), now)
+            if applied is None:
+                raise LearningError(
+                    f"step {'.'.join(map(str, step.path))} ({step}): its preconditions don't hold there"
+                )
+            conclusion = (one.behavior, one.arguments)
+            reinforce(links, conclusion, model.state(now), model.problem, one.level, constants.learning)
+            now = applied.after
+        state = _learn_steps(model, step.steps, state, links, constants) if step.steps else now
     return state
 
 

@@ -88,10 +88,13 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
                 names |= renamed.get(numbers[one.path], {})
         if not names:
             return step
+        new, *joined = (named(one, names) for one in step.together)
+        return replace(new, steps=inside, joined=tuple(joined))
+
+    def named(step: Step, names: Mapping[str, str]) -> Step:
         arguments = tuple(names.get(a, a) for a in step.arguments)
         bindings = {variable: names.get(value, value) for variable, value in step.bindings.items()}
-        number = problem.id_of(step.behavior, arguments)
-        return replace(step, id=number, arguments=arguments, bindings=bindings, steps=inside)
+        return replace(step, id=problem.id_of(step.behavior, arguments), arguments=arguments, bindings=bindings)
 
     return Plan(tuple(map(other, plan.steps)))
 
@@ -133,7 +136,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
     for step in plan.walk():
         if step.steps:
             inside = {numbers[one.path] for one in step.walk() if not one.steps}
-            for argument in dict.fromkeys(step.arguments):
+            for argument in dict.fromkeys(argument for one in step.together for argument in one.arguments):
                 naming[argument].append(inside)
     involved = {
         actor: {i for i, one in enumerate(order.activities) if actor in one.step.arguments or actor in one.actors}

@@ -25,6 +25,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "drawers-small": {1: 2, 2: 20},
     "house-small": {1: 2, 2: 19, 3: 39},
     "laboratory-small": {1: 5, 2: 17, 3: 36},
+    "library-small": {1: 3, 2: 17},
     "towers-small": {1: 4, 2: 6, 3: 30},
     # Large scenes, each step refined as shortly as can be. Assembly: a change of tools at every joint (73 and 259 if each tool is
     # fetched as seldom as the order of parts lets it). Canal: the water is wrong for every boat (297 and 555 if boats go up and
@@ -40,6 +41,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "drawers-large": {1: 9, 2: 130},
     "house-large": {1: 10, 2: 144, 3: 288},
     "laboratory-large": {1: 20, 2: 82, 3: 173},
+    "library-large": {1: 12, 2: 72},  # each book with two drives, and the brake released and set
     "towers-large": {1: 6, 2: 26, 3: 130},
 }
 SMALL = [scene for scene in AT_MOST if scene.endswith("-small")]
@@ -69,7 +71,10 @@ def test_a_world_is_planned_without_giving_a_level_up_and_left_at_rest(scene: st
         result.problem, result.plan
     ):  # a stretch may stand in the place of steps above if it is shorter
         assert len(result.plan.primitives) < max(AT_MOST[scene].items())[1], bare
-    longer = {level: count for level, count in result.plan.length.items() if count > AT_MOST[scene][level]}
+    counted = result.plan.length
+    if any(step.joined for step in result.plan.walk()):  # more steps of level 1 may have a shorter refinement together
+        counted = {max(counted): counted[max(counted)]}
+    longer = {level: count for level, count in counted.items() if count > AT_MOST[scene][level]}
     assert longer == {}, f"wanted at most {AT_MOST[scene]}"
 
 

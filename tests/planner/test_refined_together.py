@@ -1,0 +1,131 @@
+"""Several steps of a level are refined together: what the checker accepts, where the planner uses it, and who else knows it."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.planner.causal_links import Kind, purposes
+from confab.planner.levels import levels_left
+from confab.planner.plan import Plan, Step, renumbered
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Fact, Symbol
+
+
+@cache
+def library() -> confab.Scene:
+    return confab.load("library-small")
+
+
+@cache
+def tour() -> Plan:
+    """Return the plan of one tour of the cart: three steps of level 1 are refined together."""
+    return library().plan().plan
+
+
+def node() -> Step:
+    (only,) = tour().steps
+    return only
+
+
+def faults(step: Step) -> list[str]:
+    return [fault.text for fault in validate(library().problem, Plan(renumbered((step,))))]
+
+
+def bring(book: str, place: str) -> Step:
+    arguments = (book, place)
+    return Step((0,), library().problem.id_of("L1_BRING", arguments), 1, "L1_BRING", arguments)
+
+
+def test_one_tour_with_all_books_is_the_refinement_of_all_steps_of_level_1() -> None:
+    plan = tour()
+    assert plan.length == {1: 3, 2: 10}
+    assert len(plan) == 1
+    assert {one.arguments for one in node().together} == {
+        ("atlas", "shelf_a"),
+        ("bible", "shelf_b"),
+        ("comic", "shelf_a"),
+    }
+    assert validate(library().problem, plan) == []
+    assert levels_left(library().problem, plan) == []
+    assert plan.at_level(1) == node().together
+
+
+@pytest.mark.parametrize("alone", [{"mode": "paper"}, {"leave_levels": False}], ids=["paper", "strict"])
+def test_the_papers_mode_and_strict_levels_refine_each_step_alone(alone: dict[str, object]) -> None:
+    plan = library().plan(**alone).plan
+    assert plan.length == {1: 3, 2: 17}
+    assert not any(step.joined for step in plan.walk())
+
+
+def test_steps_whose_joint_effect_differs_from_the_refinement_are_refused() -> None:
+    fewer = replace(node(), joined=node().joined[:-1])
+    assert any("its refinement leaves" in text for text in faults(fewer))
+    elsewhere = replace(node(), joined=(*node().joined, bring("atlas", "shelf_b")))
+    assert any("its refinement leaves <atlas, BOOK_AT>" in text for text in faults(elsewhere))
+
+
+def test_rest_values_must_hold_at_the_end_of_a_joint_refinement_and_only_there() -> None:
+    restless = replace(node(), steps=tuple(one for one in node().steps if one.behavior != "L2_SET"))
+    (fault,) = faults(restless)
+    assert "touches" in fault
+    assert "at rest it is set" in fault
+
+
+def test_each_step_must_be_applicable_after_the_steps_before_it() -> None:
+    twice = replace(node(), joined=(*node().joined, bring("atlas", "shelf_a")))
+    (fault,) = [text for text in faults(twice) if "preconditions" in text]
+    assert "atlas shelf_a: its preconditions don't hold" in fault
+    detour = replace(bring("atlas", "shelf_b"), steps=node().steps, joined=(bring("atlas", "shelf_a"), *rest_of_tour()))
+    assert faults(detour) == []  # the order and the number of the steps don't matter, only what they do together
+
+
+def rest_of_tour() -> tuple[Step, ...]:
+    return bring("bible", "shelf_b"), bring("comic", "shelf_a")
+
+
+def test_steps_refined_together_have_one_level_and_common_steps_below() -> None:
+    one = "steps that are refined together have one level"
+    assert any(one in text for text in faults(replace(node(), steps=())))
+    assert any(one in text for text in faults(replace(node(), joined=node().steps[:1])))
+    wrong = replace(node(), joined=(replace(node().joined[0], id=999), *node().joined[1:]))
+    assert any("its ID by the numbering of level 1" in text for text in faults(wrong))
+
+
+def test_a_plan_with_steps_refined_together_is_written_and_read_as_it_is(tmp_path: Path) -> None:
+    result = library().plan()
+    path = result.save(tmp_path / "plan.json")
+    assert library().read_plan(path) == result.plan
+
+
+def test_every_step_of_a_joint_refinement_is_explained_and_named() -> None:
+    plan, problem = tour(), library().problem
+    purpose = purposes(problem, plan)[node().path]
+    assert {change.fact for change in purpose.gives} == {
+        Fact(Symbol("BOOK_AT", (book,)), place) for book, place in (one.arguments for one in node().together)
+    }
+    assert {need.kind for need in purpose.needs} == {Kind.GOAL}
+    assert str(node()).count("L1_BRING") == 3
+    assert [row["behavior"] for row in plan.to_records()].count("L1_BRING") == 3
+
+
+def test_an_intervention_within_a_joint_refinement_is_recovered_from() -> None:
+    run = library().execute(plan=tour(), interventions="after=0.4 atlas BOOK_AT shelf_b")
+    assert run.reached
+    assert run.episode.replans
+
+
+def test_a_joint_refinement_teaches_its_steps_and_no_method() -> None:
+    memory = confab.Memory.of(library())
+    memory.learn(library(), tour())
+    again = library().plan(memory=memory)
+    assert validate(library().problem, again.plan) == []
+    assert again.plan.length[2] == 10
+
+
+def test_longer_tours_are_as_many_as_the_cart_needs() -> None:
+    plan = confab.load("library-large").plan().plan
+    assert plan.length[1] == 12
+    assert plan.length[2] <= 45
