@@ -10,6 +10,7 @@ import confab
 from confab.planner.causal_links import Kind, purposes
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, Step, renumbered
+from confab.planner.solve import Mode
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Fact, Symbol
 
@@ -53,9 +54,9 @@ def test_one_tour_with_all_books_is_the_refinement_of_all_steps_of_level_1() -> 
     assert plan.at_level(1) == node().together
 
 
-@pytest.mark.parametrize("alone", [{"mode": "paper"}, {"leave_levels": False}], ids=["paper", "strict"])
-def test_the_papers_mode_and_strict_levels_refine_each_step_alone(alone: dict[str, object]) -> None:
-    plan = library().plan(**alone).plan
+@pytest.mark.parametrize(("mode", "leave_levels"), [("paper", True), ("guarded", False)], ids=["paper", "strict"])
+def test_the_papers_mode_and_strict_levels_refine_each_step_alone(mode: Mode, leave_levels: bool) -> None:
+    plan = library().plan(mode=mode, leave_levels=leave_levels).plan
     assert plan.length == {1: 3, 2: 17}
     assert not any(step.joined for step in plan.walk())
 
