@@ -136,7 +136,7 @@ def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | Non
     centers = np.concatenate([one.centers for one in spheres]) - np.array([x, y, 0.0])
     cos, sin = np.cos(yaw), np.sin(yaw)
     centers = centers @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    held = [load for load in loads.values() if load is not None]
+    held = [name for load in loads.values() for name in engine.load(load)]
     around = engine.surroundings("").without(base.robot.name, *loads, *held)
     start = np.array([x, y, 0.0, yaw, 0.0, 0.0])
     end = turned_near(start, np.array([goal[0], goal[1], 0.0, goal[2], 0.0, 0.0]))

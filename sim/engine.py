@@ -468,13 +468,14 @@ class Engine:
     ) -> Surroundings:
         """Return the obstacles of a hand: furniture, perceived bodies, the robots' trunks and the other arms.
 
-        `values` replaces the joint values of some links.
+        The `held` body and the bodies that stand on it are left out. `values` replaces the joint values of some links.
         """
         solids = [box(fixture) for fixture in self.embodiment.fixtures]
         for mechanic in self.mechanics:
             solids += mechanic.solids({**mechanic.values(), **(values or {})}, self.shift(mechanic))
+        load = self.load(held)
         for name, thing in self.bodies.items():
-            if name != held and self.knows(name):
+            if name not in load and self.knows(name):
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
                 for low, high, radius in cylinders(thing.shape):
                     size = np.array([radius, radius, (high - low) / 2])
@@ -486,9 +487,9 @@ class Engine:
         for name, other in self.hands.items():
             if name != mover:
                 arm = other.mover()
-                load = self.held(name)
-                if load is not None:
-                    arm = arm.holding(self.load_spheres(other, load))
+                its = self.held(name)
+                if its is not None:
+                    arm = arm.holding(self.load_spheres(other, its))
                 around = around.plus(name, Spheres(arm.at(other.posture[None])[0], arm.spheres.radii))
         return around
 
@@ -509,15 +510,26 @@ class Engine:
         turned, base = self.sense(body)
         return rotation.T @ turned, rotation.T @ (base - point)
 
-    def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
-        """Return spheres for a held body in the hand's frame.
+    def load(self, held: str | None) -> tuple[str, ...]:
+        """Return the held body and the bodies that stand at places on it or on one another, without a held body nothing."""
+        found = [] if held is None else [held]
+        for carrier in found:
+            found += [name for name, (by, _, _) in self.known.items() if by == carrier and name in self.bodies]
+        return tuple(found)
 
-        The lowest centimetres of the body, which may touch a table, are covered only with `whole`.
+    def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
+        """Return spheres for a held body, and for the bodies that stand on it, in the hand's frame.
+
+        The lowest centimetres of the held body, which may touch a table, are covered only with `whole`.
         """
-        rotation, base = self.in_hand(hand, body)
-        shape = self.bodies[body].shape
-        spheres = whole_spheres(shape) if whole else column(*outline(shape), bottom=min(0.03, height_of(shape) / 3))
-        return Spheres(spheres.centers @ rotation.T + base, spheres.radii)
+        centers, radii = [], []
+        for name in self.load(body):
+            rotation, base = self.in_hand(hand, name)
+            shape = self.bodies[name].shape
+            spheres = whole_spheres(shape) if whole else column(*outline(shape), bottom=min(0.03, height_of(shape) / 3))
+            centers.append(spheres.centers @ rotation.T + base)
+            radii.append(spheres.radii)
+        return Spheres(np.concatenate(centers), np.concatenate(radii))
 
     def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
         """Return the lowest height between `least` and `most` above a point at which an upright load keeps the margin to obstacles.

@@ -238,7 +238,8 @@ def verify(
             done=done,
             gui=gui,
         )
-    keep(loaded, refuted_in(loaded, report))
+    if not (perturb or noise):  # a deviation of one rollout says nothing about the scene
+        keep(loaded, refuted_in(loaded, report))
     if out is not None:
         from confab.reasoner.files import write_whole
 
@@ -344,7 +345,8 @@ def execute(
             noise=noise,
             both_hands=both_hands,
         )
-    if execution.episode.refuted and on is None:  # an external robot refuses for reasons outside the scene's geometry
+    exact = on is None and not (perturb or noise)  # only then do refutations follow from the scene's geometry
+    if execution.episode.refuted and exact:
         from confab.refuting import keep
 
         met = {found.individual for found, _ in execution.episode.discovered}  # unknown to later calls

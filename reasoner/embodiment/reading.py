@@ -120,9 +120,10 @@ def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
 
 def _body(facts: BodyFacts, node: str, shape: str, names: Callable[[str], str]) -> Body:
     numbers = facts.all_numbers(shape)
+    points = facts.ordered(facts.linked(shape, "profile_point"))
     profile = sorted(
-        (facts.number(point, "height"), facts.number(point, "inner_radius"))
-        for point in facts.linked(shape, "profile_point")
+        ((facts.number(point, "height"), facts.number(point, "inner_radius")) for point in points),
+        key=lambda point: point[0],  # points of equal height, as at a step, stay in the order of their indices
     )
     return Body(
         names(node),

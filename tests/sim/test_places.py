@@ -21,8 +21,13 @@ def scene(name: str, folder: Path) -> Scene:
     return with_reach(confab.load(shutil.copy(RIGHT / f"{name}.ttl", folder)))
 
 
-@pytest.mark.parametrize("name", ["peg", "shelf", "cupboard"])
-@pytest.mark.parametrize(("noise", "seed"), [(0.0, 4105), (0.004, 4106)])
+@pytest.mark.parametrize(
+    ("name", "noise", "seed"),
+    [
+        *[(name, *pair) for name in ("peg", "shelf", "cupboard") for pair in ((0.0, 4105), (0.004, 4106))],
+        ("tray", 0.004, 4106),
+    ],
+)
 def test_perturbed_rollouts_verify(name: str, noise: float, seed: int, tmp_path: Path) -> None:
     one = scene(name, tmp_path)
     steps = one.plan().plan.primitives
@@ -57,3 +62,23 @@ def test_a_hand_lifts_to_the_height_that_the_board_above_leaves(tmp_path: Path) 
         lifted = world.truth("jar1")[1] - world.place("under")
         assert 0.03 < lifted[2] < 0.24 - 0.09
         assert np.hypot(*lifted[:2]) < 0.02
+
+
+def test_what_stands_on_a_load_belongs_to_the_load_and_is_no_obstacle(tmp_path: Path) -> None:
+    one = scene("tray", tmp_path)
+    at = {"tray": "p1", "tin1": "s1", "tin2": "s2"}
+    state = {
+        s: at.get(s.arguments[0], value) if s.situation == "LOCATION" else value
+        for s, value in one.problem.initial.items()
+    }
+    with PhysicsWorld(one.embodiment, state) as world:
+        hand = world.hands["left_hand"]
+        alone, laden = world.load_spheres(hand, "tin1"), world.load_spheres(hand, "tray")
+        assert len(laden.radii) > 2 * len(alone.radii)
+        assert not {"tray", "tin1", "tin2"} & {solid.name for solid in world.surroundings("left_hand", "tray").solids}
+        assert {"tray", "tin2"} <= {solid.name for solid in world.surroundings("left_hand", "tin1").solids}
+
+
+def test_profile_points_of_equal_height_keep_the_order_of_their_indices(tmp_path: Path) -> None:
+    shape = scene("tray", tmp_path).embodiment.bodies["tray"].shape
+    assert shape.profile == ((0.0, 0.13), (0.012, 0.13), (0.012, 0.012), (0.18, 0.012))
