@@ -154,7 +154,7 @@ class Attempt:
                 ):  # with noise the last margin is below zero, since an obstacle may be farther away than perceived
                     break
             if not found:
-                raise _blocked(scenes, [q[order] for q in solved], objects)
+                raise _blocked(scenes, [q[order] for q in solved], stages, objects)
             return [int(left[i]) for i in found]
 
     def _unreachable(self, stages: Sequence[Stage], at: Stage, objects: tuple[str, ...]) -> SkillError:
@@ -391,15 +391,43 @@ def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage, margin: f
     return mover, around.without(*stage.ignored), margin
 
 
-def _blocked(scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
-    """Return the error for stages without a collision-free candidate. The error names the bodies that block most candidates."""
+def _blocked(
+    scenes: Sequence[Scene], postures: Sequence[Array], stages: Sequence[Stage], objects: tuple[str, ...]
+) -> SkillError:
+    """Return the error for stages without a collision-free candidate.
+
+    The error names the bodies that block most candidates. The message names the phase in which the least room is left.
+    """
     nearest: dict[str, Array] = {}
-    for (mover, around, margin), q in zip(scenes, postures, strict=True):
-        for name, gap in mover.clearances(q, around).items():
+    rooms: list[tuple[float, float, str, Stage]] = []
+    for (mover, around, margin), q, stage in zip(scenes, postures, stages, strict=True):
+        gaps = mover.clearances(q, around)
+        for name, gap in gaps.items():
             nearest[name] = np.minimum(gap - margin, nearest.get(name, np.inf))
+        if gaps:
+            worst = np.min(list(gaps.values()), axis=0)
+            best = int(worst.argmax())
+            rooms.append((float(worst[best]) - margin, margin, min(gaps, key=lambda name: gaps[name][best]), stage))
     count = {name: int(np.sum(gap <= 0)) for name, gap in nearest.items()}
     blocking = sorted(
         (name for name in nearest if count[name] == max(count.values())), key=lambda name: float(nearest[name].max())
     )
     widest = float(np.min(list(nearest.values()), axis=0).max()) + max(margin for _, _, margin in scenes)
-    return SkillError("goal in collision", named(*objects, *blocking), clearance_m=widest)
+    spare, margin, body, stage = min(rooms, key=lambda room: room[0])
+    phase = f" in {stage.phase}" if stage.phase else ""
+    at = "" if stage.joint is None else f", where the joint is at {stage.joint:.3g}"
+    message = (
+        f"{room_of(spare + margin)} {body}{phase}{at}, wanted {margin * 1000:.0f} mm"
+        if spare <= 0
+        else f"no pose has {margin * 1000:.0f} mm of room in all phases"
+    )
+    return SkillError("goal in collision", named(*objects, *blocking), message, clearance_m=widest)
+
+
+def room_of(distance: float) -> str:
+    """Return the first words of a sentence about the distance of the hand or its load from a body.
+
+    >>> room_of(0.0012), room_of(-0.004)
+    ('1 mm from', '4 mm inside')
+    """
+    return f"{abs(distance) * 1000:.0f} mm {'from' if distance >= 0 else 'inside'}"

@@ -486,10 +486,7 @@ class Engine:
             around = around.plus(name, spheres)
         for name, other in self.hands.items():
             if name != mover:
-                arm = other.mover()
-                its = self.held(name)
-                if its is not None:
-                    arm = arm.holding(self.load_spheres(other, its))
+                arm = other.mover()  # its load is one of the bodies above
                 around = around.plus(name, Spheres(arm.at(other.posture[None])[0], arm.spheres.radii))
         return around
 

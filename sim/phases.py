@@ -232,7 +232,15 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
             around = stages[-1].around
         elif one.motion:
             stages.append(
-                Stage(_poses(run, one, poses, way), ignored, around, closed, frame.low > -np.pi, released=released)
+                Stage(
+                    _poses(run, one, poses, way),
+                    ignored,
+                    around,
+                    closed,
+                    frame.low > -np.pi,
+                    released=released,
+                    phase=one.name,
+                )
             )
         closed = closed and one.fingers != "open"
         poses = stages[-1].poses
@@ -264,7 +272,7 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
     check_swing(run.world, link, values.tolist())
     found = _moved(run, phase, poses, way, values.tolist())
     return [
-        Stage(at, ignored, around, True, True, SLACK, joint=float(value))
+        Stage(at, ignored, around, True, True, SLACK, joint=float(value), phase=phase.name)
         for at, around, value in zip(found[1:], moved[1:], values[1:], strict=True)
     ]
 

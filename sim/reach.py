@@ -1,8 +1,10 @@
 """The places within reach of each hand, computed from the geometry of URDF, furniture and shapes, without a physics engine.
 
 Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose for every such
-height. Approach, grasp and lift must be within the joints' limits, and free of contact with furniture and the robot's
-trunk. Below an obstacle, a hand lifts an object less high.
+height, except for heights at which no hand takes anything from any such place. Approach, grasp and lift must be within the
+joints' limits, and free of contact with furniture and the robot's trunk. Below an obstacle, a hand lifts an object less
+high. A place on a movable body is reached if the place is reached while the body is at some place. Physics finds whether the
+hand reaches the place while the body is at its present place.
 """
 
 from __future__ import annotations
@@ -25,9 +27,12 @@ from confab.sim.motion import Reacher, beyond
 from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
 from confab.sim.urdf import Spheres, UrdfModel
 
-VERSION = "2"
+VERSION = "3"
 """Version of the computation of reach, which is part of the fingerprint of the inputs. A stored result of another
 version counts as outdated."""
+
+LAYERS = 3
+"""Maximum number of movable bodies that stand on one another for which reach is computed."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""
@@ -50,23 +55,59 @@ def reach(embodiment: Embodiment) -> Reach:
         No behaviour uses the skill `reach`, which states the settings.
     """
     numbers, heights = _settings(embodiment)
-    pairs = set()
-    places, solids = with_open_mechanisms(embodiment)
+    points, solids = _positions(embodiment)
+    found: dict[float, set[tuple[str, str]]] = {height: set() for height in heights}
     for robot in embodiment.robots:
         for stand, model in _standing(robot, embodiment):
-            near = [p for p in places.values() if not stand or embodiment.places[p.name].stand in ("", stand)]
             for hand in robot.hands:
                 reacher = _reacher(embodiment, robot, hand, model, solids)
-                found = [
-                    place
-                    for place in near
-                    if all(
-                        _reaches(reacher, _loaded(reacher, embodiment, h), place, h, numbers)
-                        for h in _heights(embodiment, place.name, heights)
-                    )
-                ]
-                pairs |= {(hand.name, place.name) for place in found}
+                for name, places in points.items():
+                    near = [place for place in places if not stand or place.stand in ("", stand)]
+                    for height in _heights(embodiment, name, heights):
+                        loaded = _loaded(reacher, embodiment, height)
+                        if any(_reaches(reacher, loaded, place, height, numbers) for place in near):
+                            found.setdefault(height, set()).add((hand.name, name))
+    pairs: set[tuple[str, str]] = set()
+    for names in _kinds(embodiment):
+        usual = [height for height in heights if any(place in names for _, place in found[height])]
+        tried = {(hand, place) for reached in found.values() for hand, place in reached if place in names}
+        pairs |= {one for one in tried if all(one in found[height] for height in _heights(embodiment, one[1], usual))}
     return Reach(frozenset(pairs), fingerprint(embodiment))
+
+
+def _kinds(embodiment: Embodiment) -> tuple[set[str], set[str]]:
+    """Return the places on movable bodies, and the other places."""
+    carried = {place.name for place in embodiment.places.values() if place.carrier in embodiment.bodies}
+    return carried, {*embodiment.places} - carried
+
+
+def _positions(embodiment: Embodiment) -> tuple[dict[str, tuple[Place, ...]], list[Solid]]:
+    """Return each place at every position that it can have, and the solids of mechanisms, both with all joints open.
+
+    A place on a movable body can be above every other place, and above places on other movable bodies.
+    """
+    fixed, solids = with_open_mechanisms(embodiment)
+    found = {name: (replace(place, stand=embodiment.places[name].stand),) for name, place in fixed.items()}
+    carried = [place for place in embodiment.places.values() if place.carrier in embodiment.bodies]
+    for _ in range(min(len(carried), LAYERS)):
+        below = dict(found)
+        for place in carried:
+            spots = [
+                spot for name, spots in below.items() if not _on(embodiment, name, place.carrier) for spot in spots
+            ]
+            raised = (replace(place, position=_sum(spot, place), carrier="", stand=spot.stand) for spot in spots)
+            found[place.name] = tuple(dict.fromkeys(raised))
+    return found, solids
+
+
+def _on(embodiment: Embodiment, place: str, carrier: str) -> bool:
+    """Return whether a place is on the movable body `carrier`."""
+    return embodiment.places[place].carrier == carrier
+
+
+def _sum(spot: Place, place: Place) -> tuple[float, float, float]:
+    x, y, z = (round(a + b, 4) for a, b in zip(spot.position, place.position, strict=True))
+    return x, y, z
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
@@ -75,12 +116,13 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
     Raises
     ------
     ValueError
-        No behaviour uses the skill `reach`, or the position of the place is unknown.
+        No behaviour uses the skill `reach`, or the place has no position.
     """
     numbers, heights = _settings(embodiment)
-    places, solids = with_open_mechanisms(embodiment)
-    if place not in places:
-        raise ValueError(f"the position of {place} is unknown: its carrier can move")
+    points, solids = _positions(embodiment)
+    if not points.get(place):
+        raise ValueError(f"the position of {place} is unknown: its carrier stands at no place")
+    where = points[place][0]
     found = []
     for robot in embodiment.robots:
         for stand, model in _standing(robot, embodiment):
@@ -88,9 +130,10 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
                 reacher = _reacher(embodiment, robot, hand, model, solids)
                 for height in _heights(embodiment, place, heights):
                     loaded = _loaded(reacher, embodiment, height)
-                    if not _reaches(reacher, loaded, places[place], height, numbers):
+                    if not _reaches(reacher, loaded, where, height, numbers):
                         at = f" at {stand}" if stand else ""
-                        found.append(f"{hand.name}{at}: {_why(reacher, loaded, places[place], height, numbers)}")
+                        load = _taken_at(embodiment, height)
+                        found.append(f"{hand.name}{at}: {_why(reacher, loaded, where, height, numbers)}{load}")
                         break
     return tuple(dict.fromkeys(found))
 
@@ -170,6 +213,12 @@ def _heights(embodiment: Embodiment, place: str, heights: Sequence[float]) -> Se
     """Return the grasp heights above a place."""
     said = embodiment.places[place].height
     return heights if said is None else (said,)
+
+
+def _taken_at(embodiment: Embodiment, height: float) -> str:
+    """Return the height in millimetres and the first body that is grasped at this height, as the end of a sentence."""
+    names = [name for name, body in embodiment.bodies.items() if body.shape.grasp_height == height]
+    return f" {names[0]}, {height * 1000:.0f} mm above its base" if names else ""
 
 
 def _content(file: Path | str) -> str:

@@ -28,7 +28,7 @@ class Stage:
     given, has the obstacles at this stage. `closed` is true if the fingers are closed around something, and `released`
     is true if the hand has released its load. `near` is true if the hand holds a handle, so that the margin is small.
     `slack` is an additional margin in radians to the limits of the joints, and `fold` is the margin in radians to the
-    stretched arm. `joint` is the value of the moved joint of furniture.
+    stretched arm. `joint` is the value of the moved joint of furniture. `phase` is the name of the skill's phase.
     """
 
     poses: Array
@@ -40,6 +40,7 @@ class Stage:
     fold: float = 0.0
     released: bool = False
     joint: float | None = None
+    phase: str = ""
 
 
 def rises(numbers: Numbers) -> tuple[float, ...]:

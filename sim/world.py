@@ -159,11 +159,17 @@ class PhysicsWorld(Engine):
         return Verdict(True, measured=measured)
 
     def _with_facts(self, verdict: Verdict, step: PrimitiveStep) -> Verdict:
-        """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of the objects."""
-        if verdict.code not in REFUTED:
+        """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of the objects.
+
+        A body that carries one of the places is an object, too: its place on the body may be out of reach where the body stands.
+        """
+        places = [self.embodiment.places[name] for name in verdict.objects if name in self.embodiment.places]
+        carriers = {place.carrier for place in places} & self.bodies.keys()
+        if verdict.code not in REFUTED and not (verdict.code == "unreachable" and carriers):
             return verdict
         spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}
-        asked = [s for s in self.symbols if s.situation in spatial and s.arguments[0] in verdict.objects]
+        objects = {*verdict.objects, *carriers}
+        asked = [s for s in self.symbols if s.situation in spatial and s.arguments[0] in objects]
         seen = self.observe() if {s.arguments[0] for s in asked} - {*step.arguments} else {}
         facts = tuple(Fact(symbol, seen[symbol]) for symbol in asked if symbol in seen)
         if not verdict.swings:
