@@ -87,7 +87,9 @@ def _positions(embodiment: Embodiment) -> tuple[dict[str, tuple[Place, ...]], li
     A place on a movable body can be above every other place, and above places on other movable bodies.
     """
     fixed, solids = with_open_mechanisms(embodiment)
-    found = {name: (replace(place, stand=embodiment.places[name].stand),) for name, place in fixed.items()}
+    found: dict[str, tuple[Place, ...]] = {
+        name: (replace(place, stand=embodiment.places[name].stand),) for name, place in fixed.items()
+    }
     carried = [place for place in embodiment.places.values() if place.carrier in embodiment.bodies]
     for _ in range(min(len(carried), LAYERS)):
         below = dict(found)

@@ -1,6 +1,8 @@
 """Places in holes, below shelves and in drawers behind doors: a load comes and goes without touching what is around it."""
 
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 import confab
 from confab.reaching import with_reach
 from confab.scene import Scene
+from confab.sim.faults import stranger
 from confab.sim.rollouts import Trial
 from confab.sim.staging import Perturbation
 from confab.sim.verify import expectations
@@ -82,3 +85,24 @@ def test_what_stands_on_a_load_belongs_to_the_load_and_is_no_obstacle(tmp_path: 
 def test_profile_points_of_equal_height_keep_the_order_of_their_indices(tmp_path: Path) -> None:
     shape = scene("tray", tmp_path).embodiment.bodies["tray"].shape
     assert shape.profile == ((0.0, 0.13), (0.012, 0.13), (0.012, 0.012), (0.18, 0.012))
+
+
+def test_a_place_on_a_body_that_is_out_of_reach_is_refuted_where_the_body_stands(tmp_path: Path) -> None:
+    one = scene("tray", tmp_path)
+    steps = one.plan().plan.primitives
+    taken = next(i for i, step in enumerate(steps) if step.arguments == ("left_hand", "tin1"))
+    moved = {"p1": (0.61, -0.46, 0.7), "p3": (0.42, 0.05, 0.7)}
+    places = {n: replace(p, position=moved.get(n, p.position)) for n, p in one.embodiment.places.items()}
+    with PhysicsWorld(replace(one.embodiment, places=places), one.problem.initial) as world:
+        *lifted, verdict = [world.execute(step) for step in steps[taken : taken + 4]]
+    assert all(done.ok for done in lifted)
+    assert verdict.code == "unreachable"
+    assert "tray LOCATION p1" in map(str, verdict.facts)
+
+
+def test_a_collision_is_told_with_the_body_the_millimetres_and_the_phase(tmp_path: Path) -> None:
+    one = scene("peg", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        stranger((0.44, 0.25, 0.7))(world)
+        verdict = world.execute(one.plan().plan.primitives[0])
+    assert re.search(r"goal in collision: .*\d mm inside stranger in reach\.\w+, wanted 3 mm", str(verdict)), verdict

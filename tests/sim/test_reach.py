@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from confab.reasoner.embodiment.values import Embodiment, Fixture
+from confab.reasoner.embodiment.values import Embodiment, Fixture, Place
 from confab.sim.reach import fingerprint, hindrance, reach
 
 from .conftest import Case
@@ -29,16 +29,36 @@ def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_els
     assert fingerprint(replace(body, bodies=repainted)) == fingerprint(body)
 
 
-def test_what_keeps_a_hand_from_a_place_is_named_with_the_stage_of_the_grasp(serving: Case) -> None:
+def test_what_keeps_a_hand_from_a_place_is_named_with_stage_object_and_height(serving: Case) -> None:
     name = "location5"
-    assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm out of reach when grasping",)
+    assert hindrance(serving.embodiment, name) == (
+        "right_hand: 9.9 cm out of reach when grasping cup1, 50 mm above its base",
+    )
     for height in (0.15, 0.2):
-        assert hindrance(below_a_lamp(serving, height), name)[0] == "left_hand: lamp is in the way when lifting"
+        assert hindrance(below_a_lamp(serving, height), name)[0].startswith(
+            "left_hand: lamp is in the way when lifting "
+        )
 
 
 def test_a_hand_lifts_less_where_a_solid_above_leaves_room_for_the_load_alone(serving: Case) -> None:
     assert ("left_hand", "location5") in reach(below_a_lamp(serving, 0.25)).pairs
     assert ("left_hand", "location5") not in reach(below_a_lamp(serving, 0.2)).pairs
+
+
+def test_a_place_on_a_movable_body_is_reached_if_it_is_reached_above_some_place(serving: Case) -> None:
+    body, on = serving.embodiment, Place("on_cup1", (0.0, 0.0, 0.1), "cup1")
+    higher = Place("on_cup2", (0.0, 0.0, 0.1), "cup2")
+    two = replace(body, places={**body.places, "on_cup1": on, "on_cup2": higher})
+    own = {(hand, place) for hand, place in reach(two).pairs if place.startswith("on_")}
+    assert own == {(hand, place) for hand in ("left_hand", "right_hand") for place in ("on_cup1", "on_cup2")}
+    away = replace(two, places={**two.places, "on_cup1": replace(on, position=(0.9, 0.0, 0.1))})
+    assert {place for _, place in reach(away).pairs if place.startswith("on_")} == {"on_cup2"}
+
+
+def test_a_height_at_which_no_hand_takes_anything_excludes_no_place(serving: Case) -> None:
+    body, cup = serving.embodiment, serving.embodiment.bodies["cup1"]
+    flat = replace(cup, name="coin", shape=replace(cup.shape, grasp_height=0.01))
+    assert reach(replace(body, bodies={**body.bodies, "coin": flat})).pairs == reach(body).pairs
 
 
 def below_a_lamp(serving: Case, height: float) -> Embodiment:
