@@ -293,14 +293,22 @@ def height_of(shape: Shape) -> float:
     return KINDS[shape.kind].height(shape)
 
 
-def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
-    """Yield the upright cylinders that represent a shape in motion planning: lower end, upper end and radius."""
-    if shape.kind != "turned":
-        yield 0.0, height_of(shape), outer_radius(shape)
+def pieces(shape: Shape) -> Iterator[tuple[str, tuple[float, float, float], float]]:
+    """Yield the solids that represent an upright shape in motion planning: kind, half extents, and height of the middle.
+
+    A vessel is a cylinder, since a hand doesn't reach into a vessel.
+    """
+    if shape.kind == "box":
+        width, depth, height = (shape.numbers[name] / 2 for name in ("width", "depth", "height"))
+        yield "box", (width, depth, height), height
         return
-    for (low, below), (high, above) in pairwise(shape.profile):
+    ends = (
+        pairwise(shape.profile) if shape.kind == "turned" else [((0.0, 0.0), (height_of(shape), outer_radius(shape)))]
+    )
+    for (low, below), (high, above) in ends:
         if high - low > STEP:
-            yield low, high, max(below, above)
+            radius = max(below, above)
+            yield "cylinder", (radius, radius, (high - low) / 2), (low + high) / 2
 
 
 def outline(shape: Shape) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ import pybullet
 from confab.reasoner.embodiment.values import Embodiment, Shape
 from confab.reasoner.limits import check
 from confab.sim.base import Base
-from confab.sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
+from confab.sim.bodies import center_height, height_of, inner_radius, outer_radius, outline, pieces, vessel_height
 from confab.sim.collision import Solid, Surroundings, box, clearances, column, rim
 from confab.sim.mechanisms import Mechanic
 from confab.sim.robot import Manipulator
@@ -477,10 +477,8 @@ class Engine:
         for name, thing in self.bodies.items():
             if name not in load and self.knows(name):
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
-                for low, high, radius in cylinders(thing.shape):
-                    size = np.array([radius, radius, (high - low) / 2])
-                    center = base + rotation[:, 2] * (low + high) / 2
-                    solids.append(Solid(name, "cylinder", size, center, rotation))
+                for kind, half, height in pieces(thing.shape):
+                    solids.append(Solid(name, kind, np.array(half), base + rotation[:, 2] * height, rotation))
         around = Surroundings(tuple(solids))
         for name, spheres in self.standing.items():
             around = around.plus(name, spheres)

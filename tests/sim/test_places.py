@@ -106,3 +106,11 @@ def test_a_collision_is_told_with_the_body_the_millimetres_and_the_phase(tmp_pat
         stranger((0.44, 0.25, 0.7))(world)
         verdict = world.execute(one.plan().plan.primitives[0])
     assert re.search(r"goal in collision: .*\d mm inside stranger in reach\.\w+, wanted 3 mm", str(verdict)), verdict
+
+
+def test_a_box_is_as_wide_for_motion_planning_as_it_is(tmp_path: Path) -> None:
+    one = scene("stack", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        (block,) = [solid for solid in world.surroundings("left_hand").solids if solid.name == "a"]
+        point = world.truth("a")[1] + np.array([0.05, 0.0, 0.05])
+    assert block.distance(point) == pytest.approx(0.02, abs=1e-3)
