@@ -15,26 +15,32 @@ import confab
 from confab.planner.acting.episode import End, Episode
 
 CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    # pushed beside its place
     ("beverage-serving", ("at=6 push cup2 -3 9",), ""),
-    ("beverage-serving", ("after=22 push cup1 2 8",), ""),
     ("beverage-serving", ("at=16 push bottle2 -4 6",), ""),
-    ("beverage-serving", ("after=28 push cup2 5 5",), ""),
-    ("beverage-serving", ("at=0.5 push cup1 -3 -8",), ""),
+    ("one-arm-serving", ("at=4 push cup1 6 -6",), ""),
+    ("spice-drawer", ("at=3 push lid -2 7",), ""),
+    ("centrifuge", ("at=8 push tube2 2 6",), ""),
+    # moved to another place
+    ("beverage-serving", ("at=9 cup2 LOCATION location8",), ""),
+    ("two-cups", ("at=5 cup2 LOCATION location8",), ""),
+    # a foreign box on a target, in the hand's way, and on a place that nobody needs
     ("beverage-serving", ("after=22 box location5",), ""),
     ("beverage-serving", ("at=3 box location7",), ""),
-    ("beverage-serving", ("after=22 box location5", "after=22 push cup2 -2 9"), ""),
-    ("beverage-serving", ("after=22 box location5 12x12x20",), "blocked by box1"),
-    ("beverage-serving", ("at=3 box location7 14x10x15",), "blocked by box1"),
-    ("beverage-serving", ("after=22 knock cup2",), "cup2 lies"),
+    ("beverage-serving", ("after=22 box location5 8x5x15", "after=22 push cup2 -2 9"), ""),
+    ("beverage-serving", ("at=5 box location4 14x14x12",), ""),
+    ("one-arm-serving", ("at=8 box place5",), ""),
+    ("spice-drawer", ("at=12 box right_spot 7x7x9",), ""),
+    # a bystander knocked over or taken away
+    ("one-arm-serving", ("at=9 knock cup2",), ""),
+    ("one-arm-serving", ("at=9 remove cup2",), ""),
+    # a door and a lid shut
+    ("spice-drawer", ("at=4 door OPENED false",), ""),
+    ("centrifuge", ("at=10 cover OPENED false",), ""),
+    # needed and knocked over, needed and taken away, and a box on a target that no hand can take
     ("beverage-serving", ("at=7 knock bottle2",), "bottle2 lies"),
     ("beverage-serving", ("after=22 remove cup2",), "cup2 isn't to be seen"),
-    ("one-arm-serving", ("at=4 push cup1 6 -6",), ""),
-    ("one-arm-serving", ("at=8 box place5",), ""),
-    ("one-arm-serving", ("at=8 knock bottle1",), "bottle1 lies"),
-    ("one-arm-serving", ("at=8 box place5 12x12x12",), "blocked by box1"),
-    ("spice-drawer", ("at=3 push lid -2 7",), ""),
-    ("spice-drawer", ("at=4 door OPENED false",), ""),
-    ("centrifuge", ("at=8 push tube2 2 6",), ""),
+    ("beverage-serving", ("after=22 box location5 12x12x20",), "blocked by box1"),
 )
 """Scene, interventions, and words of the right reason, which are empty if the goals can be reached."""
 

@@ -21,7 +21,7 @@ over         with a vessel to a pose above another vessel, from which it can be 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from itertools import product
 
@@ -77,15 +77,18 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
             f"phase {phase.name} of the skill {use.skill}: '{word}' is not stated; run confab validate",
         )
     world.look()
-    run = Run(Attempt.begin(world, world.acting(roles)), roles, use.numbers)
-    phases = [phase for phase in use.phases if all(CONDITIONS[word](run) for word in phase.when)]
-    with stopping(world, run.attempt.hand.hand.name):
+    hands = {"hand": world.acting(roles)} | {phase.by: roles[phase.by] for phase in use.phases if phase.by != "hand"}
+    runs = {role: Run(Attempt.begin(world, hand), roles, use.numbers) for role, hand in hands.items()}
+    phases = [phase for phase in use.phases if all(CONDITIONS[word](runs[phase.by]) for word in phase.when)]
+    with ExitStack() as stack:
+        for hand in hands.values():
+            stack.enter_context(stopping(world, hand))
         for i, phase in enumerate(phases):
             if not phase.foreseen:
-                _carry_out(run, phase, phases[i + 1 :])
+                _carry_out(runs[phase.by], phase, [later for later in phases[i + 1 :] if later.by == phase.by])
     if "disturbance" in use.numbers:
-        run.attempt.check_others(use.numbers, *_handled(run, phases))
-    return run.measured
+        runs["hand"].attempt.check_others(use.numbers, *_handled(runs["hand"], phases))
+    return {name: value for run in runs.values() for name, value in run.measured.items()}
 
 
 def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:

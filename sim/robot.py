@@ -48,7 +48,7 @@ class Manipulator:
     `posture` is the arm's last command. `grasp` is the rotation and position of the held object in the hand at the grasp, the
     reference for slip. `limit` is the time limit in seconds of the running skill, and `deadline` is the simulation step at
     which the limit expires. `pace` is the share of its maximum speeds that the arm uses. `at` is the object or place to which
-    the hand has moved. `opened_to` is the last command of the fingers in metres.
+    the hand has moved. `opened_to` is the last command of the fingers in metres. `links` are the links that the arm moves.
     """
 
     client: int
@@ -70,6 +70,7 @@ class Manipulator:
     deadline: float = math.inf
     at: Whereabouts = Whereabouts()
     opened_to: float = 0.0
+    links: frozenset[int] = frozenset()
 
     @property
     def limits(self) -> MotionLimits:
@@ -164,9 +165,9 @@ class Manipulator:
         return tuple(forces)
 
     def meets(self, other: int) -> bool:
-        """Return whether any part of the robot touches a body."""
+        """Return whether the arm or the hand touches a body."""
         found = pybullet.getContactPoints(self.body, other, physicsClientId=self.client)
-        return any(contact[9] > 0 for contact in found)
+        return any(contact[9] > 0 and contact[3] in self.links for contact in found)
 
     @property
     def first_finger(self) -> Array:
@@ -242,6 +243,7 @@ def _manipulator(
         tuple(efforts[name] for name in hand.arm),
         efforts[hand.fingers[0]],
         np.array(hand.home),
+        links=frozenset(i for i, link in links.items() if {joint.name for joint in model.chains.get(link, ())} & {*hand.arm}),
     )
 
 

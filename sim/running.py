@@ -93,10 +93,10 @@ class Run:
         return self.world.clear_height(attempt.hand, attempt.held, point, hover, self.numbers["raised"])
 
     def things(self) -> tuple[str, ...]:
-        """Return the objects in the skill's roles and the held body, without the hand."""
+        """Return the objects in the skill's roles and the held body, without the hands."""
         held = self.attempt.held
         ordered = sorted(self.roles.items(), key=lambda pair: TOLD.index(pair[0]) if pair[0] in TOLD else len(TOLD))
-        return named(*(name for role, name in ordered if role != "hand"), *([] if held is None else [held]))
+        return named(*(name for _, name in ordered if name not in self.world.hands), *([] if held is None else [held]))
 
     def arrived(self, goal: Array) -> None:
         """Raise `SkillError` if the skill states a tolerance and the hand is farther away from its goal."""

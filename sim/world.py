@@ -145,8 +145,8 @@ class PhysicsWorld(Engine):
         bound = {name.lstrip("?"): value for name, value in step.bindings.items()}
         roles |= {role: bound[name] for name, role in use.variables.items() if name in bound}
         self.current += 1
-        hand = self.hands.get(self.acting(roles))
-        if hand is not None:
+        hands = [self.hands[name] for name in self.hands if name in (self.acting(roles), *roles.values())]
+        for hand in hands:
             hand.limit = use.numbers.get("time_limit", math.inf)
             hand.deadline = self.steps + hand.limit * RATE
         try:
@@ -154,7 +154,7 @@ class PhysicsWorld(Engine):
         except SkillError as failure:
             return self._with_facts(failure.verdict, step)
         finally:
-            if hand is not None:
+            for hand in hands:
                 hand.deadline = math.inf
         return Verdict(True, measured=measured)
 

@@ -29,7 +29,7 @@ def roles_of(use: SkillUse) -> set[str]:
 def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
     """Yield each phase that mentions a role without a term of the behaviour, with the role."""
     for phase in use.phases:
-        for word in (*phase.to.split(), *phase.touches):
+        for word in (phase.by, *phase.to.split(), *phase.touches):
             role = word.partition(".")[0]
             if role not in WITHOUT_ROLE | roles_of(use):
                 yield phase, role

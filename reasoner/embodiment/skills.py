@@ -111,6 +111,7 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
         guards(node, text("until")),
         guards(node, text("check")),
         node,
+        text("by", "hand"),
     )
     for what, said, known in (
         ("motion", [found.motion], MOTIONS),

@@ -243,6 +243,7 @@ class Phase:
       moves to the goal.
     - `offset` is a shift of the goal in the hand's frame, and `above` is an upward shift.
     - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
+    - `by` is the role of the hand that executes the phase.
     - `fingers` (open, shut or grasp) move before the hand. `touches` contains roles or features that the hand may touch.
     - The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold.
     - The phase is executed only if all conditions in `when` hold. A `foreseen` phase is only checked for feasibility in advance.
@@ -264,6 +265,7 @@ class Phase:
     until: tuple[Guard, ...] = ()
     checks: tuple[Guard, ...] = ()
     iri: str = ""
+    by: str = "hand"
 
 
 @dataclass(frozen=True)
