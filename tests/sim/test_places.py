@@ -29,6 +29,7 @@ def scene(name: str, folder: Path) -> Scene:
     [
         *[(name, *pair) for name in ("peg", "shelf", "cupboard") for pair in ((0.0, 4105), (0.004, 4106))],
         ("tray", 0.004, 4106),
+        ("handover", 0.004, 4106),
     ],
 )
 def test_perturbed_rollouts_verify(name: str, noise: float, seed: int, tmp_path: Path) -> None:
