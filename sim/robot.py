@@ -243,7 +243,9 @@ def _manipulator(
         tuple(efforts[name] for name in hand.arm),
         efforts[hand.fingers[0]],
         np.array(hand.home),
-        links=frozenset(i for i, link in links.items() if {joint.name for joint in model.chains.get(link, ())} & {*hand.arm}),
+        links=frozenset(
+            i for i, link in links.items() if {joint.name for joint in model.chains.get(link, ())} & {*hand.arm}
+        ),
     )
 
 

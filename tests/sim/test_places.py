@@ -106,7 +106,9 @@ def test_a_collision_is_told_with_the_body_the_millimetres_and_the_phase(tmp_pat
     with PhysicsWorld(one.embodiment, one.problem.initial) as world:
         stranger((0.42, 0.19, 0.7), (0.3, 0.06, 0.2))(world)
         verdict = world.execute(one.plan().plan.primitives[0])
-    assert re.search(r"goal in collision: .*\d mm (inside|from) stranger in reach\.\w+, wanted 3 mm", str(verdict)), verdict
+    assert re.search(r"goal in collision: .*\d mm (inside|from) stranger in reach\.\w+, wanted 3 mm", str(verdict)), (
+        verdict
+    )
 
 
 def test_a_box_is_as_wide_for_motion_planning_as_it_is(tmp_path: Path) -> None:
