@@ -22,7 +22,9 @@ def _changed(steps: tuple[Step, ...], path: tuple[int, ...], problem: Problem, r
     before, step, after = steps[:first], steps[first], steps[first + 1 :]
     if rest:
         return (*before, replace(step, steps=_changed(step.steps, tuple(rest), problem, rng)), *after)
-    how = rng.choice(("drop", "drop", "twice", "swap", "argument", "argument", "behavior", "flatten", "empty"))
+    how = rng.choice(
+        ("drop", "drop", "twice", "swap", "argument", "argument", "behavior", "flatten", "empty", "join", "join")
+    )
     if how == "twice":
         return (*before, step, step, *after)
     if how == "swap" and after:
@@ -42,6 +44,14 @@ def _changed(steps: tuple[Step, ...], path: tuple[int, ...], problem: Problem, r
         if all(members):
             arguments = tuple(map(rng.choice, members))
             return (*before, replace(step, behavior=one.name, arguments=arguments), *after)
+    if how == "join" and step.joined and rng.random() < 0.5:
+        joined = list(step.joined) * rng.randint(1, 2)
+        rng.shuffle(joined)
+        return (*before, replace(step, joined=tuple(joined[rng.randint(0, 1) :])), *after)
+    if how == "join" and after:  # often valid
+        those = tuple(replace(one, steps=(), joined=()) for one in after[0].together)
+        both = replace(step, steps=(*step.steps, *after[0].steps), joined=(*step.joined, *those))
+        return (*before, both, *after[1:])
     if how == "flatten":
         return (*before, *step.steps, *after)
     if how == "empty":
@@ -69,6 +79,7 @@ def numbered(plan: Plan, problem: Problem) -> Plan:
 
     def those(steps: tuple[Step, ...]) -> Iterator[Step]:
         for step in steps:
-            yield replace(step, id=problem.id_of(step.behavior, step.arguments), steps=tuple(those(step.steps)))
+            own = problem.id_of(step.behavior, step.arguments)
+            yield replace(step, id=own, steps=tuple(those(step.steps)), joined=tuple(those(step.joined)))
 
     return Plan(tuple(those(plan.steps)))

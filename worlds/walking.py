@@ -72,19 +72,24 @@ class _Walk:
         return state
 
     def step(self, step: Step, state: State) -> State | None:
-        """Execute a step with its refinement; return the final state."""
-        made = list(self.of.done(step.behavior, step.arguments, state))
+        """Execute a step, or steps that are refined together, with the refinement; return the final state."""
+        made = [state]
+        for one in step.together:
+            if step.joined and (one.level != step.level or not step.steps or (one is not step and one.steps)):
+                self.faults.append(f"{step} can't be refined together")
+                return None
+            made = [after for before in made for _, after in self.of.done(one.behavior, one.arguments, before)]
         if not made:
             self.faults.append(f"{step} can't be done")
             return None
         if step.level == self.levels[-1]:
             if step.steps:
                 self.faults.append(f"{step} is of the lowest level, but has steps")
-            return made[0][1]
+            return made[0]
         end = self.sequence(step.steps, step.level, state, True)
         if end is None:
             return None
-        if not any(self.as_said(step.level, state, said, end) for _, said in made):
+        if not any(self.as_said(step.level, state, said, end) for said in made):
             self.faults.append(f"the refinement of {step} has another result than the step")
         return end
 
