@@ -317,26 +317,30 @@ def chosen(
 ) -> Lesson:
     """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules.
 
-    Steps that are refined together are applied, but aren't compared with other instances.
+    Steps that are refined together are chosen one after another in what their level sees.
     """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call, also=rules)
     reader = FactReader(using.program, call.table, call.goal)
     lesson = Lesson()
-    for number, step in enumerate(steps):
-        check("learning")
-        ground = step.behavior, step.arguments
+    later = grounds(steps)
+    for step in steps:
+        mark = len(call.table.trail)
+        for ground in grounds([step]):
+            check("learning")
+            del later[0]
+            open_ = policy.open() if problem.domain.behaviors[ground[0]].level == policy.first else {}
+            ready = {cell: value for cell, value in open_.items() if not policy.waits(cell)}
+            applicable = list(policy.every(ready)) or list(policy.every(open_))
+            done = [c for c in applicable if c.ground == ground]
+            if done:
+                rest = set(later)
+                passed = {c.ground: c for c in applicable if c.ground != ground and c.ground not in rest}
+                lesson += compared(reader, done, list(passed.values()))
+            if step.joined:
+                call.space.apply(changes(call, ground)[1])
         if step.joined:
-            carry_out(call, step)
-            continue
-        open_ = policy.open() if problem.domain.behaviors[ground[0]].level == policy.first else {}
-        ready = {cell: value for cell, value in open_.items() if not policy.waits(cell)}
-        applicable = list(policy.every(ready)) or list(policy.every(open_))
-        done = [c for c in applicable if c.ground == ground]
-        if done:
-            rest = set(grounds(steps[number + 1 :]))
-            passed = {c.ground: c for c in applicable if c.ground != ground and c.ground not in rest}
-            lesson += compared(reader, done, list(passed.values()))
+            call.table.undo(mark)
         carry_out(call, step)
     return lesson
 
