@@ -107,11 +107,11 @@ def endpoint(studio: Studio) -> None:
 
 
 def compared(studio: Studio) -> None:
-    """Picture the comparison of two runs."""
+    """Picture the comparison of two runs, and the history of runs."""
     for goals in ((), ("cup1 LOCATION location8",)):
         run(Job(TABLE, new_folder(studio.work / "runs"), goals=goals, film=False))
-    address = studio.file("compared", history_html(runs(studio.work / "runs"), "Runs", ("001", "002")))
-    studio.take("compared", address)
+    for name, shown in (("compared", ("001", "002")), ("history", ())):
+        studio.take(name, studio.file(name, history_html(runs(studio.work / "runs"), "Runs", shown)))
 
 
 SUBJECTS: dict[str, Callable[[Studio], None]] = {

@@ -69,6 +69,10 @@ class Commands(click.Group):
                 room = formatter.width - 6 - width
                 formatter.write_dl([(name.ljust(width), its.get_short_help_str(room)) for name, its in commands if its])
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; ``help COMMAND`` means ``COMMAND --help``."""
+        return super().parse_args(ctx, [*args[1:2], "--help"] if args[:1] == ["help"] else args)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -78,7 +82,7 @@ class Commands(click.Group):
             from confab.reasoner.names import nearest
 
             meant = command(args[0], COMMANDS)
-            hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], COMMANDS)
+            hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], [*COMMANDS, "help"])
             raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
         return super().resolve_command(ctx, args)
 

@@ -202,11 +202,15 @@ def segments(run: str) -> tuple[str, ...]:
     return ()
 
 
+def parted(name: str) -> str:
+    """Return a name in small letters with underscores between its words, for example ``get_plan`` for ``getPlan``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
+
+
 @cache
 def words_of(name: str) -> tuple[str, ...]:
     """Return the significant words of a name, for example ``plan`` and ``length`` for ``getPlanLength``."""
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
-    words = tuple(word for run in re.findall(r"[^\W_]+", apart) for word in segments(run) or (run,))
+    words = tuple(word for run in re.findall(r"[^\W_]+", parted(name)) for word in segments(run) or (run,))
     return tuple(word for word in words if word not in FILLERS) or words
 
 
@@ -256,6 +260,12 @@ TYPED = 0.85
 """Minimum similarity to a known name for a wrong name to be treated as a typing error."""
 PART = 0.6
 """Score of a word that occurs in a table's entry only as a part of longer names."""
+OWN = 0.1
+"""Additional value of a word that is the name that an entry suggests."""
+UNKNOWN = 0.4
+"""Weight of a word that no entry of a table has."""
+HALF = 0.75
+"""Factor for an entry that has the words of a wrong name only in longer names."""
 KNOWN_WORDS = 0.4
 """Minimum share of the words of a wrong name that an entry of a table must have; rare words weigh more."""
 
@@ -281,14 +291,18 @@ def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = K
     for right, others in table.items():
         names = (re.split(r"[( ]", right)[0].rpartition(".")[2], *others.split())
         bag = bags.setdefault(right, {})
-        for words in map(words_of, names):
+        for number, words in enumerate(map(words_of, names)):
             if {*map(stem, words)} == {*map(stem, wanted)}:
                 return right
             for word in map(stem, words):
-                bag[word] = max(bag.get(word, 0.0), 1.0 if len(words) == 1 else PART)
+                bag[word] = max(bag.get(word, 0.0), 1.0 + OWN * (number == 0) if len(words) == 1 else PART)
     many = Counter(word for bag in bags.values() for word in bag)
-    weights = {word: 1.0 / max(many[word], 1) ** 0.5 for word in map(stem, wanted)}
-    worth = {right: sum(weights[word] * bag.get(word, 0.0) for word in weights) for right, bag in bags.items()}
+    weights = {word: many[word] ** -0.5 if many[word] else UNKNOWN for word in map(stem, wanted)}
+    worth = {
+        right: sum(weights[word] * bag.get(word, 0.0) for word in weights)
+        * (1.0 if any(bag.get(word, 0.0) >= 1.0 for word in weights) else HALF)
+        for right, bag in bags.items()
+    }
     best = max(worth, key=lambda right: worth[right], default="")
     return best if best and worth[best] >= least * sum(weights.values()) else ""
 
@@ -305,6 +319,7 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
     if (
         meant := whole(table, name)
         or whole(table, name.lower())
+        or whole(table, parted(name))
         or name.startswith("from_") * whole(table, "from_file")
     ):
         return meant

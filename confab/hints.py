@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 MODULE = {
+    "confab.load(SCENE).plan(engine=ENGINE)": "lama fast_downward pyperplan enhsp tamer aries lpg ff engines engine get_engine",
+    "confab -v (in a shell)": "set_log_level logging verbose debug log_level set_verbosity logger quiet",
+    "confab run (in a shell)": "run_demo run_example quickstart",
     "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
     "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
     "from_graph from_string from_text loads load_domain load_problem Domain Robot Task get_scene get_problem "
@@ -80,7 +83,8 @@ SHOW = (
 SCENE = {
     "title": "label name caption heading display_name labelled get_label get_title get_name comment description_text",
     "knowledge.prefixes": "prefixes namespaces namespace prefix ns prefix_map bind namespace_manager",
-    "graph.serialize(FILE)": "serialize serialise save write dump write_ttl to_file save_as store export_owl to_owl_file "
+    "graph.serialize(FILE)": "save_state "
+    "serialize serialise save write dump write_ttl to_file save_as store export_owl to_owl_file "
     "export_ttl save_scene write_file write_graph",
     "query(TEXT), which reads inferred facts": "inferred inferred_graph infer reason reasoner run_reasoner entailments "
     "entailed materialize materialise closure owlrl expand",
@@ -101,7 +105,8 @@ SCENE = {
     "create_object add_node add_edge "
     "add_objects add_class add_behavior add_action spawn add_fluent add_statement add_rule add_axiom "
     "add_constraint add_location add_robot add_type add_property parse_into extend",
-    "graph": "triples to_yaml yaml rdf to_rdf to_graph rdflib as_graph to_ttl to_turtle "
+    "graph": "named_graphs "
+    "triples to_yaml yaml rdf to_rdf to_graph rdflib as_graph to_ttl to_turtle "
     "subjects predicates_of to_json json to_dict to_json_ld turtle ttl "
     "value_of triples_of statements quads to_networkx nodes edges networkx to_string "
     "n3 as_dict subject_objects predicate_objects knowledge_graph axioms "
@@ -113,7 +118,8 @@ SCENE = {
     "plan_all possible_plans all_plans plan_with plan_tree",
     "verify": "simulate simulation check check_plan validate_plan physics rollout verify_plan rollouts test "
     "monte_carlo is_valid_plan sim simulate_plan evaluate test_plan run_simulation check_physics",
-    "execute": "run act apply step dispatch perform tick execute_plan run_plan do play replay rollout_plan start "
+    "execute": "pick place grasp pour move_base navigate navigate_to drive goto "
+    "run act apply step dispatch perform tick execute_plan run_plan do play replay rollout_plan start "
     "loop tick_once spin go act_on monitor run_episode progress do_action apply_action send control perform_action "
     "simulate_action transition",
     "explain": "why why_not justify explanation reasons explain_plan because whynot why_unsolvable diagnose "
@@ -127,7 +133,8 @@ SCENE = {
     "belief is_true check_fact fluent_values get_facts current_facts init_state atoms initial_defaults literals "
     "static_facts obs get_obs get_property predicate_values has_fact where get_location location_of position_of "
     "state_of current_state is_holding current has pretty_facts state_dict fact_list",
-    "goals": "goal_state get_goals task tasks goal get_goal goal_facts objective targets desired wanted "
+    "goals": "goal_test test_goal "
+    "goal_state get_goals task tasks goal get_goal goal_facts objective targets desired wanted "
     "goal_conditions target goal_description current_goal current_goals goal_list list_goals",
     "picture": "draw show plot render image visualise visualize to_png view display map draw_scene screenshot "
     "thumbnail diagram show_scene viewer figure svg print_map visualization",
@@ -157,15 +164,17 @@ SCENE = {
     "embodiment.robots": "robot robots get_robot robot_model",
     "embodiment": "arms body urdf gripper joints geometry kinematics meshes poses workspace links arm agents camera "
     "cameras shapes hands sensors table",
-    "iri": "uri base_iri identifier base url id",
+    "iri": "ontology_iri get_iri uri base_iri identifier base url id",
     "knowledge.path": "path file filename source location folder",
     "serve": "endpoint server start_server web api host http app rest open_page browser",
     "board": "widget editor interactive gui ui dashboard notebook",
     "construct": "constructs",
-    "confab.load(SOURCE)": "load open read parse from_file load_scene from_string from_graph load_file from_rdf "
+    "confab.load(SOURCE)": "load_world import_ontology load_ontology "
+    "load open read parse from_file load_scene from_string from_graph load_file from_rdf "
     "reload loads import_file from_pddl from_ttl read_file from_json from_dict from_path from_url include reset "
     "restore undo from_name create make build new from_scene from_yaml from_owl from_text",
-    "confab.validate(FILE)": "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
+    "confab.validate(FILE)": "violations shacl_report "
+    "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
     "sync_reasoner warnings check_scene inconsistent_classes validation problems consistency",
     "confab.generate(FAMILY)": "generate random sample random_scene",
     "confab.Memory.of(scene).learn(scene, plan)": "learn memory train experience fit remember teach learn_from",
@@ -194,6 +203,8 @@ SCENE = {
     "graph.update(TEXT)": "sparql_update update_query execute_update run_update insert_data delete_data",
 }
 RESULT = {
+    "save(FILE)": "to_val sas_plan plan_file",
+    "plan": "best_plan final_plan first_plan",
     "scene.graph": "rdf rdflib triples turtle to_rdf to_ttl",
     "plan.steps": "steps actions action_list sequence get_steps action_names step list_actions action_sequence "
     "solution actions_sequence step_names top_level first abstract_plan to_plan first_step actions_list next_action",
@@ -259,7 +270,9 @@ RESULT = {
     "dearer()": "warnings warning hints suggestions cheaper is_cheapest",
 }
 PLAN = {
-    "steps": "plan subplans actions action_list sequence get_steps children nodes items values step action_names "
+    "result.outcome.bound": "is_optimal optimal proved_optimal proven lower_bound",
+    "steps": "behaviors behaviours "
+    "plan subplans actions action_list sequence get_steps children nodes items values step action_names "
     "top_level roots to_list list as_list root",
     "primitives": "leaves low_level atoms primitive_actions flat flatten lowest leaf_steps commands motions atomic "
     "flattened ground_actions linear bottom",
@@ -276,7 +289,8 @@ PLAN = {
     "index(STEP)": "find position locate index_of find_step get",
     "scene.verify(plan)": "verify simulate check validate physics rollout is_valid valid simulation test check_plan "
     "is_applicable evaluate validate_plan",
-    "scene.execute(plan)": "execute run act perform dispatch do play replay apply tick start execute_plan run_plan "
+    "scene.execute(plan)": "is_done done progress current_step "
+    "execute run act perform dispatch do play replay apply tick start execute_plan run_plan "
     "send next simulate_steps",
     "result.save(FILE)": "save write dump to_file store export save_json to_path write_plan save_plan save_as "
     "persist write_to_file",
@@ -293,7 +307,8 @@ PLAN = {
     "result.goals": "goals goal task",
     "result.labels": "labels label words in_words natural_language sentences verbalize",
     "result.problem": "problem domain environment",
-    "scene.plan(GOALS) (plans aren't edited)": "append insert remove add pop replace extend delete edit "
+    "scene.plan(GOALS) (plans aren't edited)": "concatenate "
+    "append insert remove add pop replace extend delete edit "
     "replace_action add_step replan repair substitute update set_step change refine splice clear remove_step concat "
     "merge join plus add_action map push unshift",
     "print(plan)": SHOW,
@@ -340,7 +355,8 @@ STEP = {
     "starts ends t0",
     "result.labels.step(step)": "label labels words sentence title caption natural_language verbalize pretty_name "
     "display_name human_readable sentence_of",
-    "scene.verify(plan)": "verify simulate check is_valid validate success status ok verdict succeeded failed valid",
+    "scene.verify(plan)": "outcome_of "
+    "verify simulate check is_valid validate success status ok verdict succeeded failed valid",
     "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor done "
     "execute_step completed executed started",
     "print(step)": SHOW,
@@ -452,12 +468,13 @@ TABLE = {
 PROBLEM = {
     "domain.behaviors": "actions operators behaviors behaviours action schemas action_schemas skills",
     "domain.situations": "fluents predicates situations situation_types fluent properties state_variables",
-    "initial": "init initial_state initial_values state explicit_initial_values facts initial_facts start start_state",
+    "initial": "fluent_values "
+    "init initial_state initial_values state explicit_initial_values facts initial_facts start start_state",
     "goal": "goals goal_state target objective tasks goal_facts goal_condition",
     "individuals": "objects all_objects instances constants user_objects things",
     "classes": "types user_types sorts kinds hierarchy",
     "scene": "name iri title label uri",
-    "relations": "static statics static_facts",
+    "relations": "static_predicates static statics static_facts",
 }
 DOMAIN = {
     "behaviors": "actions operators behaviours action schemas action_schemas skills behavior methods",
@@ -467,7 +484,8 @@ DOMAIN = {
 }
 BEHAVIOR = {
     "preconditions": "conditions precondition pre requires condition requirements when precond guard needs",
-    "effects": "effect add_effects del_effects postconditions changes adds deletes post add del_ outcomes results "
+    "effects": "post_conditions "
+    "effect add_effects del_effects postconditions changes adds deletes post add del_ outcomes results "
     "postcondition add_list delete_list",
     "parameters": "args arguments params signature inputs parameter objects",
     "variables": "bindings free_variables determined",

@@ -198,6 +198,15 @@ PARAMETER = re.compile(
 """Pattern of a Python parameter, perhaps with a value, for which the command line has an option of the same name."""
 
 
+PLAINER = (
+    (r" is not a valid float( range)?", " is no number"),
+    (r" is not a valid integer( range)?", " is no whole number"),
+    (r"([-\d.e+]+) is not in the range x>(=?)([-\d.e+]+)$", r"\1; wanted a number >\2 \3"),
+    (r"([-\d.e+]+) is not in the range ([-\d.e+]+)<=x<=([-\d.e+]+)$", r"\1; wanted a number from \2 to \3"),
+)
+"""Patterns of click's messages about numbers, and the same in plain words."""
+
+
 def _usage(error: Any) -> str:
     """Return the error of a wrong call in one line; for a call without arguments, print the help and exit."""
     if type(error).__name__ == "NoArgsIsHelpError":
@@ -207,6 +216,8 @@ def _usage(error: Any) -> str:
     if isinstance(error, click.NoSuchOption) and error.ctx:
         return f"no such option '{error.option_name}'{_in_place_of(error.option_name, error.ctx)}; see {command} --help"
     said = " ".join(error.format_message().split()).rstrip(".")
+    for pattern, plain in PLAINER:
+        said = re.sub(pattern, plain, said)
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 
 
@@ -232,6 +243,7 @@ def by_options(text: str) -> str:
 def _in_place_of(option: str, context: click.Context) -> str:
     """Return the replacement for an unknown option: another option, an argument, or an option of other commands."""
     from confab.guessing import chosen
+    from confab.reasoner.names import nearest
 
     def names(command: click.Command | None) -> list[str]:
         options = [each for each in command.params if isinstance(each, click.Option)] if command else []
@@ -243,6 +255,9 @@ def _in_place_of(option: str, context: click.Context) -> str:
             return f"; give {each.metavar} without the name of an option"
     if meant := chosen(option, names(context.command)):
         return f"; did you mean '{meant}'?"
+    plainly = {name.lstrip("-"): name for name in names(context.command)}
+    if near := nearest(option.lstrip("-"), plainly):
+        return near.replace("'", "'--", 1)
     group = context.find_root().command
     if not isinstance(group, click.Group):
         return ""

@@ -115,10 +115,21 @@ def check_replaceable(path: Path, kind: str) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise `FileNotFoundError` if more than the last folder of a path is missing, because a folder's name may be mistyped."""
-    above = _behind(path).parent.parent
+    """Raise an error if more than the last folder of a path to be written is missing, or if a file is in place of a folder.
+
+    Raises
+    ------
+    FileNotFoundError
+        A folder is missing, because its name may be mistyped.
+    NotADirectoryError
+        A part of the path is a file.
+    """
+    folder = _behind(path).parent
+    above = folder.parent
     try:
         above.stat()
+        if folder.exists() and not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"'{folder}' is a file; wanted a folder", str(path))
     except FileNotFoundError:
         said = f"there is no folder '{above}'; create it, or give another name"
         raise FileNotFoundError(errno.ENOENT, said, str(path)) from None

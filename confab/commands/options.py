@@ -68,6 +68,14 @@ class Output(click.Path):
 class Command(click.Command):
     """A command that refuses one file as input and output, one file for two outputs, and stdin for two inputs."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; errors of the parser know the command, so that they name its help."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            error.ctx = error.ctx or ctx
+            raise
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; raise `UsageError` if one file, or stdin, is given for two purposes."""
         read = [p for p in self.params if _reads_stdin(ctx.params.get(p.name or ""), p)]

@@ -82,7 +82,9 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         meant = _with_situation(problem, words) or (nearest(name, known) if len(words) > 2 else "")
         raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value'{example}{meant}")
     if about not in individuals:
-        raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
+        members = problem.classes.get(known[name].arguments[0], ()) if name in known else ()
+        hint = f"{name} is of {some_of(members)}" if members else ""
+        raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals, hint)}")
     if name not in known:
         meant = next((each for each, situation in known.items() if name in situation.properties), "")
         hint = (
@@ -107,8 +109,9 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     ranges = (*situation.arguments[1:], *([] if situation.quantity else [situation.range]))
     for kind, word in zip(ranges, rest, strict=situation.quantity is None):
         if word not in individuals and word not in (TRUE, FALSE):
+            members = problem.classes.get(kind, ())
             raise KnowledgeError(
-                f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
+                f"unknown individual '{word}' in '{fact}'{nearest(word, members, f'values: {some_of(members)}')}"
             )
         if word not in problem.members(kind):
             raise KnowledgeError(

@@ -361,3 +361,37 @@ def test_a_plan_is_json_that_a_scene_reads(scene: confab.Scene, result: confab.R
     file = tmp_path / "plan.json"
     file.write_text(json.dumps(result.plan.json()))
     assert scene.read_plan(file) == result.plan
+
+
+def test_the_words_of_a_name_are_found_behind_capital_letters_and_beside_unknown_words() -> None:
+    names = {
+        ("confab", "HTNPlanner"): "plan()",
+        ("scene", "getGoals"): "goals",
+        ("scene", "object_count"): "objects",
+        ("scene", "instances_of_class"): "objects",
+        ("scene", "run_physics"): "verify",
+    }
+    assert {key: guessed(*key) for key, right in names.items() if right not in guessed(*key)} == {}
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (["plan", "x", "--jsno"], "did you mean '--json'?"),
+        (["hlep"], "did you mean 'help'?"),
+        (["plan", "x", "--goal"], "see confab plan --help"),
+        (["plan", "x", "--time-limit", "soon"], "'soon' is no number"),
+        (["run", "x", "--noise", "7"], "wanted a number from 0.0 to 0.05"),
+        (["run", "x", "-o", "/dev/null/runs"], "'/dev/null' is a file; wanted a folder"),
+        (["plan", "two-cups", "--goal", "cup1 LOCATION nowhere"], "values: location1, "),
+        (["plan", "two-cups", "--goal", "spoon LOCATION location1"], "LOCATION is of bottle1, cup1, cup2"),
+    ],
+)
+def test_misuse_of_the_command_line_is_told_in_plain_words(refused: Refused, line: list[str], said: str) -> None:
+    assert said in refused(line)
+
+
+def test_help_with_a_command_is_the_help_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main(["help", "plan"])
+    assert capsys.readouterr().out.startswith("Usage: confab plan")

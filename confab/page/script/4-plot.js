@@ -124,7 +124,10 @@ class Plot {
         const same = numbered.find((one) => one.x === label.x && one.y === label.y);
         if (same) { same.words += `: ${words}`; continue; }
         numbered.push({ x: label.x, y: label.y, words: label.kind === "thing-name" && label.spot ? `${words}` : words });
-        svg.append(drawn("text", { class: "place key", x: label.x, y: label.y + 4, "text-anchor": "middle" }, String(numbered.length)));
+        const number = String(numbered.length), room = wide(number, "10px") + 2, beside = [[half, -6], [-half - room, -6], [-room / 2, half], [-room / 2, -half - 12]]
+          .map(([dx, dy]) => ({ x: label.x + dx, y: label.y + dy, w: room, h: 12 })).find((box) => label.size < 8 && free(box));
+        if (beside) taken.push(beside); // on a small circle a number can't be read
+        svg.append(drawn("text", { class: "place key", x: beside ? beside.x + room / 2 : label.x, y: beside ? beside.y + 10 : label.y + 4, "text-anchor": "middle" }, number));
         continue;
       }
       const [box, anchor] = chosen, x = anchor === "middle" ? box.x + w / 2 : anchor === "start" ? box.x : box.x + w;

@@ -9,7 +9,7 @@ const history = (element, data) => {
       if (event.target.checked) { chosen.add(number); if (chosen.size > 2) chosen.delete([...chosen][0]); } else chosen.delete(number);
       rows();
       show();
-    } }), ` ${run.name}`)), made("td", {}, run.scene), made("td", {}, run.when.slice(0, 16).replace("T", " ")), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`),
+    } }), ` ${run.name}`)), made("td", { class: run.page.good ? "ok" : "bad" }, `${run.page.good ? "✓" : "✗"} ${run.page.status}`), made("td", {}, run.scene), made("td", {}, run.when.slice(0, 16).replace("T", " ")),
     differ.map((name) => made("td", {}, value(run, name))))));
   const show = () => {
     const two = [...chosen].sort((a, b) => a - b).map((number) => data.runs[number]);
@@ -33,7 +33,7 @@ const history = (element, data) => {
   };
   element.classList.add("confab");
   clear(element, made("h1", {}, data.title), made("p", { class: "note" }, "A mark shows a run; two of them are compared."), made("div", { class: "scroll" }, made("table", { class: "runs" },
-    made("thead", {}, made("tr", {}, ["run", "scene", "when", "verdict", ...differ].map((words) => made("th", { scope: "col" }, words)))), table)),
+    made("thead", {}, made("tr", {}, ["run", "verdict", "scene", "when", ...differ].map((words) => made("th", { scope: "col" }, words)))), table)),
     same.length > 0 && made("p", { class: "note" }, `The same in all: ${same.map((name) => `${name} ${value(data.runs[0], name)}`).join(" · ")}`), out);
   rows();
   show();
