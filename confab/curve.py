@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 KINDS = (".png", ".svg", ".pdf")
 MODES: dict[Mode, str] = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
-"""Time limit of a planning call in seconds. A call that exceeds the limit has no point in the picture."""
+"""Time limit of a planning call in seconds. The picture has no data point for a call that exceeds the limit."""
 MANY = 12
 """Maximum number of episodes for which the picture shows names and counts."""
 

@@ -182,7 +182,7 @@ class Known(metaclass=RightNames):
         return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items()))
 
     def with_fact(self: S, *facts: Facts) -> S:
-        """Return a copy of the scene with some facts replaced. A fact is given as a text or by its words.
+        """Return a copy of the scene with some facts replaced. Write a fact as one text or as a tuple of its words.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Known(metaclass=RightNames):
         return self._restated(with_facts, facts)
 
     def with_goal(self: S, *goals: Facts) -> S:
-        """Return a copy of the scene with some goals replaced. A goal is given as a text or by its words.
+        """Return a copy of the scene with some goals replaced. Write a goal as one text or as a tuple of its words.
 
         Raises
         ------

@@ -367,7 +367,7 @@ class Result(metaclass=RightNames):
         Raises
         ------
         KnowledgeError
-            `ids` aren't the IDs of all first-level steps, each given once, or the plan can't be executed in this order.
+            `ids` doesn't contain the ID of each first-level step exactly once, or the steps can't be executed in this order.
 
         Examples
         --------

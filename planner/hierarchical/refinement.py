@@ -72,7 +72,7 @@ class Advice(Protocol):
 
 
 class Refiner:
-    """Methods that achieve targets and apply steps on the table of a workspace.
+    """Methods that achieve targets and apply steps in the current state of a workspace.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
 
 
 def _folded(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour in which effects on derived amounts have no conditions that are the same in every state."""
+    """Return a behaviour whose effects on derived amounts have only conditions that can change."""
     if not behavior.changes & domain.aggregates.keys():
         return behavior
     known = frozenset(behavior.preconditions) if behavior.timing is None else frozenset[Condition]()

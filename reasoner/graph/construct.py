@@ -24,7 +24,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     KnowledgeError
         The query isn't SPARQL, or its result isn't triples or is empty.
     LimitError
-        The query exceeds its limits, as in `confab.reasoner.graph.query_process.ask`.
+        The query exceeds the limits of `confab.reasoner.graph.query_process.ask`.
     """
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     kind, _, answer = ask(graph, query, limits)

@@ -1,7 +1,7 @@
 """Files and stores of experience: learned items as triples and tallies as annotated axioms, in Turtle that Protégé can open.
 
 Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and
-item (`:countsFor`). The counter is `:associatedWith` the item itself and with the lifted facts that held. An
+item (`:countsFor`). The property `:associatedWith` links the counter to the item and to the lifted facts that held. An
 ``owl:Axiom`` on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting
 `:probability`. Replicas never share a counter, and all other nodes are named by their content, so that the union of two
 files contains both memories. An edited rule keeps its tallies.
