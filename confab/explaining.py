@@ -137,7 +137,7 @@ def explain(
     against : behaviour and arguments, optional
         The alternative; by default the most cogent other behaviour that the rules advise in the same state.
     labels : Labels, optional
-        The labels for the text.
+        The labels by which the text names individuals.
 
     Raises
     ------

@@ -139,7 +139,7 @@ class Table:
 
 
 class PythonWriter:
-    """Writer of the conditions and behaviours of one problem as Python code over the dictionaries of a table.
+    """Writer of Python code that evaluates the conditions and behaviours of one problem on the dictionaries of a table.
 
     Parameters
     ----------

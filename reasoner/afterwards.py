@@ -381,7 +381,7 @@ def _changed(now: Expression, operation: str, by: Expression) -> Expression:
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
-    """Return conditions with explicit witnesses for variables that occur only in alternatives or other witnesses.
+    """Return conditions in which a witness quantifies each variable that occurs only in alternatives or in other witnesses.
 
     >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
     >>> found.alternatives[0][0].variable

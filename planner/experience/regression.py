@@ -348,7 +348,7 @@ class PlanTrace:
         )
 
     def plainest(self, individual: str, of: str) -> str:
-        """Return the class `of`, unless `of` is empty or a situation type.
+        """Return the given class `of`, unless `of` is empty or a situation type.
 
         Otherwise return the individual's widest class that is within `of` and isn't a situation type.
         """

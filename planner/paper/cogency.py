@@ -24,7 +24,7 @@ class PaperConstants:
     learning: float = 0.1  # λ of eq. (2)
 
     def bonus(self, c_m: float, n: int) -> float:
-        """Return the term c of eq. (5), which is ``(c_m - 1) k w`` with ``w = max(1 - n/N, 0)``."""
+        """Return the term c of the paper's equation 5: ``(c_m - 1) k w`` with ``w = max(1 - n/N, 0)``."""
         return (c_m - 1.0) * self.k * max(1.0 - n / self.anticipated_length, 0.0)
 
 

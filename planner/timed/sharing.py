@@ -401,7 +401,7 @@ class _Search:
         return facts.state()
 
     def planned(self, problem: Problem, crew: Crew, aim: Aim) -> tuple[Step, ...] | None:
-        """Return the steps of a crew that the default planner finds for a problem.
+        """Return the steps that the default planner finds for a problem with the actors of a crew.
 
         If the aim is a step, this step comes last. Return None if no such steps are found.
         """

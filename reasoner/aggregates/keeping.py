@@ -337,7 +337,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return the conditions for a contribution of a tuple: constant conditions, and changing conditions before and after."""
+        """Return the conditions under which a tuple contributes: constant ones, and changing ones before and after a step."""
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]

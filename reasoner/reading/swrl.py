@@ -204,7 +204,7 @@ class _Imp:
         return found
 
     def _said(self, predicate: str, said: tuple[str, ...]) -> None:
-        """Record the condition of an atom in the body."""
+        """Record the condition of an atom in the rule's body."""
         definitions = self.definitions
         terms = tuple(map(self.term, said)) if not predicate.startswith(BUILT_IN) else ()
         if predicate in ("sameAs", "differentFrom"):

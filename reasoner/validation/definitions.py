@@ -87,7 +87,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
 
 
 def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
-    """Return the reason why planning ignores an axiom about a value property; return None if effects are the reason."""
+    """Return the reason why planning ignores an axiom about a value property, or None if another check reports the reason."""
     name, what = local_name(prop), f"planning doesn't evaluate that {said}, since "
     nodes = {**schema.axioms, **schema.expressions}
     into = any(
