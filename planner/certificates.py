@@ -29,7 +29,7 @@ class Certificate:
     never : frozenset of Fact
         Facts that hold in no state.
     always : mapping of Symbol to value
-        Symbols that keep their initial value; for an amount, the bounds of the amount in all states.
+        Symbols with a value that holds in all states. The value of an amount is a range that contains the amount in all states.
     told_apart : mapping of Symbol to values
         Symbols with the values that are distinguished from each other and from all other values; an empty tuple means all values.
     cases : int
