@@ -14,6 +14,7 @@ from confab.reasoner.embodiment.reach import add_to_reach
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.reading.restating import refuted, with_refuted
 from confab.reasoner.refutations import Refutation
+from confab.sim.verdict import CODES
 
 if TYPE_CHECKING:
     from confab.physics import Report
@@ -27,8 +28,10 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
     if failure is None:
         return ()
     chain = chain_to(report.plan, failure.step.path)
-    why = ": ".join(filter(None, (failure.verdict.code, ", ".join(failure.verdict.objects))))
-    return refuted_by(scene.problem, chain, failure.verdict.facts, why, failure.verdict.likewise)
+    verdict = failure.verdict
+    message = "" if verdict.message in CODES.values() else verdict.message
+    why = ": ".join(filter(None, (verdict.code, ", ".join(verdict.objects), message)))
+    return refuted_by(scene.problem, chain, verdict.facts, why, verdict.likewise)
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:
