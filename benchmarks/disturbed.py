@@ -30,7 +30,7 @@ CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("beverage-serving", ("after=22 box location5 8x5x15", "after=22 push cup2 -2 9"), ""),
     ("beverage-serving", ("at=5 box location8 14x14x12",), ""),
     ("one-arm-serving", ("at=8 box place5",), ""),
-    ("spice-drawer", ("at=12 box right_spot 7x7x9",), ""),
+    ("spice-drawer", ("at=3 box left_spot 7x7x9",), ""),
     # a bystander knocked over or taken away
     ("one-arm-serving", ("at=9 knock cup2",), ""),
     ("one-arm-serving", ("at=9 remove cup2",), ""),
