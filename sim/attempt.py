@@ -57,7 +57,7 @@ THIN = 0.01
 WITHDRAWAL_SPEED = 0.5
 """Ratio of the speed at which a stopped hand withdraws to the hand's normal speed."""
 
-SAMPLES = 1500
+SAMPLES = 6000
 """Maximum number of samples in the search for a path to one of the goals."""
 
 FINER = 4
