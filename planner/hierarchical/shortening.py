@@ -4,10 +4,10 @@ The first method plans the goals again in other orders, and reuses known refinem
 of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
 (`confab.planner.hierarchical.detours`).
 
-Other orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of the
-levels between the first and the lowest level are tried only if the plan moves an object away. The cheapest plan is kept; among
-equally cheap plans, the plan with the fewest primitives. Steps of the first level explain the steps below. Therefore steps of the
-first level are dropped only if the plan becomes much cheaper.
+Other orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of lower
+levels, which may refine several steps together, are tried only if the plan has several steps or moves an object away. The cheapest
+plan is kept; among equally cheap plans, the plan with the fewest primitives. Steps of the first level explain the steps below.
+Therefore steps of the first level are dropped only if the plan becomes much cheaper.
 """
 
 from __future__ import annotations
@@ -84,16 +84,17 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
         reordered(call, work, advised, random)
         windowed(call, levels[0], work)
+    if not leave_levels:
+        return
     several = len(call.steps) > 1
-    if (aside or several) and leave_levels:
-        for level in levels[1:-1]:
-            windowed(call, level, work)
-    if aside and leave_levels:
+    for level in levels[1:-1] if aside or several else ():
+        windowed(call, level, work, inherit=True)
+    if aside:
         drop_detours(call, levels[-2])
-    if leave_levels and (
-        drop_detours(call, levels[-1]) or several or call.given_up or len(levels) == 1 or lasting(call)
-    ):
+    if drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1 or lasting(call):
         windowed(call, levels[-1], work)
+    if len(levels) > 1 and several:  # the steps may have a shorter refinement together
+        windowed(call, levels[-1], work, inherit=True)
 
 
 def lasting(call: Call) -> bool:

@@ -34,9 +34,12 @@ MOST_ROWS, OF_A_STEP = 20_000, 500
 """Maximum number of rows of a join when a level is grounded for shortening: in total, and for each step of the plan."""
 
 
-def windowed(call: Call, level: int, work: int) -> None:
-    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`)."""
-    new = cheaper(call, level, work)
+def windowed(call: Call, level: int, work: int, inherit: bool = False) -> None:
+    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`).
+
+    If `inherit`, the new steps also satisfy the preconditions that the upper levels impose on their changes.
+    """
+    new = cheaper(call, level, work, inherit)
     if new is None:
         return
     other = fresh_call(call, call.problem)
@@ -54,7 +57,7 @@ def windowed(call: Call, level: int, work: int) -> None:
             return
 
 
-def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
+def cheaper(call: Call, level: int, work: int, inherit: bool) -> list[Ground] | None:
     """Return a cheaper sequence of steps of a level for a call's plan, without refinements.
 
     Return None if no cheaper sequence is found, or if the level is too large.
@@ -65,17 +68,12 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     from confab.planner.grounded.plan_windows import shorter
     from confab.planner.grounded.shortest import least
 
-    first, last = call.program.levels[0], call.program.levels[-1]
-    bound = [replace(call.problem, domain=binding(call.problem, level))] if level > first else []
-    unbound = [call.problem] if level in (first, last) else []
-    for problem in (*bound, *unbound):
-        task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
-        operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
-        if operators is not None:
-            break
+    problem = replace(call.problem, domain=binding(call.problem, level)) if inherit else call.problem
+    task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
+    operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
     if task is None or operators is None:
         return None
-    if level == call.program.levels[-1]:
+    if level == call.program.levels[-1] and not inherit:
         call.bound = least(task)
     found = shorter(task, operators, work, call.space.deadline)
     better = (task.cost_of(found), len(found)) < (task.cost_of(operators), len(operators))
