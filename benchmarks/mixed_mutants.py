@@ -1,22 +1,28 @@
 """The share of small faults in recognition, proofs and checkers that random worlds detect.
 
 `benchmarks.mutants` draws the faults. A separate process with one fault judges the worlds until a result is wrong that is right
-without the fault. The results are stored in a file, so that a later run can continue.
+without the fault. It judges only worlds that execute the faulty statement, first those that have detected most faults. The
+results are stored in a file, so that a later run can continue. If the generator or the judge of worlds has changed, the later run
+tries the survivors again.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import os
 import resource
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from types import FrameType
+from typing import Any, TypedDict
 
 from benchmarks.mutants import ROOT, Instead, faults, meaning
 from worlds.interpreter import Interpreter, TooManyStatesError
@@ -35,44 +41,104 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-WITHOUT_PLANS = ("proofs", "checker of certificates")
-"""Parts whose faults are mostly detected by worlds without a plan, which are judged first."""
-FIRST, WORLDS, SECONDS, WAITING = 8_000_000, 150, 60, 600.0
-"""First seed and number of worlds, CPU seconds for all worlds, and seconds by the clock for a call on a busy machine."""
+FIRST, WORLDS, TRIED = 8_000_000, 300, 60
+"""First seed and number of worlds, and maximum number of worlds that are judged with a fault."""
+SECONDS, WAITING = 60, 600.0
+"""CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
+CONSTRAINED = 0.3
+"""Share of worlds with a constraint on every state."""
+NOWHERE = "in no world: "
+"""Result of a fault in a statement that no world executes."""
 Drawn = tuple[RandomWorld, Interpreter]
+Saying = dict[str, list[str]]
+"""The complaints about each world, by its seed."""
 
 
-def kills(many: int, into: Path) -> None:
-    """Try `many` faults in each part, and print the share of detected faults."""
+class Record(TypedDict):
+    """The results for the faults of a module, with a hash of the generator and the judge of worlds."""
+
+    worlds: str
+    results: dict[str, str]
+
+
+def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
+    """Try `many` faults in each part, or in the chosen parts, and print the share of detected faults."""
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
-    known: dict[str, dict[str, str]] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
-    worlds = [drawn(seed) for seed in range(FIRST, FIRST + WORLDS)]
-    print("| part | module | faults tried | noticed | share |\n|---|---|---|---|---|")
+    known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
+    worlds = {seed: drawn(seed, constrained=CONSTRAINED) for seed in range(FIRST, FIRST + WORLDS)}
+    judging = hashed("".join(file.read_text("utf-8") for file in sorted((ROOT / "worlds").glob("*.py"))))
+    print("| part | module | faults tried | noticed | in no world | share of the others |\n|---|---|---|---|---|---|")
     for part, files in PARTS.items():
-        useful = sorted(worlds, key=lambda one: hopeless(one[1]) is not (part in WITHOUT_PLANS))
-        total = [0, 0]
-        for file, mode in files.items():
-            source = (ROOT / file).read_text("utf-8")
-            its = known.setdefault(f"{file} {hashlib.sha256(meaning(source).encode()).hexdigest()[:12]}", {})
-            before = complained(file, source, useful, mode, set())
-            if not isinstance(before, set):
-                raise SystemExit(f"{file}: the worlds can't be judged without any fault")
-            share = -(-many // len(files))
-            for (name, number), text in islice(faults(source, Random(file)), share):
-                key = f"{name.removeprefix('core/')}:{number}"
-                if key not in its:
-                    found = complained(file, text, useful, mode, before)
-                    line = next(
-                        n for o, n in zip(source.splitlines(), [*text.splitlines(), ""], strict=False) if o != n
-                    )
-                    its[key] = "noticed" if not isinstance(found, set) or found else f"survived: {line.strip()}"
-                    record.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", "utf-8")
-                    print(file, key, its[key], file=sys.stderr, flush=True)
-            noticed = sum(said == "noticed" for said in its.values())
-            total = [total[0] + len(its), total[1] + noticed]
-            print(f"| {part} | `{file}` | {len(its)} | {noticed} | {noticed / max(len(its), 1):.0%} |", flush=True)
-        print(f"| {part} | **all** | {total[0]} | {total[1]} | {total[1] / max(total[0], 1):.0%} |", flush=True)
+        if chosen and part not in chosen:
+            continue
+        total = Counter[str]()
+        for mode in dict.fromkeys(files.values()):
+            its = [file for file in files if files[file] == mode]
+            before, lines = traced(its, list(worlds.values()), mode)
+            for file in its:
+                source = (ROOT / file).read_text("utf-8")
+                key = f"{file} {hashed(meaning(source))}"
+                found = known.setdefault(key, Record(worlds=judging, results={}))
+                if found["worlds"] != judging:
+                    found["results"] = {fault: said for fault, said in found["results"].items() if said == "noticed"}
+                    found["worlds"] = judging
+                best = Counter[int]()
+                for (name, number), text in islice(faults(source, Random(file)), -(-many // len(files))):
+                    fault = f"{name.removeprefix('core/')}:{number}"
+                    if fault not in found["results"]:
+                        at, line = changed(source, text)
+                        where = statement(source, at)
+                        useful = [seed for seed in worlds if not where or not where.isdisjoint(lines[file][seed])]
+                        useful.sort(key=lambda seed: -best[seed])
+                        tried = {seed: worlds[seed] for seed in useful[:TRIED]}
+                        by = noticed(file, text, tried, mode, before)
+                        best.update([by] if by else [])
+                        said = "noticed" if by is not None else f"survived: {line}"
+                        found["results"][fault] = said if useful else NOWHERE + line
+                        record.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", "utf-8")
+                        print(file, fault, at, by, found["results"][fault], file=sys.stderr, flush=True)
+                row = Counter(said.partition(": ")[0] for said in found["results"].values())
+                total += row
+                print(f"| {part} | `{file}` | {shares(row)} |", flush=True)
+        print(f"| {part} | **all** | {shares(total)} |", flush=True)
+
+
+def shares(row: Counter[str]) -> str:
+    """Return the number of faults, of detected faults, of faults that no world executes, and the share, as cells of a table."""
+    nowhere = row[NOWHERE.partition(": ")[0]]
+    others = row.total() - nowhere
+    return f"{row.total()} | {row['noticed']} | {nowhere} | {row['noticed'] / max(others, 1):.0%}"
+
+
+def hashed(text: str) -> str:
+    """Return a short hash of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def changed(source: str, text: str) -> tuple[int, str]:
+    """Return the number of the first line that differs in a changed text, and the changed line."""
+    pairs = zip(source.splitlines(), [*text.splitlines(), ""], strict=False)
+    return next((at, new.strip()) for at, (old, new) in enumerate(pairs, 1) if old != new)
+
+
+def statement(source: str, line: int) -> set[int]:
+    """Return the lines of the statement that contains a line; of a compound statement, the lines before its body.
+
+    Return an empty set if the statement is outside of functions, so that each process executes it.
+    """
+    found, within = set[int](), False
+    waiting: list[tuple[ast.AST, bool]] = [(ast.parse(source), False)]
+    while waiting:
+        node, inside = waiting.pop()
+        for child in ast.iter_child_nodes(node):
+            first, last = getattr(child, "lineno", 0), getattr(child, "end_lineno", 0)
+            if isinstance(child, ast.stmt) and first <= line <= last:
+                body = getattr(child, "body", None)
+                end = body[0].lineno - 1 if body and body[0].lineno > first else last
+                found, within = set(range(first, end + 1)), inside
+            waiting.append((child, inside or isinstance(child, ast.FunctionDef)))
+    return found if within else set()
 
 
 def hopeless(meant: Interpreter) -> bool:
@@ -83,8 +149,57 @@ def hopeless(meant: Interpreter) -> bool:
         return False
 
 
-def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before: set[str]) -> set[str] | None:
-    """Return the complaints with a changed text of a module: all, or the first new complaint, or None if the process fails."""
+def traced(files: Sequence[str], worlds: Sequence[Drawn], mode: str) -> tuple[Saying, dict[str, dict[int, set[int]]]]:
+    """Judge worlds without a fault; return the complaints, and for each file the lines that each world executes."""
+
+    def run(tell: Callable[[object], None]) -> None:
+        executed: dict[str, set[int]] = {Instead(file, "").name: set() for file in files}
+
+        def call(frame: FrameType, event: str, given: object) -> Any:
+            lines = executed.get(frame.f_globals.get("__name__", ""))
+            if lines is None:
+                return None
+
+            def line(frame: FrameType, event: str, given: object) -> Any:
+                lines.add(frame.f_lineno)
+                return line
+
+            return line(frame, event, given)
+
+        for world, meant in worlds:
+            for lines in executed.values():
+                lines.clear()
+            sys.settrace(call)
+            said = judged(world, meant, mode)
+            sys.settrace(None)
+            tell([world.seed, said, [sorted(lines) for lines in executed.values()]])
+
+    answers, ended = forked(run, None)
+    if not ended:
+        raise SystemExit(f"{', '.join(files)}: the worlds can't be judged without any fault")
+    before = {str(seed): said for seed, said, _ in answers}
+    return before, {file: {seed: set(lines[i]) for seed, _, lines in answers} for i, file in enumerate(files)}
+
+
+def noticed(file: str, text: str, worlds: dict[int, Drawn], mode: str, before: Saying) -> int | None:
+    """Return the seed of the first world with a new complaint with a changed text of a module; 0 if the process fails."""
+
+    def run(tell: Callable[[object], None]) -> None:
+        faulty = Instead(file, text)
+        sys.meta_path.insert(0, faulty)
+        for seed, (world, meant) in worlds.items():
+            if not set(judged(world, meant, mode)) <= set(before[str(seed)]):
+                tell(seed)
+                return
+        if worlds and sys.modules[faulty.name].__loader__ is not faulty:
+            raise ImportError(faulty.name)  # the worlds were judged without the fault
+
+    answers, ended = forked(run, SECONDS)
+    return answers[0] if answers else None if ended else 0
+
+
+def forked(run: Callable[[Callable[[object], None]], None], seconds: int | None) -> tuple[list[Any], bool]:
+    """Call a function in a separate process; return what it tells, and whether it returns within its CPU seconds."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns about forks with threads
@@ -92,47 +207,36 @@ def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before:
     if child == 0:
         code = 1
         try:
-            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+            if seconds is not None:
+                resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
             os.close(reading)
             with open(os.devnull, "w") as nowhere:  # noqa: PTH123
                 os.dup2(nowhere.fileno(), 1)
                 os.dup2(nowhere.fileno(), 2)
-            faulty = Instead(file, text)
-            sys.meta_path.insert(0, faulty)
-            found = judge(worlds, mode, lambda said: bool(before) and said not in before)
-            if sys.modules[faulty.name].__loader__ is faulty:  # otherwise the worlds were judged without the fault
-                os.write(writing, json.dumps(sorted(found)).encode())
-                code = 0
+            with os.fdopen(writing, "w") as answers:
+                run(lambda said: print(json.dumps(said), file=answers, flush=True))
+            code = 0
         finally:
             os._exit(code)
     os.close(writing)
-    with os.fdopen(reading) as answer:
-        said = answer.read()
+    with os.fdopen(reading) as given:
+        said = [json.loads(line) for line in given]
     _, state = os.waitpid(child, 0)
-    if not (os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0):
-        return None
-    return {one for one in json.loads(said) if not before or one not in before}
+    return said, os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
 
 
-def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
-    """Judge worlds in one mode until `enough` is true for a complaint (a found fault); return the complaints and call results."""
+def judged(world: RandomWorld, meant: Interpreter, mode: str) -> list[str]:
+    """Judge a world in one mode, and return its complaints."""
     from worlds import judging
 
     judging.SECONDS = WAITING
-    found: set[str] = set()
     with TemporaryDirectory() as folder:
-        for world, meant in worlds:
-            its = judging.Judge(world, Path(folder), only=mode, meant=meant).judged()
-            said = {
-                f"{world.seed} {one.kind} {one.mode}"
-                for one in (*its.complaints, *its.remarks)
-                if one.kind != "gave-up" or hopeless(meant)
-            }
-            found |= said | {f"{world.seed} judged"}
-            if any(map(enough, said)):
-                break
-    return found
+        its = judging.Judge(world, Path(folder), only=mode, meant=meant).judged()
+    kept: Iterable[judging.Complaint] = (
+        one for one in (*its.complaints, *its.remarks) if one.kind != "gave-up" or hopeless(meant)
+    )
+    return sorted({f"{one.kind} {one.mode}" for one in kept})
 
 
 if __name__ == "__main__":
-    kills(int(sys.argv[1]), Path(sys.argv[2]))
+    kills(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])

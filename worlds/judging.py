@@ -194,7 +194,7 @@ class Judge:
             modes["optimal"] = {"mode": "optimal"}
         if len(self.world.problem.domain.levels) > 1 and self.sampled(STRICT, "strict", "strict"):
             modes["strict levels"] = {"leave_levels": False}
-        if self.only == "proofs":
+        if self.only.startswith(("proofs", "certificates")):
             modes = {}
         elif self.only and "/" not in self.only:
             first = self.only if self.only in modes else "guarded"
