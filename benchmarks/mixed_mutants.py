@@ -17,6 +17,7 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from random import Random
@@ -24,7 +25,7 @@ from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any, TypedDict
 
-from benchmarks.mutants import ROOT, Instead, faults, meaning
+from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import RandomWorld, drawn
 
@@ -41,7 +42,7 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-FIRST, WORLDS, TRIED = 8_000_000, 300, 60
+FIRST, WORLDS, TRIED = 8_000_000, 240, 30
 """First seed and number of worlds, and maximum number of worlds that are judged with a fault."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
@@ -63,6 +64,8 @@ class Record(TypedDict):
 
 def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     """Try `many` faults in each part, or in the chosen parts, and print the share of detected faults."""
+    for name in LIBRARIES:
+        import_module(name)
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}

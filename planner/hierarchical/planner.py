@@ -42,6 +42,8 @@ The maximum work corresponds to a few seconds.
 """
 FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
+TRIALS = 1_000_000
+"""Maximum number of times that a behaviour is tried in a state of a level that can't be grounded."""
 NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
 """Share of the time limit that is used for search; the other time is for releasing memory."""
@@ -143,9 +145,10 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} "
             f"{'were' if len(upper) > 1 else 'was'} given up for the whole task"
         )
-    if agenda.too_large is not None:
-        return given_up(call, f"planning goal by goal found no plan, and {agenda.too_large.text}")
-    flat = lowest_alone(call, limits, BITS * limits.work)
+    if agenda.too_large is None:
+        flat = lowest_alone(call, limits, BITS * limits.work)
+    else:
+        flat = step_by_step(call, limits, f"planning goal by goal found no plan, and {agenda.too_large.text}")
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
@@ -153,6 +156,22 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     if plan and upper and all(step.level == upper[0] for step in plan.steps):
         call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up
     return call.outcome(flat.status, plan, flat.reason)
+
+
+def step_by_step(call: Call, limits: Limits, why: str) -> Outcome:
+    """Search the lowest level as in the paper's mode, which evaluates any calculation in each state; `why` it isn't grounded.
+
+    The number of states is bounded, because each behaviour is tried in each state.
+    """
+    from confab.planner.paper.hierarchy import flat
+
+    lowest = call.program.levels[-1]
+    states = min(limits.expansions, TRIALS // max(call.program.size(lowest), 1))
+    if not states:
+        return Outcome(Status.GAVE_UP, reason=Reason(why))
+    found = flat(call.problem, lowest, limits=replace(limits, expansions=states).until(call.space.deadline))
+    call.count(found)
+    return found if found.plan is not None else replace(found, status=Status.GAVE_UP, reason=Reason(why))
 
 
 def given_up(call: Call, why: str) -> Outcome:

@@ -203,13 +203,19 @@ def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
     return prefixes
 
 
+def _copied(*elements: Any) -> tuple[Any, ...]:
+    """Return copies of grammar elements that share the token by which pyparsing marks an optional part that is missing."""
+    missing = pyparsing.Opt(pyparsing.Empty()).defaultValue
+    return deepcopy(elements, {id(missing): missing})
+
+
 @cache
 def _grammar(unit_name: str) -> pyparsing.ParserElement:
     from rdflib import Literal
     from rdflib.plugins.sparql import parser
 
-    unit, variable, name, iri, a, negative = deepcopy(
-        (getattr(parser, unit_name), parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE)
+    unit, variable, name, iri, a, negative = _copied(
+        getattr(parser, unit_name), parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE
     )
     negative.set_parse_action(lambda tokens: Literal(-tokens[0].value))  # rdflib's own action fails with decimals
 
@@ -234,7 +240,7 @@ def _stuck(unit_name: str, text: str) -> int:
     """Return the farthest position in an invalid text at which an element of the grammar failed."""
     from rdflib.plugins.sparql import parser
 
-    unit, farthest = deepcopy(getattr(parser, unit_name)).parse_with_tabs(), 0
+    unit, farthest = _copied(getattr(parser, unit_name))[0].parse_with_tabs(), 0
 
     def failed(_: str, at: int, *__: object) -> None:
         nonlocal farthest

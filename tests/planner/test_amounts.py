@@ -9,18 +9,21 @@ import confab
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
-from confab.reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
+from confab.reasoner.amounts import Amount, Calculation, Measure, Quantity, bounds_written, meets, written
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.symbols import (
     AmountEffect,
+    AnyOf,
     Behavior,
     Comparison,
+    EqualityCondition,
     Parameter,
     Problem,
     SituationType,
     Symbol,
     ValueEffect,
+    Witness,
 )
 from worlds.writing import becomes, has, world
 
@@ -164,6 +167,27 @@ def test_a_product_of_amounts_that_change_is_searched_only_where_states_are_look
     outcome = solve(Request(replace(problem, domain=domain), "paper"))
     assert outcome.plan is not None
     assert meets(str(outcome.plan.length[1]), "2")
+
+
+def test_what_stands_in_the_way_of_a_quotient_of_changing_amounts_is_found_by_looking_at_states() -> None:
+    shelf, box, mean = Parameter("?s", "Shelf"), Parameter("?b", "Box"), Fraction(3)
+    weight, one = Measure("weight", ("?b",)), Fraction(1)
+    total, count = (Calculation("+", Amount(n, ("?s",)), by) for n, by in (("TOTAL", weight), ("COUNT", one)))
+    heavier = Comparison(Calculation("/", total, count), ">", mean)
+    light = AnyOf(((Witness("?x", "Shelf", (EqualityCondition("?x", "?s"), AnyOf(((heavier,),)))),),), negated=True)
+    more = tuple(AmountEffect(n, ("?s",), "increase", by) for n, by in (("TOTAL", weight), ("COUNT", one)))
+    put = Behavior(
+        "PUT", 1, (box, shelf), (), (has("ON", "?b", "floor"), light), (becomes("ON", "?b", "?s"),), amounts=more
+    )
+    problem = world(
+        [SituationType("ON", ("Box",), "ON"),
+         *(SituationType(n, ("Shelf",), n, quantity=Quantity("")) for n in ("TOTAL", "COUNT"))],
+        [put], {"Box": ("iron", "wood"), "Shelf": ("shelf",), "ON": ("shelf", "floor")},
+        {"ON iron": "floor", "ON wood": "floor", "TOTAL shelf": "0", "COUNT shelf": "0"}, {"ON iron": "shelf"},
+    )  # fmt: skip
+    plan = solve(Request(replace(problem, relations={"weight": frozenset({("iron", "4"), ("wood", "2")})}))).plan
+    assert plan is not None
+    assert [step.arguments[0] for step in plan.primitives] == ["wood", "iron"]
 
 
 def test_a_world_with_amounts_is_carried_out_to_its_goal() -> None:

@@ -186,6 +186,7 @@ ALIKE = [
     ),
     ("FILTER(! (?tube = :a && ?slot = :b))", "FILTER NOT EXISTS { FILTER(?tube = :a) FILTER(?slot = :b) }"),
     ("FILTER NOT EXISTS { ?anyone a :Tube ; :spot ?slot }", "FILTER NOT EXISTS { ?t a :Tube ; :spot ?slot }"),
+    ("; :fits ?slot ; . ?slot a :Slot ;", "; :fits ?slot . ?slot a :Slot"),
 ]
 
 
