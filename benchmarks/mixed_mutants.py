@@ -42,7 +42,7 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-FIRST, WORLDS, TRIED = 8_000_000, 240, 30
+FIRST, WORLDS, TRIED = 8_000_000, 200, 30
 """First seed and number of worlds, and maximum number of worlds that are judged with a fault."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
@@ -78,7 +78,9 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
         total = Counter[str]()
         for mode in dict.fromkeys(files.values()):
             its = [file for file in files if files[file] == mode]
-            before, lines = traced(its, list(worlds.values()), mode)
+            texts = "".join((ROOT / file).read_text("utf-8") for file in its)
+            kept = into / f"mixed-{mode}-{hashed(judging + texts)}.json"
+            before, lines = traced(its, list(worlds.values()), mode, kept)
             for file in its:
                 source = (ROOT / file).read_text("utf-8")
                 key = f"{file} {hashed(meaning(source))}"
@@ -152,8 +154,13 @@ def hopeless(meant: Interpreter) -> bool:
         return False
 
 
-def traced(files: Sequence[str], worlds: Sequence[Drawn], mode: str) -> tuple[Saying, dict[str, dict[int, set[int]]]]:
-    """Judge worlds without a fault; return the complaints, and for each file the lines that each world executes."""
+def traced(
+    files: Sequence[str], worlds: Sequence[Drawn], mode: str, kept: Path
+) -> tuple[Saying, dict[str, dict[int, set[int]]]]:
+    """Judge worlds without a fault; return the complaints, and for each file the lines that each world executes.
+
+    The results are kept in a file for a later run.
+    """
 
     def run(tell: Callable[[object], None]) -> None:
         executed: dict[str, set[int]] = {Instead(file, "").name: set() for file in files}
@@ -177,9 +184,12 @@ def traced(files: Sequence[str], worlds: Sequence[Drawn], mode: str) -> tuple[Sa
             sys.settrace(None)
             tell([world.seed, said, [sorted(lines) for lines in executed.values()]])
 
-    answers, ended = forked(run, None)
-    if not ended:
-        raise SystemExit(f"{', '.join(files)}: the worlds can't be judged without any fault")
+    answers: list[Any] = json.loads(kept.read_text("utf-8")) if kept.is_file() else []
+    if not answers:
+        answers, ended = forked(run, None)
+        if not ended:
+            raise SystemExit(f"{', '.join(files)}: the worlds can't be judged without any fault")
+        kept.write_text(json.dumps(answers), "utf-8")
     before = {str(seed): said for seed, said, _ in answers}
     return before, {file: {seed: set(lines[i]) for seed, _, lines in answers} for i, file in enumerate(files)}
 

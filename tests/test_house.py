@@ -20,7 +20,7 @@ ROOMS = [
 SUBROOMS = {  # of the planner: what each may import beside itself; plan, validation, language, levels and transitions all may
     "paper": set[str](),
     "grounded": set[str](),
-    "hierarchical": {"grounded"},
+    "hierarchical": {"grounded", "paper"},
     "experience": {"hierarchical"},
     "acting": {"hierarchical"},
     "timed": {"grounded", "hierarchical"},
