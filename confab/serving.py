@@ -26,7 +26,7 @@ import threading
 from asyncio import LifoQueue, Transport
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -101,6 +101,7 @@ class Worker:
     def __init__(self, service: Service, nice: int) -> None:
         self.service, self.change = service, 0
         self.process = QueryWorker(service.scene.knowledge, service.limits, nice)
+        self.running: asyncio.Future[Any]
 
     def ready(self) -> None:
         """Start the process if necessary, and wait until it has read the current state of the scene."""
@@ -112,14 +113,20 @@ class Worker:
     async def call(self, function: Callable[..., T], *arguments: object) -> T:
         """Call a function in a thread and return its result; if the caller is cancelled, interrupt the process's query."""
         future = asyncio.get_running_loop().run_in_executor(self.service.threads, function, *arguments)
+        self.running = future
         try:
             return await asyncio.shield(future)
         except asyncio.CancelledError:
             while not future.done():
                 self.process.interrupt()
-                await asyncio.wait([future], timeout=0.05)
+                with suppress(asyncio.CancelledError):  # the client leaves at a time limit
+                    await asyncio.wait([future], timeout=0.05)
             future.exception()
             raise
+
+    def return_to(self, lane: LifoQueue[Worker]) -> None:
+        """Make the worker available in a lane as soon as its last call has ended, even if the caller didn't wait for the end."""
+        self.running.add_done_callback(lambda _: lane.put_nowait(self))
 
 
 class Service:
@@ -156,7 +163,7 @@ class Service:
             except LimitError as error:
                 raise HTTPException(500, str(error)) from error
             finally:
-                lane.put_nowait(worker)
+                worker.return_to(lane)
         raise AssertionError("the last lane has no time limit of its own")
 
     def take(self, event: Event) -> None:

@@ -1,5 +1,6 @@
 """A scene served on loopback: real clients are answered as the SPARQL 1.1 protocol wants it, and nothing they send harms it."""
 
+import asyncio
 import http.client
 import json
 import random
@@ -21,7 +22,7 @@ from rdflib.plugins.stores.sparqlstore import SPARQLStore
 
 import confab
 from confab.reasoner.graph.query_process import QueryLimits
-from confab.serving import AT_ONCE, Server, serving
+from confab.serving import AT_ONCE, LANES, Server, Service, serving
 
 CUPS = "SELECT ?cup ?where WHERE { ?cup a k:Cup ; k:location ?where } ORDER BY ?cup"
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
@@ -228,6 +229,29 @@ def test_a_client_that_leaves_ends_its_query(server: Server) -> None:
     until(lambda: running(server) == 1)
     client.close()
     until(lambda: running(server) == 0)
+
+
+def test_a_process_is_free_for_another_query_only_when_its_own_has_ended_though_its_client_left_at_a_time_limit() -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def slow(_: object) -> None:
+        begun.set()
+        ended.wait(5.0)
+
+    async def left() -> tuple[int, int]:
+        service = Service(confab.load("beverage-serving"), QueryLimits())
+        client = asyncio.create_task(service.run(slow))
+        await asyncio.to_thread(begun.wait)
+        await asyncio.sleep(2 * LANES[0])  # the first time limit is over
+        client.cancel()
+        await asyncio.gather(client, return_exceptions=True)
+        busy = service.lanes[0].qsize()
+        ended.set()
+        await asyncio.sleep(0.2)
+        service.close()
+        return busy, service.lanes[0].qsize()
+
+    assert asyncio.run(left()) == (AT_ONCE - 1, AT_ONCE)
 
 
 def until(condition: Callable[[], bool]) -> None:
