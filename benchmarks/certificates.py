@@ -12,7 +12,6 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -29,11 +28,11 @@ from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.symbols import Problem
 from worlds.agreement import solvable
+from worlds.false_certificates import corrupted
 from worlds.families import random_table
 from worlds.hierarchies import hierarchy
-from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import mixed
 from worlds.numbers import jugs, rounds
 from worlds.scenes import scene
@@ -41,12 +40,8 @@ from worlds.scenes import scene
 FIRST, COUNT = 4_000_000, 100
 CORRUPTED = 50
 """Number of certificates that are corrupted, drawn from all worlds."""
-MOST_STATES = 600
-"""Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
 LIMITS = Limits(expansions=20_000, seconds=20.0)
 """Limits of planning for problems without a scene file."""
-SAMPLE = 20
-"""Number of reachable states that are changed to refute a certificate."""
 SECONDS = 20.0
 """Time limit in seconds of planning for a scene."""
 DOORS = ("defined", "amounts", "updates")
@@ -54,8 +49,6 @@ DOORS = ("defined", "amounts", "updates")
 Answer = tuple[Problem, Outcome, float]
 """A problem, its outcome, and the CPU seconds of planning."""
 T = TypeVar("T")
-NOTHING = "nothing"
-"""A name that occurs in no world."""
 VALUES: dict[str, Callable[[int], Problem]] = {
     "levels": hierarchy,
     "tables": random_table,
@@ -128,66 +121,6 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
     """Return the result of a call and its CPU seconds."""
     begin = process_time()
     return call(), process_time() - begin
-
-
-def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterator[tuple[str, Certificate]]:
-    """Yield invalid certificates: with a false claim, for another goal, or without a necessary claim."""
-    goal = certificate.unmet[0]
-    other = Fact(Symbol(goal.symbol.situation, (NOTHING,)), goal.value)
-    yield "without a goal", replace(certificate, unmet=())
-    yield "of another goal", replace(certificate, unmet=(other,))
-    yield "with a case more", replace(certificate, cases=certificate.cases + 1)
-    yield "with a case less", replace(certificate, cases=certificate.cases - 1)
-    first = rng.choice(sorted(s for s in problem.initial if s.situation not in problem.domain.rules))
-    true = Fact(first, problem.initial[first])
-    yield "with a fact of the initial state as never true", replace(certificate, never=certificate.never | {true})
-    if certificate.always:
-        one = rng.choice(sorted(certificate.always))
-        yield "with another constant", replace(certificate, always={**certificate.always, one: NOTHING})
-    meant = Interpreter(problem)
-    for fact in rng.sample(sorted(certificate.never), min(3, len(certificate.never))):
-        less = replace(certificate, never=certificate.never - {fact})
-        if disproved(meant, less, fact.symbol, [fact.value]):
-            yield "without a fact that is never true", less
-            break
-    for name in ("always", "told_apart"):
-        claims = getattr(certificate, name)
-        for symbol in rng.sample(sorted(claims), min(3, len(claims))):
-            kept = {one: of for one, of in claims.items() if one != symbol}
-            less = replace(certificate, always=kept) if name == "always" else replace(certificate, told_apart=kept)
-            if disproved(meant, less, symbol, problem.values(symbol, 9)):
-                yield f"without a symbol of {name}", less
-                break
-
-
-def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, values: Iterable[str]) -> bool:
-    """Return whether a state that a certificate allows leads to a state that the certificate excludes.
-
-    A tested state is a reachable state with another value of the symbol whose claim was removed. All other claims of the
-    certificate hold in a tested state. The plain interpreter, which shares no code with the checker, searches for the goal or
-    the opposite of a claim.
-    """
-    at, level = meant.slots.get(symbol), meant.problem.domain.levels[-1]
-    if at is None or at >= meant.stated or meant.kinds[symbol.situation].quantity is not None:
-        return False
-
-    def allowed(state: State) -> bool:
-        never = any(meant.meets(state, fact.symbol, fact.value) for fact in certificate.never)
-        return not never and all(meant.meets(state, one, value) for one, value in certificate.always.items())
-
-    other = meant.wanting({fact.symbol: fact.value for fact in certificate.unmet})
-    try:
-        reached = {state for state, _ in meant.wanting({}).explored(level, MOST_STATES, rests=False).costs}
-        for state in sorted(reached, key=str)[:SAMPLE]:
-            for value in values:
-                other.initial = meant.closed([*state[:at], value, *state[at + 1 :]])
-                if allowed(other.initial):
-                    found = other.explored(level, MOST_STATES, rests=False)
-                    if found.least is not None or not all(allowed(after) for after, _ in found.costs):
-                        return True
-    except TooManyStatesError:
-        pass
-    return False
 
 
 def main() -> int:

@@ -86,6 +86,25 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
         return None
 
 
+def of_each_kind(problem: Problem, most: float = WORK) -> Iterator[tuple[str, Certificate | None]]:
+    """Yield the certificate of each kind that is found without the other kinds, or None; each search has its own work limit.
+
+    In `certify`, the result of one kind can hide a fault of another kind.
+    """
+
+    def found(find: Callable[[Lowest, Relaxed], Certificate | None]) -> Certificate | None:
+        lowest = Lowest(problem, most)
+        try:
+            return find(lowest, Relaxed(lowest))
+        except (WorkLimitError, RecursionError):
+            return None
+
+    yield "facts", found(lambda _, relaxed: relaxed.certificate(problem.goal))
+    yield "pairs", found(_by_pairs)
+    yield "cases", found(lambda lowest, relaxed: _by_cases(lowest, relaxed, problem.goal))
+    yield "states", found(lambda lowest, _: _by_states(lowest))
+
+
 def _at_once(lowest: Lowest, little: int) -> Certificate | None:
     """Return a certificate for a single goal; each goal is tried with a small work limit."""
     for symbol, wanted in sorted(lowest.problem.goal.items()):

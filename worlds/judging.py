@@ -32,6 +32,7 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Problem, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
+from worlds.false_certificates import corrupted as corrupted_certificates
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import RandomWorld
 from worlds.scenes import scene
@@ -45,8 +46,6 @@ OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3,
 """Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
 LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
-FEW_STATES = 100
-"""Maximum number of states of a world whose certificate of all states takes little work."""
 MOST_ACTIONS = 1_500
 """Maximum number of grounded behaviours of an imported problem for the exhaustive search."""
 T = TypeVar("T")
@@ -298,28 +297,30 @@ class Judge:
                 return
 
     def proofs(self, read: Scene) -> None:
-        """Certify the task without a search, and judge the certificate without the planner.
+        """Certify the task without a search, and judge the certificates without the planner.
 
-        The planner hides a wrong certificate, since it gives up if the checker rejects the certificate.
+        The planner hides a wrong certificate, since it gives up if the checker rejects the certificate. The certificate of each
+        kind is judged, too, since one kind hides the faults of another. Certificates of cases and of states have to be found for
+        each task without a plan.
         """
         from confab.planner.certificate_checks import refusal
-        from confab.planner.certifying import certify
+        from confab.planner.certifying import certify, of_each_kind
 
         problem = read.reading.problem
-        for few_states in (False, True):
-            mode = f"proofs {'of all states' if few_states else 'by facts'}"
-            found = certify(problem, CERTIFYING, few_states)
+        for kind, found in (("all", certify(problem, CERTIFYING)), *of_each_kind(problem, CERTIFYING)):
+            mode = f"proofs by {kind}"
             if found is None:
-                if self.found.known and self.found.least is None:
+                if self.found.known and self.found.least is None and kind in ("all", "cases", "states"):
                     self.found.remarks.append(Complaint("no certificate", mode, ""))
                 continue
             if self.found.least is not None and self.surely is not None:
                 self.complain("a certificate although there is a plan", mode, found)
             if said := refusal(problem, found):
                 self.complain("a certificate that its checker rejects", mode, f"{said}: {found}")
-            if few_states and self.found.known and self.found.states <= FEW_STATES and (found.never or found.always):
-                self.found.remarks.append(Complaint("another proof than by few states", mode, str(found)[:400]))
             self.claims(mode, found)
+            for what, false in corrupted_certificates(problem, found, self.rng):
+                if refusal(problem, false) is None:
+                    self.complain("a false certificate is accepted", mode, f"{what}: {false}")
 
     def false_certificates(self, read: Scene) -> None:
         """Test the certificate checker with certificates of tasks that lack one behaviour.

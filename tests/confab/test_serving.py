@@ -231,7 +231,9 @@ def test_a_client_that_leaves_ends_its_query(server: Server) -> None:
     until(lambda: running(server) == 0)
 
 
-def test_a_process_is_free_for_another_query_only_when_its_own_has_ended_though_its_client_left_at_a_time_limit() -> None:
+def test_a_process_is_free_for_another_query_only_when_its_own_has_ended_though_its_client_left_at_a_time_limit() -> (
+    None
+):
     begun, ended = threading.Event(), threading.Event()
 
     def slow(_: object) -> None:

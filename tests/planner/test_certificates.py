@@ -13,7 +13,6 @@ from random import Random
 import pytest
 
 import confab
-from benchmarks.certificates import corrupted
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.certified import certified
@@ -22,6 +21,7 @@ from confab.planner.plan import Outcome, Reason, Status
 from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
 from worlds.agreement import solvable
+from worlds.false_certificates import corrupted
 from worlds.hierarchies import hierarchy
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import mixed
