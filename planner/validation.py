@@ -135,6 +135,7 @@ class _Check:
         self.depth = depth  # the lowest level with steps in the plan
         self.rules = rules
         self.facts = Facts(problem, problem.initial, rules)
+        self.rules.remember(self.facts)
         self.exceptions = {name: Fraction(self.facts.value(name, ()) or 0) for name in problem.domain.constraints}
         self.faults: list[Fault] = []
 
@@ -195,6 +196,7 @@ class _Check:
         if not step.steps:
             for (situation, arguments), value in wanted.items():
                 self.facts.put(situation, arguments, value)
+            self.rules.remember(self.facts)
             if level < self.depth and self.facts.since(mark):
                 self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
             return self.within_bounds(step)
@@ -203,6 +205,8 @@ class _Check:
         totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
         said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
         for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
+            if cell[0] in self.problem.domain.remembers:
+                continue  # a refinement may make remembered symbols true
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
             if (cell in wanted and cell[0] not in totals) or self.problem.sees(level, symbol, said[cell]):
                 self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
@@ -231,7 +235,9 @@ class _Check:
             wanted |= made or {}
             for (situation, arguments), value in wanted.items():
                 self.facts.put(situation, arguments, value)
-            allowed = self.within_bounds(last, self.problem.domain.behaviors[last.behavior].level)
+            level = self.problem.domain.behaviors[last.behavior].level
+            self.rules.remember(self.facts, level)
+            allowed = self.within_bounds(last, level)
             made, last = self.changes(one) if allowed else None, one
             if made is None:
                 break
@@ -240,7 +246,10 @@ class _Check:
         return None if made is None else wanted | made
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the values that a step gives to symbols in the current state; record a fault if it isn't applicable."""
+        """Return the values that a step gives to symbols in the current state; record a fault if it isn't applicable.
+
+        Remembered symbols are left out, because `BehaviorReader.remember` computes them.
+        """
         behavior = self.problem.domain.behaviors.get(step.behavior)
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
@@ -255,7 +264,8 @@ class _Check:
             )
             self.fault(step.path, f"{step}: {why}")
             return None
-        return {(situation, arguments): value for situation, arguments, value in changes}
+        remembers = self.problem.domain.remembers
+        return {(situation, key): value for situation, key, value in changes if situation not in remembers}
 
     def within_bounds(self, step: Step, level: int | None = None) -> bool:
         """Return whether all totals are within their bounds and no constraint is violated after a step; record a violation.
@@ -416,6 +426,16 @@ class BehaviorReader:
             if all(map(contains, rule.members, arguments)) and all_hold(rule.preconditions, facts, values):
                 return True
         return False
+
+    def remember(self, facts: Facts, level: int | None = None) -> None:
+        """Make each remembered symbol that a level (by default, any level) sees true if the symbol that it remembers is true."""
+        for name, source in self.problem.domain.remembers.items():
+            if level is not None and self.problem.domain.situations[name].level > level:
+                continue
+            kinds = self.problem.domain.situations[name].arguments
+            for arguments in product(*(self.problem.classes.get(kind, ()) for kind in kinds)):
+                if facts.value(name, arguments) != TRUE and facts.value(source, arguments) == TRUE:
+                    facts.put(name, arguments, TRUE)
 
     def read(self, behavior: Behavior) -> _Behavior:
         """Return a behaviour in its compiled form."""

@@ -96,10 +96,13 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
 
 
 def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a fact is a derived amount, which depends on other facts."""
+    """Raise `ImpossibleStateError` if a fact is a derived amount, or makes a remembered situation type false."""
     for fact in facts:
         if (name := fact.symbol.situation) in domain.aggregates:
             text = f"a rule defines {name}; change a fact that it follows from"
+            raise ImpossibleStateError(f"{cause or fact}: {text}")
+        if name in domain.remembers and fact.value == FALSE:
+            text = f"{name} remembers {domain.remembers[name]}, and never becomes false; leave the fact out"
             raise ImpossibleStateError(f"{cause or fact}: {text}")
 
 

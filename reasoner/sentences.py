@@ -62,6 +62,10 @@ def said(condition: Condition, words: Words = str) -> str:
             return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
         case Witness(variable, kind, conditions, negated):
             return _sought(variable, words(kind), conditions, negated, words)
+        case AnyOf(constraint=Constraint(_, _, (once,))):
+            return f"{words(once)} is true at most once"
+        case AnyOf(constraint=Constraint(_, _, (one, other))):
+            return f"{words(one)} is true only after {words(other)}"
         case AnyOf(constraint=Constraint(situation, always)):
             return f"{words(situation)} is {'always' if always else 'never'} true"
         case AnyOf(alternatives, True) if all(len(group) == 1 for group in alternatives):

@@ -170,12 +170,19 @@ class Witness:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on every state: a situation type is never true, or always true for all individuals of its argument classes."""
+    """A condition on every state: a situation type is never true, or always true for all individuals of its argument classes.
+
+    `about` has the situation types that the author constrains if these aren't `situation` itself: one that is true at most once, or
+    one that is true only after another one.
+    """
 
     situation: str
     always: bool = False
+    about: tuple[str, ...] = ()
 
     def __str__(self) -> str:
+        if self.about:
+            return f"{self.about[0]} must be true {' '.join(('only after' if self.about[1:] else 'at most once', *self.about[1:]))}"
         return f"{self.situation} must {'always' if self.always else 'never'} be true"
 
 
@@ -487,7 +494,9 @@ class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
     `rules` contains the rules of each derived situation type, and `aggregates` the derived amounts. `constraints` maps the name of
-    a derived count of violations, whose maximum is 0, to the constraint.
+    a derived count of violations, whose maximum is 0, to the constraint. `remembers` maps each remembered situation type to the
+    situation type that it remembers, in order of dependency: its symbol is true from the first state on in which the symbol of the
+    other type with the same arguments is true.
     """
 
     situations: Mapping[str, SituationType]
@@ -496,6 +505,7 @@ class Domain:
     rules: Mapping[str, tuple[Rule, ...]] = field(default_factory=dict)
     aggregates: Mapping[str, Aggregate] = field(default_factory=dict)
     constraints: Mapping[str, Constraint] = field(default_factory=dict)
+    remembers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[int, ...]:

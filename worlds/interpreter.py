@@ -123,7 +123,7 @@ class Interpreter:
                 if value is None:
                     continue
                 value = value if kind.quantity is None else number(value)
-                if name in changed:
+                if name in changed or name in domain.remembers:
                     self.slots[symbol] = len(initial)
                     initial.append(value)
                 else:
@@ -142,6 +142,9 @@ class Interpreter:
         self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
         mutual = any(read_by(one) & domain.rules.keys() for one in domain.aggregates.values())
         self.rounds = 1 + len(domain.aggregates) if mutual else 1  # rules and amounts may depend on each other
+        self.remembered = [
+            (self.kinds[name].level, self.sources(name, other)) for name, other in domain.remembers.items()
+        ]
         self.initial = self.closed(initial)
         self.rests = self.unsettled()
         self._actions: dict[int, list[Action]] = {}
@@ -252,8 +255,29 @@ class Interpreter:
         rules = [rule for name in group for rule in self.problem.domain.rules[name]]
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
-    def closed(self, values: list[Any]) -> State:
-        """Return a state with all derived values: first amounts, and then rules group by group, each up to a fixed point."""
+    def sources(self, name: str, other: str) -> list[tuple[int, Any]]:
+        """Return the slot of each symbol of a remembered type, with the function that tells whether what it remembers is true."""
+        found = []
+        for symbol, slot in self.slots.items():
+            if symbol.situation == name:
+                said = self.condition(ValueCondition(other, symbol.arguments, TRUE), {}, {})
+                found.append((slot, eval(f"lambda s: {said}", NAMES)))
+        return found
+
+    def closed(self, values: list[Any], level: float = math.inf) -> State:
+        """Return a state with all derived values.
+
+        The remembered symbols that a level sees become true if what they remember is true.
+        """
+        self.derive(values)
+        for cells in (cells for first, cells in self.remembered if first <= level):
+            for slot in [slot for slot, true in cells if true(values)]:
+                values[slot] = TRUE
+            self.derive(values)
+        return tuple(values)
+
+    def derive(self, values: list[Any]) -> None:
+        """Set all derived values: first amounts, and then rules group by group, each up to a fixed point."""
         for _ in range(self.rounds):
             for slot, total in self.totals:
                 values[slot] = total(values)
@@ -266,7 +290,6 @@ class Interpreter:
                     for slot in found:
                         values[slot] = TRUE
                     more = recursive and bool(found)
-        return tuple(values)
 
     def aggregated(self, one: Aggregate) -> Iterator[tuple[int, Any]]:
         """Yield the slot of each symbol of a derived amount, with the function from a state to the symbol's number."""
@@ -326,7 +349,7 @@ class Interpreter:
                     limits[slot] = self.limit(symbol, f"t[{slot}]")
         lines += [f" if not ({limit}): return None" for limit in limits.values()]
         price = repr(one.cost) if one.price is None else self.worth(one.price, terms)
-        lines.append(" t = closed(t)")
+        lines.append(f" t = closed(t, {one.level})")
         lines += [f" if not ({limit}): return None" for limit in (*self.limits(), *self.prevented())]
         lines.append(f" return {price}, t")
         names: dict[str, Any] = {**NAMES, "closed": self.closed}
@@ -342,7 +365,7 @@ class Interpreter:
             for trial in self.bindings(effect.when, {**kinds, each.name: each.kind}, {**terms, each.name: one}):
                 symbol = Symbol(effect.situation, tuple(trial.get(a, a) for a in effect.arguments))
                 when = self.all_of(effect.when, trial, kinds)
-                if symbol in self.slots and when != "False":
+                if symbol in self.slots and when != "False" and symbol.situation not in self.problem.domain.remembers:
                     if isinstance(effect, ValueEffect):
                         said = trial.get(effect.value, effect.value)
                     else:

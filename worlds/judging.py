@@ -477,6 +477,7 @@ class Judge:
     def fact(self) -> str:
         """Return the text of a random fact that may become true; an empty text if there is no such fact."""
         symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and self.alone(s.situation)]
+        symbols = [s for s in symbols if s.situation not in self.world.problem.domain.remembers]
         if not symbols:
             return ""
         symbol: Symbol = self.rng.choice(symbols)

@@ -80,24 +80,26 @@ class RandomWorld:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> RandomWorld:
+def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0) -> RandomWorld:
     """Return the random world of a seed; for the other parameters see `drawn`."""
-    return drawn(seed, aggregated, constrained)[0]
+    return drawn(seed, aggregated, constrained, remembered)[0]
 
 
-def drawn(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter]:
+def drawn(
+    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0
+) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained : float
-        The shares of worlds with derived amounts, and with constraints on every state.
+    aggregated, constrained, remembered : float
+        The shares of worlds with derived amounts, with constraints on every state, and with remembered situation types.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated, constrained).world()
+        world = _Draft(rng, seed, aggregated, constrained, remembered).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -237,9 +239,10 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 class _Draft(Vocabulary):
     """A randomly drawn world without its goal."""
 
-    def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float) -> None:
+    def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float, remembered: float) -> None:
         super().__init__(rng)
-        self.seed, self.share, self.prevented = seed, aggregated, constrained
+        self.seed, self.share, self.prevented, self.remembered = seed, aggregated, constrained, remembered
+        self.forbidden: list[str] = []  # situation types of which a constraint is drawn
         self.levels = rng.choice((1, 1, 1, 2, 2, 3))
         self.owners: dict[str, tuple[str, ...]] = {}
         self.pairs: set[str] = set()
@@ -264,11 +267,18 @@ class _Draft(Vocabulary):
             self.defined(number)
         for number in range(0 if first else many):
             self.aggregated(number)
+        self.remembering()
         behaviors = self.behaviors()
         used = {b.level for b in behaviors}
         self.levels = max(used)
         aggregates = self.aggregates
-        domain = Domain(self.situations, {b.name: b for b in behaviors}, rules=self.rules, aggregates=aggregates)
+        domain = Domain(
+            self.situations,
+            {b.name: b for b in behaviors},
+            rules=self.rules,
+            aggregates=aggregates,
+            remembers=self.remembers,
+        )
         problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
         if aggregates:
             problem = self.bounded(problem)
@@ -467,7 +477,7 @@ class _Draft(Vocabulary):
     def constrained(self, problem: Problem) -> Problem:
         """Return the problem; in a share of the worlds, the problem gets a constraint that holds initially."""
         own = Random(f"constraints {self.seed}")
-        if own.random() >= self.prevented:
+        if own.random() >= self.prevented and not self.forbidden:
             return problem
         meant = Interpreter(problem)
         found = [
@@ -485,9 +495,61 @@ class _Draft(Vocabulary):
             )
         ]
         derived = [one for one in found if one.situation in self.rules]
-        chosen = [own.choice(derived if derived and own.random() < 0.8 else found)] if found else []
+        chosen = [one for one in found if one.situation in self.forbidden and not one.always]
+        if not self.forbidden and found:
+            chosen = [own.choice(derived if derived and own.random() < 0.8 else found)]
         constraints = {f"{one.situation}.exceptions": one for one in chosen}
         return replace(problem, domain=replace(problem.domain, constraints=constraints))
+
+    def remembering(self) -> None:
+        """Draw remembered situation types, and constraints on them: "at most once" and "only after"."""
+        own, rng = Random(f"remembered {self.seed}"), self.rng
+        if own.random() >= self.remembered:
+            return
+        self.rng = own  # a separate generator keeps worlds without remembered situation types unchanged
+        kinds = [
+            s
+            for s in self.situations.values()
+            if s.boolean and s.name not in circular(self.rules) and (len(s.arguments) == 1 or "|" not in s.arguments[0])
+        ]
+        if kinds:
+            of = self.rng.choice(kinds)
+            same = [s for s in kinds if s.arguments == of.arguments and s is not of]
+            pattern = self.rng.choice(("some", "once", "once", "after"))
+            if pattern == "some" or (pattern == "after" and not same):
+                self.remember("O0", of.name)
+            elif pattern == "once":
+                self.remember("O0", of.name)
+                self.both("E0", of, "O0", TRUE, of.name, FALSE)
+                self.remember("O1", "E0")
+                self.both("V0", of, of.name, TRUE, "O1", TRUE)
+                self.forbidden.append("V0")
+            else:
+                first = self.rng.choice(same).name
+                self.both("E0", of, first, TRUE, of.name, FALSE)
+                self.remember("O0", "E0")
+                self.both("V0", of, of.name, TRUE, "O0", FALSE)
+                self.forbidden.append("V0")
+        self.rng = rng
+
+    def remember(self, name: str, source: str) -> None:
+        """Add a situation type that remembers another one."""
+        kind = self.situations[source]
+        self.owners[name], self.remembers[name] = (), source
+        self.situations[name] = replace(kind, name=name, rest=None, default=FALSE, properties=())
+        for row in product(*(self.classes[of] for of in kind.arguments)):
+            if self.chance(0.05):
+                self.initial[Symbol(name, row)] = TRUE
+
+    def both(self, name: str, of: SituationType, one: str, its: str, other: str, value: str) -> None:
+        """Add a situation type that is true if two situation types have the given values for its arguments."""
+        head = tuple(Parameter(f"?p{i}", kind.split("|")[0]) for i, kind in enumerate(of.arguments))
+        terms = tuple(one.name for one in head)
+        conditions = tuple(ValueCondition(s, terms, TRUE, v == FALSE) for s, v in ((one, its), (other, value)))
+        level = max(self.situations[s].level for s in (one, other))
+        self.owners[name] = self.owners[of.name] if len(of.arguments) == 1 else ()
+        self.situations[name] = SituationType(name, of.arguments, "Truth", level, boolean=True, default=FALSE)
+        self.rules[name] = (Rule(name, head, (), conditions),)
 
     def along(self, name: str, base: str) -> None:
         """Draw a situation type that a property axiom defines: a transitive superproperty, or a property chain."""
@@ -583,7 +645,8 @@ class _Draft(Vocabulary):
         parameters = [p.name for p in upper.parameters]
         bound = list(writer.kinds)
         more = writer.conditions(bound, self.rng.choice((0, 0, 1)), 1)
-        lower = [s for s in self.situations.values() if s.level == level and s.name not in self.rules]
+        derived = {*self.rules, *self.remembers}
+        lower = [s for s in self.situations.values() if s.level == level and s.name not in derived]
         switches = [
             s for s in lower if s.boolean and s.arguments in (("A",), ("B",), ("A1",)) and self.classes[s.arguments[0]]
         ]

@@ -52,6 +52,7 @@ class Vocabulary:
         self.ends: dict[str, tuple[str, ...]] = {}
         self.rules: dict[str, tuple[Rule, ...]] = {}
         self.aggregates: dict[str, Aggregate] = {}
+        self.remembers: dict[str, str] = {}
         self.objects: tuple[str, ...] = ()
 
 
@@ -84,7 +85,7 @@ class Phrases:
             one
             for one in self.draft.situations.values()
             if one.level <= self.level and (one.quantity is not None) is quantity
-            and not (changeable and (one.name in self.draft.rules or one.name in self.draft.aggregates))
+            and not (changeable and any(one.name in its for its in (self.draft.rules, self.draft.aggregates, self.draft.remembers)))
         ]  # fmt: skip
 
     def term(self, bound: Sequence[str], kind: str) -> str | None:

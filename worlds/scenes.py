@@ -111,7 +111,8 @@ class _Scene:
 
     def situation(self, one: SituationType) -> Iterator[str]:
         name, owners = one.name, self.world.owners[one.name]
-        derived = {*self.problem.domain.rules, *self.problem.domain.aggregates}
+        domain = self.problem.domain
+        derived = {*domain.rules, *domain.aggregates, *domain.remembers}
         said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in derived else []
         said += [f"c:restValue {_iri(one.rest)}"] if one.rest is not None else []
         constraint = self.problem.domain.constraints.get(f"{name}.exceptions")
@@ -126,7 +127,9 @@ class _Scene:
             said += ["c:wholeNumbers true"] if quantity.whole and not owners else []
         has_property = bool(owners) and (name in self.world.pairs or not one.boolean)
         said += [f"c:valueProperty :{name.lower()}"] if has_property else []
-        if not owners:
+        if name in self.problem.domain.remembers:
+            said.append(f"c:remembers :{self.problem.domain.remembers[name]}")
+        elif not owners:
             said.append("c:parameter " + ", ".join(f":{name}.{i}" for i in range(1, len(one.arguments) + 1)))
         kinds = (
             "owl:NamedIndividual, c:SituationType, c:Amount"
@@ -134,7 +137,8 @@ class _Scene:
             else "owl:Class, owl:NamedIndividual, c:SituationType"
         )
         yield self.node(name, kinds, *said)
-        for i, kind in enumerate(() if owners else one.arguments, start=1):
+        own = () if owners or name in self.problem.domain.remembers else one.arguments
+        for i, kind in enumerate(own, start=1):
             yield f":{name}.{i} a owl:NamedIndividual, c:Parameter ; c:index {i} ; c:termType :{kind} ."
         if has_property:
             kinds = "owl:DatatypeProperty" if quantity else "owl:ObjectProperty"

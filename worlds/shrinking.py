@@ -167,6 +167,7 @@ def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
         rules={n: r for n, r in problem.domain.rules.items() if n != name},
         aggregates={n: a for n, a in problem.domain.aggregates.items() if n != name},
         constraints={n: c for n, c in problem.domain.constraints.items() if c.situation != name},
+        remembers={n: s for n, s in problem.domain.remembers.items() if n != name},
     )  # fmt: skip
     values = [v for v in problem.classes.get(name, ()) if v.startswith(name)]
     parents = {kind: tuple(p for p in above if p != name) for kind, above in world.parents.items()}
@@ -204,6 +205,7 @@ def _mentioned(name: str, world: RandomWorld) -> bool:
     domain = problem.domain
     rules: list[Any] = [rule.conditions for other, its in domain.rules.items() if other != name for rule in its]
     rules += [aggregate for other, aggregate in domain.aggregates.items() if other != name]
+    rules += [source for other, source in domain.remembers.items() if other != name]
     lines = [line for other, its in world.axioms.items() if other != name for line in its]
     return (
         any(symbol.situation == name for symbol in problem.goal)

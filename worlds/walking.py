@@ -97,7 +97,7 @@ class _Walk:
         """Return whether, after a refinement, all symbols visible on a level have the values that the refined step determines."""
         for slot in range(self.of.stated):
             symbol = self.of.symbols[slot]
-            seen = self.problem.first_level(symbol) <= level
+            seen = self.problem.first_level(symbol) <= level and symbol.situation not in self.problem.domain.remembers
             hidden = said[slot] == before[slot] and self.problem.value_levels.get(str(before[slot]), 1) > level
             if seen and not hidden and end[slot] != said[slot]:
                 return False

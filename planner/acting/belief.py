@@ -105,6 +105,8 @@ class Belief:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
         now.update(seen)
+        remembers = self.problem.domain.remembers
+        now.update((s, v) for s, v in self.problem.initial.items() if s.situation in remembers and v == TRUE)
         now = following(self.problem, now)
         surprises = []
         for symbol in sorted(expected.keys() | now.keys()):

@@ -61,7 +61,7 @@ def _inherited(
 ) -> Iterator[Condition]:
     """Yield the conditions that the levels above impose on an effect, at most one condition for each level."""
     for level in sorted({upper.level for upper in above}):
-        if problem.domain.situations[effect.situation].level > level:
+        if problem.domain.situations[effect.situation].level > level or effect.situation in problem.domain.remembers:
             continue
         makers = [(upper, e) for upper in above if upper.level == level for e in upper.effects]
         makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]

@@ -221,11 +221,16 @@ class Refiner:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def targets(self, level: int, changes: Sequence[Change]) -> dict[Cell, str]:
-        """Return the symbols that a step changes, each with its new value, except totals that the level doesn't see."""
-        now, totals = self.table.now, self.space.program.domain.aggregates
+        """Return the symbols that a step changes, each with its new value.
+
+        Remembered symbols are left out, and so are totals that the level doesn't see.
+        """
+        now, domain = self.table.now, self.space.program.domain
         found: dict[Cell, str] = {}
         for situation, key, value in changes:
-            if situation in totals and not self.space.visible(level, (situation, key)):
+            if situation in domain.remembers:
+                continue
+            if situation in domain.aggregates and not self.space.visible(level, (situation, key)):
                 continue
             if now[situation].get(key) is not None or self.space.exists(situation, key):
                 found[situation, key] = value

@@ -120,10 +120,16 @@ class Workspace:
         """Return the function of required final values in the refinement of a step of a level.
 
         Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value
-        may have any final value; if `careful`, the symbol must be unchanged.
+        may have any final value; if `careful`, the symbol must be unchanged. A remembered symbol may become true.
         """
-        rest = self.rest
-        return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
+        rest, remembers = self.rest, self.program.domain.remembers
+
+        def keep(cell: Cell, first: str) -> str | None:
+            if cell[0] in remembers:
+                return None
+            return first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
+
+        return keep
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
         """Return the function of required final values for steps towards a goal.

@@ -250,7 +250,8 @@ def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -
     said = {
         i: value
         for i, value in enumerate(applied.after)
-        if value != state[i] or problem.sees(level, model.symbols[i], value)
+        if (value != state[i] or problem.sees(level, model.symbols[i], value))
+        and model.symbols[i].situation not in problem.domain.remembers
     }
     found = solve(call, below, state, target(model, level, below, state, said))
     call.known[state, ground] = None if found is None else (replace(step, steps=tuple(found[0])), found[1])

@@ -1,4 +1,4 @@
-"""Compilation of a domain with aggregates: behaviours update sums and counts."""
+"""Compilation of a domain: behaviours update sums, counts and remembered situation types, and maintain constraints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
-from confab.reasoner.aggregates.keeping import MOST_CONDITIONS, kept
+from confab.reasoner.aggregates import keeping
+from confab.reasoner.aggregates.keeping import MOST_CONDITIONS
+from confab.reasoner.aggregates.remembering import in_order_of_update, remembering
 from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, walk
 from confab.reasoner.limits import check
@@ -14,26 +16,31 @@ from confab.reasoner.symbols import AnyOf, Behavior, Condition, Domain, Effect, 
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
-    """Return an equivalent domain in which behaviours update sums and counts.
+    """Return an equivalent domain in which behaviours update sums, counts and remembered situation types.
 
     Effects on all members of a class become one effect per member.
 
     Raises
     ------
     DomainError
-        Too many effects change the same total.
+        Too many effects change the same total or remembered situation type.
     """
-    aggregates = domain.aggregates.values()
+    updated = in_order_of_update(domain)
     behaviors = {}
     for name, behavior in domain.behaviors.items():
         check("deriving amounts")
-        keeping = _prevented(kept(behavior, aggregates, domain.situations, classes), domain, classes)
-        behaviors[name] = _folded(spread(keeping, classes), domain, classes)
+        for one in updated:
+            if one.situation in domain.remembers:
+                behavior = remembering(behavior, one, domain, classes)
+            else:
+                behavior = keeping.kept(behavior, (one,), domain.situations, classes)
+        behaviors[name] = _folded(spread(_prevented(behavior, domain, classes), classes), domain, classes)
         conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
         many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))
-        if aggregates and many > MOST_CONDITIONS:
+        if updated and many > MOST_CONDITIONS:
+            kept = " and ".join(sorted(domain.aggregates.keys() | domain.remembers.keys()))
             raise DomainError(
-                f"{name}: the effects that keep {' and '.join(sorted(domain.aggregates))} take more than {MOST_CONDITIONS} "
+                f"{name}: the effects that keep {kept} take more than {MOST_CONDITIONS} "
                 "conditions; let fewer of its effects change them, or let no derived amount depend on another"
             )
     return replace(domain, behaviors=behaviors)

@@ -1,4 +1,4 @@
-"""Calculation of sums and counts in a state."""
+"""Calculation of sums, counts and remembered situation types in a state."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 
+from confab.reasoner.aggregates.remembering import in_order_of_update
 from confab.reasoner.amounts import (
     COMPARING,
     NOTHING,
@@ -21,6 +22,7 @@ from confab.reasoner.amounts import (
 from confab.reasoner.language import mentions
 from confab.reasoner.symbols import (
     FALSE,
+    TRUE,
     Aggregate,
     AnyOf,
     ClassCondition,
@@ -43,15 +45,19 @@ def with_totals(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return a state extended by the sums and counts that follow from the state.
+    """Return a state extended by the sums, the counts and the true remembered symbols that follow from the state.
 
     The number of violations of a constraint is included only if effects change this number.
     """
     found = dict(state)
     changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}
     left_out = domain.constraints.keys() - changed
-    for aggregate in (one for one in domain.aggregates.values() if one.kept and one.situation not in left_out):
-        found |= totals(aggregate, classes, relations, found, domain.situations)
+    for one in in_order_of_update(domain):
+        if one.kept and one.situation not in left_out:
+            numbers = totals(one, classes, relations, found, domain.situations)
+            if one.situation in domain.remembers:
+                numbers = {symbol: TRUE for symbol, number in numbers.items() if number != "0"}
+            found |= numbers
     return found
 
 
@@ -69,7 +75,7 @@ def exceptions(
 
 
 def following(problem: Problem, state: Mapping[Symbol, str]) -> dict[Symbol, str]:
-    """Return a state, after changes by observations or interventions, with updated sums and counts."""
+    """Return a state, after changes by observations or interventions, with updated sums, counts and remembered symbols."""
     return with_totals(problem.domain, problem.classes, problem.relations, state)
 
 

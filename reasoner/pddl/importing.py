@@ -9,6 +9,7 @@ predicates of which at most     one functional situation type, e.g. ``AT`` for `
 one holds of an object          with an extra value for "none of them holds"
 any other predicate             boolean situation type
 derived predicate               boolean situation type with rules
+``sometime``, ``at-most-once``  remembered situation types, with a goal or a constraint
 action                          behaviour on level 1, all of whose variables are parameters
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, whose last argument is the number
@@ -154,7 +155,7 @@ class _Import:
         self.derived = {axiom.predicate for axiom in self.pddl.axioms}
         self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects} | self.derived
         self.happening = {atom[0] for _, atom, _ in self.pddl.timed}
-        self.changing |= self.happening
+        self.changing |= self.happening | self.pddl.remembers.keys()
         self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
         self.facts = dict.fromkeys(self.pddl.initial)
 
@@ -231,7 +232,9 @@ class _Import:
         scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
         never = [Constraint(self.places[predicate].situation) for predicate in pddl.forbidden]
         constraints = {f"{one.situation}.exceptions": one for one in never}
-        domain = Domain(situations, behaviors, rules=rules, constraints=constraints)
+        named = {predicate: place.situation for predicate, place in self.places.items()}
+        remembers = {named[one]: named[other] for one, other in pddl.remembers.items()}
+        domain = Domain(situations, behaviors, rules=rules, constraints=constraints, remembers=remembers)
         return Problem(scene, domain, classes, relations, initial, goal, parents, times=times, weights=weights)
 
     def rules(self) -> dict[str, tuple[Rule, ...]]:
@@ -263,7 +266,7 @@ class _Import:
     ) -> dict[str, SituationType]:
         """Return all situation types, first the types of invariants, and store the translation of each predicate in `places`."""
         found: dict[str, SituationType] = {}
-        candidates = frozenset(self.changing - self.derived - self.happening)
+        candidates = frozenset(self.changing - self.derived - self.happening - self.pddl.remembers.keys())
         pddl, effects = snapped(self.pddl, self.effects)
         for parts in Invariants(pddl, effects, candidates, frozenset(self.changing), self.sets).found():
             name = self.name("situation", "+".join(p.predicate for p in parts), parts[0].predicate.upper())

@@ -1,8 +1,8 @@
 """Parser of PDDL texts, which checks all declarations and formulas.
 
 The supported subset contains types, constants, predicates, functions, actions with conditional and quantified effects, durative
-actions, derived predicates, action costs, timed initial literals, ``always`` constraints and goal preferences. Other constructs
-are rejected by name. Every error states file, line and column.
+actions, derived predicates, action costs, timed initial literals, goal preferences, and the constraints ``always``, ``sometime``,
+``sometime-before`` and ``at-most-once``. Other constructs are rejected by name. Every error states file, line and column.
 
 The parser of unified-planning isn't used, because that parser reports an undefined type as a ``KeyError`` without a message,
 states no position for half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
@@ -29,6 +29,9 @@ SECTIONS = {
     ":method": "HDDL methods",
     ":htn": "HDDL task networks",
 }
+
+EARLIER = {"sometime": 2, "sometime-before": 3, "at-most-once": 2}
+"""Constraints that concern several states of a plan, with their number of items."""
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
@@ -154,6 +157,9 @@ class _Reader:
         if len(goal.items) != 2 or not isinstance(goal.items[1], Form):
             raise self.fail(goal, "wanted one condition as the goal")
         self.goal(goal.items[1])
+        if self.pddl.sometime:
+            hard = [self.pddl.goal] if self.pddl.goal is not None else []
+            self.pddl.goal = _formed(goal, "and", *hard, *self.pddl.sometime)
         if ":metric" in sections:
             self.metric(sections[":metric"])
 
@@ -345,9 +351,10 @@ class _Reader:
         self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
 
     def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
-        """Parse ``(always CONDITION)``, also inside ``and`` and ``forall``: a condition that must hold in every state.
+        """Parse constraints on all states of a plan, also inside ``and`` and ``forall``.
 
-        Each condition becomes a derived predicate that holds if the condition is violated, and that is forbidden.
+        A constraint becomes a derived predicate that holds if the constraint is violated, and that is forbidden. The constraints
+        about earlier states read predicates that remember whether other derived predicates have held. ``sometime`` becomes a goal.
         """
         for part in parts:
             head = part.head if isinstance(part, Form) else ""
@@ -360,17 +367,60 @@ class _Reader:
                 for outer in reversed(each):
                     condition = replace(outer, items=(*outer.items[:2], condition))
                 word = replace(self.word(part.items[0], "always"), text="not")
-                violated, name = replace(part, items=(word, condition)), f"violated-{len(self.pddl.forbidden) + 1}"
-                while name in self.pddl.predicates:
-                    name += "-"
+                violated = replace(part, items=(word, condition))
                 self.condition(violated, {})
-                self.pddl.predicates[name] = ()
-                self.pddl.axioms.append(Axiom(name, (), violated))
-                self.pddl.forbidden.append(name)
+                self.pddl.forbidden.append(self.derive("violated", (), violated).head)
+            elif isinstance(part, Form) and len(part.items) == EARLIER.get(head):
+                self.earlier(part, each)
             else:
-                raise self.fail(
-                    part, f"'{head or '…'}' is not supported in (:constraints …); wanted (always CONDITION)"
-                )
+                known = ", ".join(sorted({"always", *EARLIER}))
+                raise self.fail(part, f"'{head or '…'}' is not supported in (:constraints …); wanted one of {known}")
+
+    def earlier(self, part: Form, each: Sequence[Form]) -> None:
+        """Add the predicates for ``sometime``, ``sometime-before`` or ``at-most-once`` below quantifiers."""
+        lists = [outer.items[1] for outer in each if self.quantified(outer, {})]
+        typed = tuple(one for words in lists if isinstance(words, Form) for one in self.typed(words.items))
+        variables = self.scope(typed, {})
+        for one in part.items[1:]:
+            self.condition(one, variables)
+        condition = part.items[1]
+        if (
+            part.head == "sometime-before"
+        ):  # as in PDDL, the second condition holds in an earlier state than the first one
+            first = self.derive("first", typed, _formed(part, "and", part.items[2], _formed(part, "not", condition)))
+            allowed = self.remember("allowed", first, typed)
+            violated = _formed(part, "and", condition, _formed(part, "not", allowed))
+        else:
+            holds = self.derive("holds", typed, _formed(part, "and", condition))
+            held = self.remember("held", holds, typed)
+            if part.head == "sometime":
+                for outer in reversed(each):
+                    held = replace(outer, items=(*outer.items[:2], held))
+                self.pddl.sometime.append(held)
+                return
+            over = self.derive("over", typed, _formed(part, "and", held, _formed(part, "not", holds)))
+            violated = _formed(part, "and", holds, self.remember("ended", over, typed))
+        self.pddl.forbidden.append(self.derive("violated", typed, violated).head)
+
+    def derive(self, name: str, typed: tuple[Typed, ...], condition: Form) -> Form:
+        """Add a derived predicate for a condition, with a new name; return the atom of the predicate."""
+        atom = self.declare(name, typed)
+        self.pddl.axioms.append(Axiom(atom.head, typed, condition))
+        return atom
+
+    def remember(self, name: str, source: Form, typed: tuple[Typed, ...]) -> Form:
+        """Add a predicate that holds once an atom has held; return the atom of the predicate."""
+        atom = self.declare(name, typed)
+        self.pddl.remembers[atom.head] = source.head
+        return atom
+
+    def declare(self, name: str, typed: tuple[Typed, ...]) -> Form:
+        """Declare a predicate with a new name, and return its atom."""
+        number = 1
+        while f"{name}-{number}" in self.pddl.predicates:
+            number += 1
+        self.pddl.predicates[f"{name}-{number}"] = typed
+        return Form((Word(f"{name}-{number}", 0, 0), *(Word(one.name, 0, 0) for one in typed)), 0, 0)
 
     def stated(self, form: Form, where: str) -> None:
         """Raise an error if the predicate of an effect or an initial fact is a derived predicate."""
@@ -558,3 +608,8 @@ class _Reader:
             raise self.fail(item, "wanted (at TIME (predicate …)) or (at TIME (not (predicate …))), the time from 0 on")
         self.stated(inner, "stated")
         self.pddl.timed.append((seconds, self.atom(inner, {}), true))
+
+
+def _formed(at: Form, head: str, *items: Word | Form) -> Form:
+    """Return a form with a head, at the position of another form."""
+    return Form((Word(head, at.line, at.column), *items), at.line, at.column)

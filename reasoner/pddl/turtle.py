@@ -150,6 +150,9 @@ class _SceneWriter:
         constraint = self.problem.domain.constraints.get(f"{one.name}.exceptions")
         if constraint is not None:
             pairs.append(("c:always" if constraint.always else "c:never", "true"))
+        if one.name in self.problem.domain.remembers:
+            pairs.append(("c:remembers", self.iri(self.problem.domain.remembers[one.name])))
+            pairs = [pair for pair in pairs if pair[0] != "c:fromLevel"]
         if not single:
             pairs.append(("c:parameter", [f":{one.name}.{i}" for i in range(1, len(one.arguments) + 1)]))
         if single and not one.boolean:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import chain
 
 from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
 from confab.reasoner.aggregates.extrema import extrema_replaced
+from confab.reasoner.aggregates.remembering import NONE_ALLOWED, solutions_of
 from confab.reasoner.amounts import Amount, Quantity, inside, written
 from confab.reasoner.derivation import circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -19,6 +19,7 @@ from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.facts import individuals_named
 from confab.reasoner.reading.parts import Parts
+from confab.reasoner.reading.remembering import Past, iris_of_the_past, past, remembers_in_order
 from confab.reasoner.reading.rows import (
     HIGHEST_LEVEL,
     HIGHEST_NUMBER,
@@ -47,7 +48,6 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
-NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 
 
@@ -112,17 +112,19 @@ def frame(
     parts = Parts(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
     classes, parents = classes_of(instances, supers, names)
     situations, properties = _situations(parts, schema, classes)
-    constraints = _constraints(parts, schema, situations)
+    before = past(parts, schema, situations)
+    situations = [*before.situations.values()]
+    constraints = _constraints(parts, schema, situations) | before.constraints
     situations += [SituationType(name, (), name, 1, quantity=NONE_ALLOWED) for name in constraints]
     if earlier is not None and earlier.names.agree(names):
         lifted = earlier.lifted
     else:
         in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
-    rules = _rules(parts, schema, {s.name: s for s in situations})
+    rules = _rules(parts, schema, {s.name: s for s in situations}) | before.rules
     aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules, constraints)
     domain = Domain(
-        situations={s.name: s for s in _on_their_levels(situations, rules, aggregates)},
+        situations={s.name: s for s in _on_their_levels(situations, rules, aggregates, before)},
         behaviors=lifted,
         first_ids={
             parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
@@ -130,7 +132,9 @@ def frame(
         rules=rules,
         aggregates=aggregates,
         constraints=constraints,
+        remembers=before.remembers,
     )
+    domain = replace(domain, remembers=remembers_in_order(domain, names))
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
     following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]
@@ -154,6 +158,7 @@ def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str]
             *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
             *(iri for iri in namesakes if iri not in nodes),
             *derived,
+            *iris_of_the_past(schema),
             *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
             *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
@@ -183,6 +188,12 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     for iri, kinds in arguments.items():
         name, said = parts.names.short(iri), parts.values(iri, "holdsOf")
         if by := [*written[iri], *said, *(["SWRL"] if iri in by_swrl else [])]:
+            if parts.values(iri, "remembers"):
+                raise KnowledgeError(
+                    f"<{iri}> remembers a situation type, and <{min(by)}> defines it; keep one of them, or let c:remembers name a "
+                    "defined situation type",
+                    iri,
+                )
             if iri in changed:
                 who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
                 raise KnowledgeError(
@@ -208,7 +219,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
             rules.append(Rule(name, head, (), parts.definitions.holding("?it", kind)))
-        if iri not in changed and iri in schema.pairs:
+        if iri not in changed and iri in schema.pairs and not parts.values(iri, "remembers"):
             for prop in parts.values(iri, "valueProperty"):
                 rules += parts.definitions.rules(prop, name, kinds, bool(rules))
         if not rules:
@@ -265,7 +276,7 @@ def _aggregates(
             )
     for name, constraint in constraints.items():
         try:
-            found[name] = unfolded(_exceptions(name, constraint, situations[constraint.situation]), rules)
+            found[name] = unfolded(solutions_of(name, situations[constraint.situation], constraint.always), rules)
         except DomainError:
             raise KnowledgeError(
                 f"{constraint}, but it is defined recursively; constrain a situation type whose definition isn't recursive",
@@ -301,25 +312,20 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
     return found
 
 
-def _exceptions(name: str, constraint: Constraint, situation: SituationType) -> Aggregate:
-    """Return the aggregate that counts the violations of a constraint, which are the symbols with the wrong truth value."""
-    variables = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(situation.arguments))
-    true = ValueCondition(situation.name, tuple(one.name for one in variables), TRUE, constraint.always)
-    return Aggregate(name, "count", Fraction(1), (), variables, (true,))
-
-
 def _on_their_levels(
     situations: Iterable[SituationType],
     rules: Mapping[str, Sequence[Rule]],
     aggregates: Mapping[str, Aggregate],
+    before: Past,
 ) -> Iterator[SituationType]:
     """Yield the situation types with their levels; a derived type exists from the first level that has all types it depends on."""
     known = {s.name: s for s in situations}
-    before = None
+    earlier = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
     reads |= {name: {*read_by(one)} for name, one in aggregates.items()}
-    while before != known:
-        before = dict(known)
+    reads |= {name: {source} for name, source in before.remembers.items()}
+    while earlier != known:
+        earlier = dict(known)
         for name, its in reads.items():
             read = its | {name}
             known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))

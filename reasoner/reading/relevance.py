@@ -31,6 +31,7 @@ from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.goals import BOUNDS, with_goals
 from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
 from confab.reasoner.reading.problem import Reading, read, reading_of
+from confab.reasoner.reading.remembering import concerns_the_past
 from confab.reasoner.reading.rows import Member, Schema, Triple, derived_goals
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import (
@@ -95,8 +96,8 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ('bottle1', 'bottle2', 'cup1', 'cup2')
     """
     schema = read_schema(graph)
-    if derived_goals(schema):
-        reading = read(graph, schema)  # derived goals may depend on any individual
+    if derived_goals(schema) or concerns_the_past(schema):
+        reading = read(graph, schema)  # derived goals and remembered situations may depend on any individual
         return replace(reading, problem=with_goals(reading.problem, goals))
     constants = constants_of(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)

@@ -35,6 +35,7 @@ DATA = frozenset(
         "construct",
         "never",
         "always",
+        "atMostOnce",
         "weight",
     )
 )

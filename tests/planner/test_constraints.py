@@ -137,8 +137,8 @@ def test_always_of_pddl_becomes_a_constraint_and_other_trajectory_constraints_ar
     made = CliRunner().invoke(app, ["import", str(tmp_path / "d.pddl"), str(tmp_path / "p.pddl"), "-o", scene])
     assert made.exit_code == 0
     assert len(confab.load(scene).plan(optimal=True).plan.steps) == 3
-    with pytest.raises(PddlError, match="'sometime' is not supported in"):
-        parse(domain.replace("(always", "(sometime"), problem)
+    with pytest.raises(PddlError, match="'sometime-after' is not supported in"):
+        parse(domain.replace("(always", "(sometime-after"), problem)
 
 
 def test_random_worlds_with_constraints_are_answered_as_exhaustive_search_answers(tmp_path: Path) -> None:

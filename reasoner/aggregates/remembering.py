@@ -1,0 +1,119 @@
+"""Effects by which a behaviour updates a remembered situation type.
+
+A remembered symbol becomes true after a behaviour if the symbol that it remembers is true after this behaviour. The count of the
+remembered symbol's solutions, which is 0 or 1, has the same conditions. Therefore the regression of counts
+(`confab.reasoner.aggregates.keeping`) also derives the effects on remembered symbols. The maximum of the count is 0, so that an
+effect depends only on the state after the behaviour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
+from confab.reasoner.aggregates.keeping import kept
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.folding import Folding
+from confab.reasoner.language import DomainError, mentions
+from confab.reasoner.symbols import (
+    TRUE,
+    Aggregate,
+    AmountEffect,
+    Behavior,
+    Domain,
+    Parameter,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    made_of,
+)
+
+NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))
+"""The quantity of a count whose maximum is 0."""
+
+
+def solutions_of(name: str, situation: SituationType, negated: bool = False) -> Aggregate:
+    """Return the aggregate that counts the symbols of a situation type with the value true (false if `negated`)."""
+    variables = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(situation.arguments))
+    true = ValueCondition(situation.name, tuple(one.name for one in variables), TRUE, negated)
+    return Aggregate(name, "count", Fraction(1), (), variables, (true,))
+
+
+def in_order_of_update(domain: Domain) -> list[Aggregate]:
+    """Return the aggregates of a domain, and a count for each remembered situation type, in order of dependency.
+
+    The count of a remembered symbol is 1 if the symbol that it remembers is true, and 0 otherwise.
+
+    Raises
+    ------
+    DomainError
+        A remembered situation type depends on itself or on a recursive definition.
+    """
+    return in_order({**domain.aggregates, **{name: count_of(name, domain) for name in domain.remembers}})
+
+
+def count_of(name: str, domain: Domain) -> Aggregate:
+    """Return the count whose value is 1 for the arguments of a remembered situation type if the remembered symbol is true.
+
+    Raises
+    ------
+    DomainError
+        The definition of the remembered symbol is recursive.
+    """
+    source = domain.remembers[name]
+    count = solutions_of(name, replace(domain.situations[source], arguments=domain.situations[name].arguments))
+    return unfolded(replace(count, parameters=count.variables, variables=()), domain.rules)
+
+
+def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
+    """Return a behaviour that makes a remembered symbol true if the symbol that it remembers is true afterwards.
+
+    A behaviour of a level that doesn't see the remembered situation type is unchanged.
+
+    Parameters
+    ----------
+    behavior : Behavior
+        The behaviour with its effects on everything that the remembered situation type depends on.
+    count : Aggregate
+        The count of the remembered situation type, by `count_of`.
+    domain : Domain
+    classes : mapping of class to individuals
+
+    Raises
+    ------
+    DomainError
+        The behaviour has a duration, or too many of its effects change the same remembered situation type.
+    """
+    if not read_by(count) & behavior.changes or behavior.level < domain.situations[count.situation].level:
+        return behavior
+    if behavior.timing is not None:
+        raise DomainError(
+            f"{behavior.name} takes time and changes what {count.situation} remembers; "
+            "a situation type can't be remembered during a behaviour: leave the duration out, or c:remembers"
+        )
+    situations = {
+        **domain.situations,
+        count.situation: replace(domain.situations[count.situation], quantity=NONE_ALLOWED),
+    }
+    counting = kept(behavior, (count,), situations, classes)
+    known = frozenset(behavior.preconditions)
+    kinds = {**counting.kinds, **{e.each.name: e.each.kind for e in counting.amounts if e.each is not None}}
+    made = (one for e in counting.amounts if e.situation == count.situation for one in _alone(e, classes))
+    found = Folding(classes, kinds, known).effects(made)
+    effects = (ValueEffect(e.situation, e.arguments, TRUE, e.when, e.each) for e in found)
+    used = {term for e in found for term in (*e.arguments, *(t for c in e.when for t in mentions(c)))}
+    variables = tuple(v for v in counting.variables if v in behavior.variables or v.name in used)
+    return replace(behavior, variables=variables, effects=(*behavior.effects, *effects))
+
+
+def _alone(effect: AmountEffect, classes: Mapping[str, Sequence[str]]) -> Iterator[AmountEffect]:
+    """Yield an effect; if each member of a class has it and isn't an argument, yield one effect for each member."""
+    if effect.each is None or effect.each.name in effect.arguments:
+        yield effect
+        return
+    for member in classes.get(effect.each.kind, ()):
+        one = made_of(effect, member)
+        assert isinstance(one, AmountEffect)
+        yield one
