@@ -535,7 +535,8 @@ class _Draft(Vocabulary):
     def remember(self, name: str, source: str) -> None:
         """Add a situation type that remembers another one."""
         kind = self.situations[source]
-        self.owners[name], self.remembers[name] = (), source
+        self.owners[name] = self.owners[source] if len(kind.arguments) == 1 else ()
+        self.remembers[name] = source
         self.situations[name] = replace(kind, name=name, rest=None, default=FALSE, properties=())
         for row in product(*(self.classes[of] for of in kind.arguments)):
             if self.chance(0.05):

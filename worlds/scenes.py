@@ -129,7 +129,7 @@ class _Scene:
         said += [f"c:valueProperty :{name.lower()}"] if has_property else []
         if name in self.problem.domain.remembers:
             said.append(f"c:remembers :{self.problem.domain.remembers[name]}")
-        elif not owners:
+        if not owners:
             said.append("c:parameter " + ", ".join(f":{name}.{i}" for i in range(1, len(one.arguments) + 1)))
         kinds = (
             "owl:NamedIndividual, c:SituationType, c:Amount"
@@ -137,8 +137,7 @@ class _Scene:
             else "owl:Class, owl:NamedIndividual, c:SituationType"
         )
         yield self.node(name, kinds, *said)
-        own = () if owners or name in self.problem.domain.remembers else one.arguments
-        for i, kind in enumerate(own, start=1):
+        for i, kind in enumerate(() if owners else one.arguments, start=1):
             yield f":{name}.{i} a owl:NamedIndividual, c:Parameter ; c:index {i} ; c:termType :{kind} ."
         if has_property:
             kinds = "owl:DatatypeProperty" if quantity else "owl:ObjectProperty"

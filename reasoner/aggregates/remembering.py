@@ -90,8 +90,8 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
         return behavior
     if behavior.timing is not None:
         raise DomainError(
-            f"{behavior.name} takes time and changes what {count.situation} remembers; "
-            "a situation type can't be remembered during a behaviour: leave the duration out, or c:remembers"
+            f"{behavior.name} has a duration and changes what {count.situation} remembers; leave the duration out, or the "
+            "condition about earlier states (c:remembers, c:atMostOnce, c:onlyAfter)"
         )
     situations = {
         **domain.situations,

@@ -14,7 +14,7 @@ in the ontology               in `confab.reasoner.symbols`
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.aggregates.remembering import in_order_of_update
@@ -91,8 +91,6 @@ def concerns_the_past(schema: Schema) -> bool:
 def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> Past:
     """Return all situation types, with the remembered ones and the constraints that concern several states.
 
-    A remembered situation type without stated arguments has the arguments of the situation type that it remembers.
-
     Raises
     ------
     KnowledgeError
@@ -104,7 +102,6 @@ def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> P
     for iri in sorted(schema.of_kind("SituationType"), key=short):
         if parts.values(iri, "remembers"):
             found.remembers[short(iri)] = short(_checked(parts, schema, found, iri))
-    _with_arguments(found)
     for name, source in found.remembers.items():
         _check_arguments(found, parts.names, name, source, "remembers")
     for iri in sorted(schema.of_kind("SituationType"), key=short):
@@ -131,8 +128,8 @@ def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
     for said in ("fromLevel", "restValue", "defaultValue"):
         if parts.values(iri, said):
             raise KnowledgeError(
-                f"<{iri}> has a c:{said}; a situation type with c:remembers exists on the levels of what it remembers, is false "
-                "at first, and never becomes false again: leave it out",
+                f"<{iri}> has a c:{said}; a situation type with c:remembers exists on the levels of the one that it remembers, is "
+                "false at first, and never becomes false again: leave it out",
                 iri,
             )
     for effect in schema.of_kind("ValueEffect"):
@@ -152,19 +149,10 @@ def _check_boolean(parts: Parts, found: Past, iri: str, word: str, *both: str) -
             raise KnowledgeError(f"<{iri}>: c:{word} names <{one}>, which is no situation type; name one", iri)
         if not found.situations[name].boolean:
             raise KnowledgeError(
-                f"<{iri}>: c:{word} is about situation types that are true or false; {name} has other values. Define a situation "
-                "type by a rule about these values, and use that",
+                f"<{iri}>: c:{word} is about situation types that are true or false, and {name} has other values; define a "
+                "situation type by a rule about these values, and use that",
                 iri,
             )
-
-
-def _with_arguments(found: Past) -> None:
-    """Give each remembered situation type without arguments the arguments of the situation type that it remembers."""
-    for _ in found.remembers:
-        for name, source in found.remembers.items():
-            if not found.situations[name].arguments:
-                arguments = found.situations[source].arguments
-                found.situations[name] = replace(found.situations[name], arguments=arguments)
 
 
 def _check_arguments(found: Past, names: Names, name: str, other: str, verb: str) -> None:

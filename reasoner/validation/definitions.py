@@ -125,6 +125,8 @@ def defined(case: Case) -> Iterator[Fault]:
     changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in domain.rules.items()}
     for name in domain.rules:
+        if name in names and names.iri(name) not in case.reading.schema.nodes:
+            continue  # a situation type that expresses a constraint on several states
         below, waiting = {name}, [name]
         while waiting:
             waiting += (more := reads.get(waiting.pop(), set()) - below)

@@ -22,6 +22,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "carts-small": {1: 5, 2: 9},
     "packing-small": {1: 4},
     "drums-small": {1: 3, 2: 11},
+    "tour-small": {1: 9},
     "drawers-small": {1: 2, 2: 20},
     "house-small": {1: 2, 2: 19, 3: 39},
     "laboratory-small": {1: 5, 2: 17, 3: 36},
@@ -38,6 +39,7 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "carts-large": {1: 17, 2: 34},
     "packing-large": {1: 18},
     "drums-large": {1: 12, 2: 57},  # each move with two drives, a lift and a lowering, and a fifth more
+    "tour-large": {1: 24},
     "drawers-large": {1: 9, 2: 130},
     "house-large": {1: 10, 2: 144, 3: 288},
     "laboratory-large": {1: 20, 2: 82, 3: 173},
