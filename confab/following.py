@@ -20,7 +20,7 @@ from confab.reasoner.vocabulary import CORE, TYPE
 
 DEFINED = """
 ASK {
-  { ?rule a :Rule } UNION { ?situation :holdsOf ?class } UNION
+  { ?rule a :Rule } UNION { ?situation :holdsOf ?class } UNION { ?situation :remembers ?other } UNION
   { ?situation :valueProperty ?property .
     { ?other rdfs:subPropertyOf|owl:equivalentProperty|owl:inverseOf ?property }
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
@@ -30,7 +30,7 @@ ASK {
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write the initial facts of each defined situation type, sum or count that a query names into the named graph `DERIVED`."""
+    """Write the initial facts of each defined or remembered situation type, sum or count that a query names into the named graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):
@@ -38,16 +38,18 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
     reading = read()
     problem, properties = reading.problem, value_properties(graph)
     classes: dict[str, list[str]] = {}
-    totals = [name for name, one in problem.domain.aggregates.items() if one.kept]
-    for situation in (*problem.domain.rules, *totals):
-        iri = reading.names.iri(situation)
+    stored = {name for name, one in problem.domain.aggregates.items() if one.kept} | problem.domain.remembers.keys()
+    for situation in (*problem.domain.rules, *sorted(stored)):
+        iri = reading.names.iri(situation) if situation in reading.names else ""
+        if iri not in reading.schema.nodes:
+            continue  # a situation type that expresses a constraint
         of = list(reading.schema.nodes[iri].get(CORE + "holdsOf", ()))
         words = (local_name(one) for one in (iri, properties.get(iri, iri), *of))
         if any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", sparql) for word in words):
             classes[situation] = of
-    facts = [Fact(symbol, TRUE) for symbol in _following(problem, [name for name in classes if name not in totals])]
-    amounts = sorted(symbol for symbol in problem.initial if symbol.situation in totals and symbol.situation in classes)
-    facts += [Fact(symbol, problem.initial[symbol]) for symbol in amounts]
+    facts = [Fact(symbol, TRUE) for symbol in _following(problem, [name for name in classes if name not in stored])]
+    known = sorted(symbol for symbol in problem.initial if symbol.situation in stored and symbol.situation in classes)
+    facts += [Fact(symbol, problem.initial[symbol]) for symbol in known]
     for count, fact in enumerate(facts):
         symbol, prop = fact.symbol, properties.get(reading.names.iri(fact.symbol.situation))
         triples = list(said(reading, fact, prop, ox.BlankNode(f"follows{count}")))

@@ -138,6 +138,15 @@ def test_an_intervention_is_remembered_and_cannot_make_a_remembered_situation_fa
         scene.execute(interventions=["after=1 station SEEN false"])
 
 
+def test_queries_find_what_is_remembered_initially_in_scenes_with_constraints() -> None:
+    found = confab.load("tour-small").query(
+        "PREFIX d: <https://w3id.org/confab/tour#> SELECT ?p { ?f :situationType d:SEEN ; :about ?p }"
+    )
+    assert "station" in str(found)
+    constrained = confab.load("drums-small")
+    assert not len(constrained.query("PREFIX d: <https://w3id.org/confab/drums#> SELECT ?b { ?b d:CLASH true }"))
+
+
 def test_the_constraints_of_pddl_hold_and_become_goals(tmp_path: Path) -> None:
     plan = confab.load(pddl(tmp_path, TRIP, ROADS)).plan(optimal=True).plan
     assert [step.behavior for step in plan.steps] == ["PACK", "GO", "TAKE", "GO", "GO"]
