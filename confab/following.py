@@ -30,7 +30,7 @@ ASK {
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write the initial facts of each defined or remembered situation type, sum or count that a query names into the named graph `DERIVED`."""
+    """Write the initial facts of each derived or remembered situation type in a query into the named graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):
