@@ -34,6 +34,7 @@ import json, sys
 from unified_planning.io import PDDLReader
 from unified_planning.shortcuts import OneshotPlanner, get_environment
 get_environment().credits_stream = None
+get_environment().error_used_name = False
 problem = PDDLReader().parse_problem(sys.argv[2], sys.argv[3])
 with OneshotPlanner(name=sys.argv[1]) as planner:
     plan = planner.solve(problem).plan
@@ -147,6 +148,7 @@ def validated(domain: Path, problem: Path, lines: Sequence[str]) -> bool:
     from unified_planning.shortcuts import get_environment
 
     get_environment().credits_stream = None
+    get_environment().error_used_name = False  # an action and a predicate may have the same name
     read = PDDLReader().parse_problem(str(domain), str(problem))
     plan = PDDLReader().parse_plan_string(read, "\n".join(lines))
     return bool(TimeTriggeredPlanValidator().validate(read, plan))
