@@ -81,6 +81,7 @@ class ScheduleJson(TypedDict):
     serial: float
     bound: float
     bounds: str
+    bound_of_any_plan: float
     scheduler: str
     steps: list[ScheduledStepJson]
 

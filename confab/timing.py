@@ -99,6 +99,10 @@ def headline(timed: TimedPlan) -> str:
     """Return the makespan and its lower bound in one line."""
     bound = said(timed.bound)
     proved = " (no schedule of these steps is shorter)" if timed.bound == timed.makespan else ""
+    if timed.least:
+        proved += f", {said(timed.least)} s for any plan"
+    if timed.least == timed.makespan:
+        proved += " (no plan is shorter)"
     return (
         f"makespan {said(timed.makespan)} s, {said(timed.serial)} s one step after the other; "
         f"at least {bound} s for {timed.bounds}{proved}; by {timed.scheduler}"
@@ -150,6 +154,7 @@ def schedule_json(timed: TimedPlan) -> ScheduleJson:
         "serial": float(timed.serial),
         "bound": float(timed.bound),
         "bounds": timed.bounds,
+        "bound_of_any_plan": float(timed.least),
         "scheduler": timed.scheduler,
         "steps": steps,
     }

@@ -101,6 +101,7 @@ def page_data(
             {"name": "makespan", "text": f"{float(timed.makespan):.3g} s"},
             {"name": "one after the other", "text": f"{float(timed.serial):.3g} s"},
             {"name": "lower bound", "text": f"{float(timed.bound):.3g} s for {timed.bounds}"},
+            *([{"name": "any plan", "text": f"at least {float(timed.least):.3g} s"}] if timed.least else []),
             *(tile for tile in data["tiles"] if tile["name"] != "simulated"),
         ]
     if alarm := alarm_of(timeline, labels, outcome, report, execution):

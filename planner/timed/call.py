@@ -58,6 +58,16 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     shorten : bool
         Whether to search for a short schedule; otherwise return the first schedule that keeps all windows and deadlines.
     """
+    found = _best(problem, plan, seconds, shorten)
+    if found.plan is None or not shorten:
+        return found
+    from confab.planner.timed.bounds import of_any_plan
+
+    least = of_any_plan(problem)
+    return replace(found, plan=replace(found.plan, least=least, bound=max(found.plan.bound, least)))
+
+
+def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) -> Timed:
     from confab.planner.timed.sharing import evenly_shared, shared
 
     until = None if seconds is None else perf_counter() + seconds

@@ -49,6 +49,8 @@ class TimedPlan:
         Lower bound on the makespan, in seconds.
     bounds : str
         The schedules to which the bound applies: `THESE_STEPS`.
+    least : Fraction
+        Lower bound on the makespan of every plan, also with other steps, in seconds; 0 if it wasn't computed.
     scheduler : str
         The name of the scheduler.
     arcs : tuple of (int, int)
@@ -59,6 +61,7 @@ class TimedPlan:
     slots: tuple[Slot, ...]
     bound: Fraction = Fraction(0)
     bounds: str = THESE_STEPS
+    least: Fraction = Fraction(0)
     scheduler: str = "exchanges"
     arcs: tuple[tuple[int, int], ...] = ()
 

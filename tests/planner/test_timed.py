@@ -12,6 +12,7 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
+from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
@@ -244,3 +245,30 @@ def test_a_count_follows_the_facts_in_time_too(tmp_path: Path) -> None:
         Fraction(10),
         Fraction(10),
     ]
+
+
+def test_the_bound_of_any_plan_is_not_above_the_least_makespan() -> None:
+    bounds, least = [], []
+    for seed in range(13_000, 13_200):
+        world = timed_world(seed)
+        actions = tuple(
+            replace(
+                one, asks=tuple(("throughout", a) for _, a in one.asks), makes=tuple(("throughout", m) for _, m in last)
+            )
+            for one in world.actions
+            if (last := list({fact: (span, (fact, value)) for span, (fact, value) in one.makes}.values()))
+        )
+        world = replace(world, actions=actions)
+        if (known := least_makespan(world)) is not None:
+            least.append(known)
+            bounds.append(of_any_plan(problem_of(world)))
+    assert [(bound, known) for bound, known in zip(bounds, least, strict=True) if bound > known] == []
+    assert sum(bounds) >= 0.8 * sum(least)
+
+
+def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(SHELVES)
+    result = confab.load(tmp_path / "shelves.ttl").plan(
+        ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan"
+    )
+    assert "10 s for any plan (no plan is shorter)" in str(result)
