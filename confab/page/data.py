@@ -97,11 +97,11 @@ def page_data(
         "again": again or again_of(scene, problem, report, execution, timeline.unit == "s"),
     }
     if timed is not None:
+        least = f", {float(timed.least):.3g} s for any plan" if timed.least else ""
         data["tiles"] = [
             {"name": "makespan", "text": f"{float(timed.makespan):.3g} s"},
             {"name": "one after the other", "text": f"{float(timed.serial):.3g} s"},
-            {"name": "lower bound", "text": f"{float(timed.bound):.3g} s for {timed.bounds}"},
-            *([{"name": "any plan", "text": f"at least {float(timed.least):.3g} s"}] if timed.least else []),
+            {"name": "lower bound", "text": f"{float(timed.bound):.3g} s for {timed.bounds}{least}"},
             *(tile for tile in data["tiles"] if tile["name"] != "simulated"),
         ]
     if alarm := alarm_of(timeline, labels, outcome, report, execution):
