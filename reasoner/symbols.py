@@ -302,12 +302,15 @@ class Times:
         The average measured duration of behaviours without a stated duration.
     events : mapping of behaviour to seconds
         The fixed times of events, which no actor executes (PDDL's timed initial literals).
+    of_actors : mapping of (behaviour, actor) to seconds
+        The average measured duration of a behaviour by an actor, which replaces the average of all actors.
     """
 
     deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)
     windows: Mapping[str, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
     measured: Mapping[str, Fraction] = field(default_factory=dict)
     events: Mapping[str, Fraction] = field(default_factory=dict)
+    of_actors: Mapping[tuple[str, str], Fraction] = field(default_factory=dict)
 
 
 # ---------------------------------------------------------------------------------------------------------- behaviours

@@ -188,8 +188,6 @@ def _durations(
             return None
         terms = (*arguments, *(given.get(v.name, v.name) for v in pieces_of(problem, behavior).fixed))
         seconds = duration_of(problem, behavior, terms, facts)
-        own = order.activities[member].duration
-        seconds = own if behavior.timing is None or behavior.timing.duration is None else seconds
         if seconds is None or (seconds / network.unit).denominator != 1:
             return None
         found[member] = int(seconds / network.unit)

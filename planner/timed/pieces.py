@@ -100,8 +100,10 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
     """
     stated = timing_of(behavior).duration
     if stated is None:
-        measured = (problem.times or Times()).measured
-        return measured.get(behavior.name, SECOND)
+        times = problem.times or Times()
+        acting = actors_of(problem, behavior, arguments, default_actors(problem)) if times.of_actors else ()
+        own = [times.of_actors[behavior.name, a] for a in acting if (behavior.name, a) in times.of_actors]
+        return max(own, default=times.measured.get(behavior.name, SECOND))
     names = [term.name for term in (*behavior.parameters, *_fixed(behavior))]
     reader = ConditionReader(BehaviorReader(problem), names)
     its = worth(stated, reader.key, problem.relations)

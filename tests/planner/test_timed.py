@@ -14,6 +14,7 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
 from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.call import Timed, best_in_time, in_time
+from confab.planner.timed.measuring import measured, with_durations
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
@@ -272,3 +273,13 @@ def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) ->
         ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan"
     )
     assert "10 s for any plan (no plan is shorter)" in str(result)
+
+
+def test_measured_durations_give_each_hand_its_own_speed() -> None:
+    timed = served()
+    executed = [(slot.step, 3.0 if slot.actors == ("left_hand",) else 1.0) for slot in timed.slots]
+    problem = with_durations(serving(), measured(serving(), executed))
+    again = in_time(problem, timed.plan).plan
+    assert again is not None
+    assert {slot.end - slot.begin for slot in again.slots if slot.actors == ("left_hand",)} == {Fraction(3)}
+    assert {slot.end - slot.begin for slot in again.slots if slot.actors == ("right_hand",)} == {Fraction(1)}
