@@ -71,7 +71,7 @@ ON_A_TABLE = (
     Planted("unreachable object", faults.displaced("cup1", (0.55, 0.0)), 0, "unreachable", ("cup1",)),
     Planted("unreachable location", faults.place_displaced("location7", (0.4, 0.0)), 3, "unreachable", ("location7",)),
     Planted("occupied location", faults.stranger((0.56, -0.12, 0.7)), 3, "goal in collision", ("location7", "stranger")),
-    Planted("object built in", faults.stranger((0.4, 0.04, 0.7), (0.3, 0.06, 0.2)), 0, "goal in collision", ("cup1", "stranger")),
+    Planted("object built in", faults.stranger((0.34, 0.12, 0.7), (0.03, 0.3, 0.2)), 0, "goal in collision", ("cup1", "stranger")),
     Planted("hidden wall before the object", faults.hidden_wall("cup1"), 0, "tracking error", ("hidden wall",)),
     Planted("hidden wall on the way", WALL_ON_THE_WAY, 3, "slip or drop", ("cup1", "hidden wall")),
     Planted("heavy object", faults.heavy("cup1", 8.0), 2, "slip or drop", ("cup1",)),
@@ -123,11 +123,11 @@ LABORATORY = (
     Planted("lid falls shut when let go", faults.sprung("cover", 0.0, 2.0), 0, "stuck", ("cover",), scene=SPINNER),
     Planted("lid shut by a person meanwhile", faults.swung("cover", 0.0, 4, 0.0), 4, "tracking error", ("cover",), scene=SPINNER),
     Planted("slot occupied", faults.stranger((0.57, 0.15, 0.74), SMALL), 4, "goal in collision", ("stranger",), scene=SPINNER),
-    Planted("lid not shut", faults.stopped("cover", 0.3, 2.0, 7, 0.0), 7, "slip or drop", ("cover",), scene=SPINNER),
-    Planted("lid springs open again", faults.sprung("cover", 0.5, 3.0, 7, 4.0), 7, "stuck", ("cover",), scene=SPINNER),
-    Planted("button not latched", faults.unlatched("start"), 16, "stuck", ("start",), scene=SPINNER),
-    Planted("button stuck", faults.stiff("start", 200.0), 16, "stuck", ("start",), scene=SPINNER),
-    Planted("button's value read 1 cm too low", faults.misread("start", -0.01), 16, "stuck", ("start",), scene=SPINNER),
+    Planted("lid not shut", faults.stopped("cover", 0.3, 2.0, 13, 0.0), 13, "slip or drop", ("cover",), scene=SPINNER),
+    Planted("lid springs open again", faults.sprung("cover", 0.5, 3.0, 13, 4.0), 13, "stuck", ("cover",), scene=SPINNER),
+    Planted("button not latched", faults.unlatched("start"), 14, "stuck", ("start",), scene=SPINNER),
+    Planted("button stuck", faults.stiff("start", 200.0), 14, "stuck", ("start",), scene=SPINNER),
+    Planted("button's value read 1 cm too low", faults.misread("start", -0.01), 14, "stuck", ("start",), scene=SPINNER),
 )  # fmt: skip
 
 PLANTED = (*ON_A_TABLE, *KITCHEN, *LABORATORY)

@@ -176,7 +176,7 @@ def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, 
         if enough:
             assert attempt.choose([Stage(pose[None])], ()) == [0]
         else:
-            with pytest.raises(SkillError, match="touch something"):
+            with pytest.raises(SkillError, match="1 mm from post, wanted 3 mm"):
                 attempt.choose([Stage(pose[None])], ())
 
 
