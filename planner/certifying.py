@@ -59,6 +59,8 @@ Key: TypeAlias = "tuple[str, Symbol, str]"
 """Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
 change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
+KINDS = ("facts", "pairs", "cases", "states")
+"""Kinds of certificates: unreachable facts; two goals that exclude each other; distinguished values; all values."""
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
@@ -86,23 +88,24 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
         return None
 
 
-def of_each_kind(problem: Problem, most: float = WORK) -> Iterator[tuple[str, Certificate | None]]:
-    """Yield the certificate of each kind that is found without the other kinds, or None; each search has its own work limit.
+def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | None:
+    """Return a certificate of one of the `KINDS`, found without the other kinds, or None.
 
     In `certify`, the result of one kind can hide a fault of another kind.
     """
-
-    def found(find: Callable[[Lowest, Relaxed], Certificate | None]) -> Certificate | None:
-        lowest = Lowest(problem, most)
-        try:
-            return find(lowest, Relaxed(lowest))
-        except (WorkLimitError, RecursionError):
-            return None
-
-    yield "facts", found(lambda _, relaxed: relaxed.certificate(problem.goal))
-    yield "pairs", found(_by_pairs)
-    yield "cases", found(lambda lowest, relaxed: _by_cases(lowest, relaxed, problem.goal))
-    yield "states", found(lambda lowest, _: _by_states(lowest))
+    lowest = Lowest(problem, most)
+    relaxed = Relaxed(lowest)
+    try:
+        match kind:
+            case "facts":
+                return relaxed.certificate(problem.goal)
+            case "pairs":
+                return _by_pairs(lowest, relaxed)
+            case "cases":
+                return _by_cases(lowest, relaxed, problem.goal)
+        return _by_states(lowest)
+    except (WorkLimitError, RecursionError):
+        return None
 
 
 def _at_once(lowest: Lowest, little: int) -> Certificate | None:

@@ -26,9 +26,10 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
     yield "of another goal", replace(certificate, unmet=(other,))
     yield "with a case more", replace(certificate, cases=certificate.cases + 1)
     yield "with a case less", replace(certificate, cases=certificate.cases - 1)
-    first = rng.choice(sorted(s for s in problem.initial if s.situation not in problem.domain.rules))
-    true = Fact(first, problem.initial[first])
-    yield "with a fact of the initial state as never true", replace(certificate, never=certificate.never | {true})
+    if stated := sorted(symbol for symbol in problem.initial if symbol.situation not in problem.domain.rules):
+        first = rng.choice(stated)
+        true = Fact(first, problem.initial[first])
+        yield "with a fact of the initial state as never true", replace(certificate, never=certificate.never | {true})
     if certificate.always:
         one = rng.choice(sorted(certificate.always))
         yield "with another constant", replace(certificate, always={**certificate.always, one: NOTHING})
