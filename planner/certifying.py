@@ -103,7 +103,8 @@ def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | No
                 return _by_pairs(lowest, relaxed)
             case "cases":
                 return _by_cases(lowest, relaxed, problem.goal)
-        return _by_states(lowest)
+            case _:
+                return _by_states(lowest)
     except (WorkLimitError, RecursionError):
         return None
 
