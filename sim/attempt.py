@@ -40,7 +40,7 @@ TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Distance in metres beyond the reach above which a pose was marked as impossible, since the hand would not be level."""
+"""A pose that is farther beyond the reach than this distance in metres is marked as impossible: the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.

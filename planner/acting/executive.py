@@ -390,7 +390,7 @@ class _Run:
     def on_no_plan(self, outcome: Outcome | None, limits: Limits) -> None:
         """Handle a failure of planning: look for free spots, drop or postpone goals, retry, or end the episode.
 
-        Each unreachable goal is dropped or postponed. If no goal is unreachable, planning is tried again, or the episode ends.
+        Each unreachable goal is dropped or postponed. If all goals are reachable, the planner tries again, or the episode ends.
 
         A goal that needs facts in doubt is postponed until all other goals are handled.
         """

@@ -95,7 +95,7 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return the latest steps, up to `last`, that changed exactly the same symbols and in the end restored the old values.
+    """Return the latest steps, up to `last`, that all changed the symbols of `last` only, and together restored the old values.
 
     Return an empty list if there are no such steps.
     """

@@ -155,7 +155,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
 def _terms(
     problem: Problem, rules: BehaviorReader, facts: Facts, step: Step, names: Mapping[str, str]
 ) -> dict[str, str] | None:
-    """Return the individuals of a step's terms with other actors, or None if static facts don't allow these actors."""
+    """Return the individuals of a step after its actors are replaced, or None if static facts don't allow the new actors."""
     behavior = problem.domain.behaviors[step.behavior]
     arguments = tuple(names.get(a, a) for a in step.arguments)
     given = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}

@@ -61,7 +61,7 @@ class Network:
     def ends(self, i: int, begin: int, lasts: int) -> list[int]:
         """Return the latest ends that the latest times, the window and the fixed time of an activity allow.
 
-        The activity stays in the window that contains the activity at the given begin.
+        An activity that begins in a window also ends in this window.
         """
         fixed = self.at[i]
         found = [by if which == END else by + lasts for which, by in self.latest[i]]
