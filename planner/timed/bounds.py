@@ -25,7 +25,7 @@ from confab.reasoner.timing import timing_of
 
 MOST_ROWS = 50_000
 """Maximum number of rows of one join when the lowest level is grounded; larger levels have the bound 0."""
-MOST_CUT = 3_000
+MOST_CUT = 12_000
 """Maximum number of operators for which LM-cut is computed."""
 PARTS = 1_000_000
 """Number of parts of a second to which a bound is rounded down."""
@@ -43,8 +43,9 @@ def of_any_plan(problem: Problem) -> Fraction:
             return Fraction(0)
     if problem.weights:
         return Fraction(0)
+    wanted = {symbol: value for symbol, value in problem.goal_on(level).items() if problem.initial.get(symbol) != value}
     try:
-        task = ground(problem, level, goal=problem.goal_on(level), most=MOST_ROWS)
+        task = ground(problem, level, goal=wanted, most=MOST_ROWS)
     except (UngroundableError, MemoryError):
         return Fraction(0)
     if isinstance(task, Reason) or not len(task) or not task.goal:
