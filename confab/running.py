@@ -103,10 +103,11 @@ def run(job: Job) -> int:
     with progress("planning"):
         memory = job.memory
         remembered = Memory.load(memory, scene) if memory and has_content(memory) else Memory.of(scene)
-        result = scene.plan(job.goals, remembered, job.mode)
+        used = None if job.mode == "optimal" else remembered  # the optimal search uses no memory
+        result = scene.plan(job.goals, used, job.mode)
     report = None
     if result.outcome.plan is not None and bodies and physics:
-        replan = partial(Scene.plan, goals=job.goals, memory=remembered, mode=job.mode)
+        replan = partial(Scene.plan, goals=job.goals, memory=used, mode=job.mode)
         scene, result, report = persuaded(scene, result, job, replan)
     show(result if report is None else report)
     if dearer := result.dearer():

@@ -8,9 +8,10 @@ must take this individual; the whole task is planned again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import product
 
 from confab.planner.causal_links import on_level
 from confab.planner.checked_conditions import Bindings
@@ -93,7 +94,7 @@ def instead_of(
     for i in places:
         found = rules.satisfied(behavior.preconditions, given, behavior.kinds, Facts(problem, states[i]))
         if found is not None:
-            possible.append((i, tuple(found[p.name] for p in behavior.parameters)))
+            possible += [(i, arguments) for arguments in _completed(problem, behavior, found)]
     doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]
     if possible and not doable:
         at, arguments = possible[0]
@@ -120,6 +121,11 @@ def instead_of(
     if faults := validate(problem, whole):
         return replace(asked, reason=Reason(faults[0].text))
     return replace(asked, plan=whole, cost=cost_of(problem, whole))
+
+
+def _completed(problem: Problem, behavior: Behavior, found: Bindings) -> Iterator[tuple[str, ...]]:
+    """Yield the arguments of a behaviour; a parameter that no condition determines takes each member of its class."""
+    yield from product(*((found[p.name],) if p.name in found else problem.members(p.kind) for p in behavior.parameters))
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:

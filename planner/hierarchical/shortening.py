@@ -86,14 +86,15 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
         windowed(call, levels[0], work)
     if not leave_levels:
         return
-    several = len(call.steps) > 1
-    for level in levels[1:-1] if aside or several else ():
-        windowed(call, level, work, inherit=True)
     if aside:
         drop_detours(call, levels[-2])
-    if drop_detours(call, levels[-1]) or call.given_up or len(levels) == 1 or lasting(call):
+    detours = drop_detours(call, levels[-1])
+    together = len(call.steps) > 1 and (aside or detours or lasting(call))  # a shorter joint refinement is likely
+    for level in levels[1:-1] if aside or together else ():
+        windowed(call, level, work, inherit=True)
+    if detours or call.given_up or len(levels) == 1 or lasting(call):
         windowed(call, levels[-1], work)
-    if len(levels) > 1 and several:  # the steps may have a shorter refinement together
+    if len(levels) > 1 and together:
         windowed(call, levels[-1], work, inherit=True)
 
 

@@ -196,7 +196,7 @@ UNWANTED = (
     ),
 )
 """What a plan in a shipped scene has no use for: heavy, or other commands' rooms."""
-MOST_MODULES = 160
+MOST_MODULES = 162
 """42 are rich's, 102 ours, 12 click's; and a few."""
 MOST_OWN = 147
 """Of Python's own modules, which have others below them in each version."""

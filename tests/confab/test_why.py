@@ -219,3 +219,27 @@ def test_an_alternative_is_given_by_names_or_in_the_words_of_an_explanation(word
 def test_a_shipped_query_is_offered_where_its_vocabulary_is_used() -> None:
     with pytest.raises(confab.KnowledgeError, match=r"a vocabulary that this scene doesn't import; .*what-is-wanted"):
         confab.load("towers-small").query("where-is-everything")
+
+
+def test_a_parameter_that_no_condition_determines_takes_any_member_of_its_class(tmp_path: Path) -> None:
+    domain = """
+    @prefix : <https://example.org/lamps#> .
+    @prefix c: <https://w3id.org/confab/core#> .
+    @prefix owl: <http://www.w3.org/2002/07/owl#> .
+    @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+    <https://example.org/lamps> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> .
+    :Lamp a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :ON .
+    :Hand a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+    :Match a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+    :ON a owl:Class, owl:NamedIndividual, c:SituationType .
+    :LIGHT a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update
+      "INSERT { ?lamp :ON true } WHERE { ?lamp a :Lamp . ?hand a :Hand . ?match a :Match . FILTER NOT EXISTS { ?lamp :ON true } }" .
+    :a a owl:NamedIndividual, :Lamp ; c:index 1 .
+    :left a owl:NamedIndividual, :Hand ; c:index 2 .
+    :right a owl:NamedIndividual, :Hand ; c:index 3 .
+    :m a owl:NamedIndividual, :Match ; c:index 4 .
+    """
+    (tmp_path / "lamps.ttl").write_text(domain)
+    result = confab.load(tmp_path / "lamps.ttl").plan(goal="a ON true")
+    assert str(result.plan[0]) == "0 LIGHT a left m"
+    assert "is possible and costs the same" in str(result.why_not("LIGHT a right"))

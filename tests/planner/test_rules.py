@@ -356,10 +356,10 @@ def test_where_a_level_is_left_rules_still_act_on_the_level_of_their_behaviours_
     assert len(led.given_up) <= len(alone.given_up)
 
 
-def test_a_lesson_teaches_refinements_where_its_own_plan_was_shortened_to_the_lowest_level() -> None:
+def test_a_lesson_teaches_refinements_where_steps_of_its_own_plan_are_refined_together() -> None:
     small, experience = confab.load("drawers-small").problem, Experience("robot")
     made = teach(experience, small)
-    assert made is not None and {step.level for step in made.steps} == {2}
+    assert made is not None and any(step.joined for step in made.steps)
     assert "L2_SHUT" in {rule.does[0] for rule in rules_in(experience)}  # only what is opened in between is shut
 
 

@@ -105,7 +105,7 @@ def test_what_is_no_ordinary_file_or_read_only_is_left_and_named(tmp_path: Path)
         assert error.value.filename == str(path)
     assert locked.read_text() == "old"
     assert left(tmp_path) == ["folder", "locked", "pipe"]
-    with pytest.raises(OSError, match="can't be written") as error:
+    with pytest.raises(OSError, match="is a file; wanted a folder") as error:
         write_whole(locked / "inside", "new")
     assert error.value.filename == str(locked / "inside")
 
