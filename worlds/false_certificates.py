@@ -71,6 +71,16 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
     if at is None or at >= meant.stated or meant.kinds[symbol.situation].quantity is not None:
         return False
 
+    def possible(state: State) -> bool:
+        """Return whether all amounts are within their bounds, which the checker of certificates takes for granted."""
+        bounds = ((slot, meant.kinds[one.situation].quantity) for one, slot in meant.slots.items())
+        return all(
+            (quantity.least is None or state[slot] >= quantity.least)
+            and (quantity.most is None or state[slot] <= quantity.most)
+            for slot, quantity in bounds
+            if quantity is not None and state[slot] is not None
+        )
+
     def allowed(state: State) -> bool:
         never = any(meant.meets(state, fact.symbol, fact.value) for fact in certificate.never)
         return not never and all(meant.meets(state, one, value) for one, value in certificate.always.items())
@@ -81,7 +91,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
         for state in sorted(reached, key=str)[:SAMPLE]:
             for value in values:
                 other.initial = meant.closed([*state[:at], value, *state[at + 1 :]])
-                if allowed(other.initial):
+                if possible(other.initial) and allowed(other.initial):
                     found = other.explored(level, MOST_STATES, rests=False)
                     if found.least is not None or not all(allowed(after) for after, _ in found.costs):
                         return True
