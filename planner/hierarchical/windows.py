@@ -37,7 +37,8 @@ MOST_ROWS, OF_A_STEP = 20_000, 500
 def windowed(call: Call, level: int, work: int, inherit: bool = False) -> None:
     """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`).
 
-    If `inherit`, the new steps also satisfy the preconditions that the upper levels impose on their changes.
+    If `inherit`, the new steps also satisfy the preconditions that the upper levels impose on their changes, unless the level with
+    these preconditions is too large.
     """
     new = cheaper(call, level, work, inherit)
     if new is None:
@@ -68,12 +69,15 @@ def cheaper(call: Call, level: int, work: int, inherit: bool) -> list[Ground] | 
     from confab.planner.grounded.plan_windows import shorter
     from confab.planner.grounded.shortest import least
 
-    problem = replace(call.problem, domain=binding(call.problem, level)) if inherit else call.problem
-    task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
-    operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
+    bound = [replace(call.problem, domain=binding(call.problem, level))] if inherit else []
+    for problem in (*bound, call.problem):
+        task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
+        operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
+        if operators is not None:
+            break
     if task is None or operators is None:
         return None
-    if level == call.program.levels[-1] and not inherit:
+    if level == call.program.levels[-1] and problem is call.problem:
         call.bound = least(task)
     found = shorter(task, operators, work, call.space.deadline)
     better = (task.cost_of(found), len(found)) < (task.cost_of(operators), len(operators))
