@@ -24,7 +24,7 @@ CASES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     # moved to another place
     ("beverage-serving", ("at=9 cup2 LOCATION location8",), ""),
     ("two-cups", ("at=5 cup2 LOCATION location8",), ""),
-    # a foreign box on a target, in the hand's way, and on a place that nobody needs
+    # a foreign box on a target, in the hand's way, and on a place that the plan doesn't use
     ("beverage-serving", ("after=22 box location5",), ""),
     ("beverage-serving", ("at=3 box location7",), ""),
     ("beverage-serving", ("after=22 box location5 8x5x15", "after=22 push cup2 -2 9"), ""),

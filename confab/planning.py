@@ -24,7 +24,7 @@ from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, LimitError, within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import CalledFloat, RightNames, right_names
+from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
@@ -541,7 +541,7 @@ class Result(metaclass=RightNames):
         """
         from confab.planner.plan_costs import cost_of
 
-        return CalledFloat(cost_of(self.problem, self.plan))
+        return cost_of(self.problem, self.plan)
 
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.

@@ -46,6 +46,12 @@ def asks_for_times(problem: Problem, minimise: str | None) -> bool:
     return minimise == "makespan" or (times is not None and bool(times.deadlines or times.windows or times.events))
 
 
+def has_times(problem: Problem) -> bool:
+    """Return whether a behaviour has a duration, or the task has deadlines, windows or events."""
+    durations = any(behavior.timing is not None for behavior in problem.domain.behaviors.values())
+    return durations or asks_for_times(problem, None)
+
+
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
     """Plan with steps that must overlap in time; return the outcome and the schedule."""
     from confab.planner.timed.concurrent import plan

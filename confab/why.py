@@ -364,18 +364,12 @@ def why_not(
     """
     first, _, rest = asked.strip().partition(" ")
     behavior = problem.domain.behaviors.get(first)
-    if behavior is not None:
-        return _step_told(
-            asked,
-            problem,
-            plan,
-            labels,
-            instead_of(problem, plan, behavior, _given(problem, behavior, rest), ask, instead),
-        )
-    if (worded := worded_behavior(problem, labels, asked)) is not None:
-        return _step_told(
-            asked, problem, plan, labels, instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
-        )
+    worded = (
+        worded_behavior(problem, labels, asked) if behavior is None else (behavior, _given(problem, behavior, rest))
+    )
+    if worded is not None:
+        found = instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
+        return _step_told(asked, problem, plan, labels, found, "" if instead else ", where the fewest conditions fail")
     by = BY.search(asked)
     fact = BY.sub("", asked.strip())
     if (said := worded_fact(problem, labels, fact)) is not None:
@@ -410,7 +404,7 @@ def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
     return given
 
 
-def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:
+def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast, chosen: str) -> WhyNot:
     behavior = problem.domain.behaviors[found.behavior]
     terms = dict(zip((p.name for p in behavior.parameters), found.arguments, strict=True))
     what = labels.behavior(behavior, {t: v for t, v in terms.items() if not v.startswith("?")})
@@ -424,7 +418,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
         return WhyNot(
             asked,
-            f"“{what}” isn't applicable. In place of {place}, where the fewest conditions fail, it would require that",
+            f"“{what}” isn't applicable. In place of {place}{chosen}, it would require that",
             lacks,
         )
     if found.plan is not None:
@@ -487,7 +481,7 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
     said = f"costs {more:g} more" if more > 0 else "costs the same" if more == 0 else f"costs {-more:g} less"
     steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
     if breaks := _breaks(problem, plan, found.plan, labels):
-        said = f"is possible only if a condition of a level above is violated, and {said} ({count}):"
+        said = f"is possible, but the plan that was found violates a condition of a level above, and {said} ({count}):"
         return WhyNot(asked, f"{what} {said}", (), found.plan, more, steps, breaks)
     return WhyNot(asked, f"{what} is possible and {said} ({count}):", (), found.plan, more, steps)
 

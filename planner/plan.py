@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol, overload
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
-from confab.reasoner.names import CalledDict, CalledTuple, RightNames, brief, known_as, right_names
+from confab.reasoner.names import RightNames, brief, known_as, right_names
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
@@ -171,13 +171,13 @@ class Plan(Sequence[Step], metaclass=RightNames):
     @property
     def primitives(self) -> tuple[Step, ...]:
         """The steps without sub-steps; a robot executes these steps."""
-        return CalledTuple(step for step in self.walk() if not step.steps)
+        return tuple(step for step in self.walk() if not step.steps)
 
     @property
     def length(self) -> dict[int, int]:
         """Number of steps per level; each of several steps that are refined together counts."""
         levels = [step.level for node in self.walk() for step in node.together]
-        return CalledDict((level, levels.count(level)) for level in sorted(set(levels)))
+        return {level: levels.count(level) for level in sorted(set(levels))}
 
     def json(self) -> dict[str, object]:
         """Return the plan as JSON data, which `confab.Scene.read_plan` reads from a file.

@@ -18,7 +18,6 @@ C = TypeVar("C", bound=type)
 P = ParamSpec("P")
 R = TypeVar("R")
 V = TypeVar("V")
-W = TypeVar("W")
 
 
 class Names:
@@ -68,27 +67,7 @@ class Names:
         return name in self._iris
 
 
-class Called:
-    """A value that can also be called and then returns itself, since other libraries have methods in place of properties."""
-
-    def __call__(self: V) -> V:
-        """Return the value itself."""
-        return self
-
-
-class CalledFloat(float, Called):
-    """A number that can also be called."""
-
-
-class CalledDict(dict[V, W], Called):
-    """A dictionary that can also be called."""
-
-
-class CalledTuple(tuple[V, ...], Called):
-    """A tuple that can also be called."""
-
-
-class Named(dict[str, V], Called):
+class Named(dict[str, V]):
     """A mapping that can't be edited. Its `KeyError` for a missing name suggests the most similar name."""
 
     def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:

@@ -298,8 +298,12 @@ def export(
             paths = _exported_trees(load(scene), plan, goal, out)
         else:
             from confab.pddl_commands import export_pddl
+            from confab.timing import has_times
 
-            paths = export_pddl(load(scene).problem, level, out)
+            problem = load(scene).problem
+            paths = export_pddl(problem, level, out)
+            if has_times(problem):
+                remark("the PDDL has no durations, deadlines or windows of availability")
     for path in paths:
         print(path)
 

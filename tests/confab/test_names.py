@@ -350,13 +350,6 @@ def test_values_are_represented_in_one_short_line(things: dict[str, object]) -> 
     assert texts["domain"].startswith("Domain(situations: 5, behaviors: 12")
 
 
-def test_properties_that_other_libraries_have_as_methods_can_be_called(result: confab.Result) -> None:
-    assert result.cost() == result.cost  # type: ignore[operator]
-    assert result.plan.length() == result.plan.length  # type: ignore[operator]
-    assert result.plan.primitives() == result.plan.primitives  # type: ignore[operator]
-    assert type(pickle.loads(pickle.dumps(result.cost)) + 1) is float
-
-
 def test_a_plan_is_json_that_a_scene_reads(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
     file = tmp_path / "plan.json"
     file.write_text(json.dumps(result.plan.json()))

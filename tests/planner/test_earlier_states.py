@@ -105,7 +105,7 @@ def test_the_checker_knows_the_definitions_and_not_the_effects_that_are_added(
 
 
 def test_what_happens_within_a_step_of_an_upper_level_is_remembered(tmp_path: Path) -> None:
-    """The acid would be on the forklift twice, which only level 2 sees; nobody can carry it back to make room."""
+    """The acid would be on the forklift twice, which only level 2 sees. No behaviour carries the acid back to make room."""
     scenes = ontology.ROOT / "scenes"
     domain = (ontology.ROOT / "domains" / "drums.ttl").read_text("utf-8")
     domain = domain.replace(":hasSituationType :IN ;", ":hasSituationType :IN, :CARRIED ;")

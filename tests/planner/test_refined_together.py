@@ -1,4 +1,4 @@
-"""Several steps of a level are refined together: what the checker accepts, where the planner uses it, and who else knows it."""
+"""Several steps of a level are refined together: the checker, the planner, and the other modules that handle plans."""
 
 from dataclasses import replace
 from functools import cache

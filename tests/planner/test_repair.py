@@ -296,7 +296,7 @@ def after_somebody(problem: Problem, draw: random.Random) -> Problem:
         ("swap", 6, 12, 11, 305, 34, 3),
         ("full", 4, 40, 36, 355, 148, 18),
         ("handover", 5, 12, 10, 245, 54, 6),
-        ("blocked", 5, 24, 20, 520, 136, 14),
+        ("blocked", 5, 24, 23, 520, 64, 11),
     ],
 )
 def test_whatever_happens_whenever_little_is_done_otherwise(

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from click.testing import CliRunner
+
 import confab
+from confab.cli import app
 from confab.planner.plan import Status
 from confab.planning import Result
 from confab.timing import Minimise
@@ -190,3 +193,11 @@ def test_a_battery_is_charged_before_it_is_empty_if_the_charger_is_available_onl
     assert result.timed is not None
     (charge,) = (slot for slot in result.timed.slots if slot.step.behavior == "CHARGE")
     assert charge.end <= 10
+
+
+def test_an_export_says_that_pddl_has_no_times(tmp_path: Path) -> None:
+    (tmp_path / "robots.ttl").write_text(ROBOTS, "utf-8")
+    done = CliRunner().invoke(app, ["export", str(tmp_path / "robots.ttl"), "-o", str(tmp_path / "pddl")])
+    assert "the PDDL has no durations, deadlines or windows of availability" in done.stderr
+    done = CliRunner().invoke(app, ["export", "house-small", "-o", str(tmp_path / "house")])
+    assert done.stderr == ""
