@@ -1,12 +1,12 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the
-previous value, the later step would be inapplicable or lose a required effect. The test with the previous value finds
-causal links for any kind of condition, for example "no object stands on the shelf". The checker
-(`confab.planner.validation`) rejects a plan without a needed step. Each level has a separate sequence of steps. Where
-the plan leaves a level, lower-level steps replace the steps of the level. The facts that a step reads are recorded, and
-only these facts are reset to their previous values. Therefore the effort grows with the number of facts that the steps
-read, and not with the square of the plan's length.
+A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the previous
+value, the later step would be inapplicable or lose a required effect. Because the later step is tested with the previous value,
+causal links are found for any kind of condition, for example "no object stands on the shelf". The checker
+(`confab.planner.validation`) rejects a plan without a needed step. Each level has a separate sequence of steps. Where the plan
+leaves a level, lower-level steps replace the steps of the level. The facts that a step reads are recorded, and only these facts
+are reset to their previous values. Therefore the effort grows with the number of facts that the steps read, and not with the
+square of the plan's length.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class _Written:
 
 
 class _Noting(Facts):
-    """Facts that record the symbols that are read, and the values whose holders are read."""
+    """A view of the facts that records which symbols are read, and the values whose holders are read."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -196,7 +196,7 @@ class _Course:
         return found if applicable else None
 
     def in_turn(self, step: Step) -> Iterator[tuple[Step, dict[Cell, str] | None]]:
-        """Yield each of the steps that are refined together, in the state after the steps before it, with its changes.
+        """Yield each of the steps that are refined together, with its changes in the state after the steps before it.
 
         The changes of an inapplicable step are None, and no step follows it. At the end the facts are as before.
         """
@@ -309,7 +309,7 @@ class _Course:
     def left(
         self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
     ) -> Iterator[tuple[Path, Need]]:
-        """Yield each fact that sub-steps achieve for their parent (level 0: the plan), and the step that achieves the fact."""
+        """Yield each fact that sub-steps achieve for their parent (the plan on level 0), and the step that achieves the fact."""
         touched = dict[Cell, str]()
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)

@@ -30,7 +30,7 @@ The entry `OTHER` means any value that isn't distinguished. The entry `ANY` mean
 means the value before the behaviour.
 """
 WORK = 3_000_000
-"""Maximum work of a check, as the number of tested conditions and of behaviours tried in a case."""
+"""Maximum work of a check: the number of tested conditions plus the number of behaviours that are tried in cases."""
 MOST_CASES = 200_000
 
 T = TypeVar("T")

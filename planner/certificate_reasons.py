@@ -138,7 +138,7 @@ class _Causes:
         return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
 
     def causes(self, claim: Claim) -> list[Cause]:
-        """Return for each behaviour that could make a claim false the cause that prevents it, the simplest cause first."""
+        """Return the cause that prevents each behaviour which could make a claim false, the simplest cause first."""
         fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):
@@ -200,7 +200,7 @@ class _Causes:
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
     def exceeded(self, fact: Fact) -> str:
-        """Return as text the bound of an amount that a goal value exceeds; an empty text if the value exceeds no bound."""
+        """Return as text the bound that a goal value exceeds, or an empty text if the value is within bounds."""
         quantity, words = (
             self.lowest.quantity(fact.symbol.situation),
             _named(fact.symbol),

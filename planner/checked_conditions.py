@@ -106,7 +106,7 @@ class ConditionReader:
         return [*tests, *(self.test(condition, bound, kinds) for condition in nested), *last]
 
     def given(self, condition: ValueCondition, kind: str) -> Test:
-        """Return the choice of a value that the state doesn't determine: every individual of the class is tried."""
+        """Return a test that binds the variable of a condition to the current value, if the value belongs to a class."""
         key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
 
         def given(facts: Stated, values: Values) -> bool:

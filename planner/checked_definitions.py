@@ -29,9 +29,10 @@ class Definitions:
     Parameters
     ----------
     strata : mapping of situation type to its stratum
-        From `stratum_of`.
+        The result of `stratum_of`.
     given : function of a situation type and arguments to a truth value
-        Returns whether one of the rules derives the symbol; rules read other defined situations by `follows`.
+        Function that returns whether one of the rules derives the symbol; rules read other defined situations by calling
+        `follows`.
     """
 
     def __init__(self, strata: Mapping[str, tuple[str, ...]], given: Callable[[str, tuple[str, ...]], bool]) -> None:

@@ -33,7 +33,7 @@ from confab.reasoner.symbols import (
 )
 
 Ask = Callable[[Problem], Outcome]
-"""A planning function: Function that calls `confab.planner.solve.solve` with a fixed mode and fixed limits."""
+"""Planning function that calls `confab.planner.solve.solve` with a fixed mode and fixed limits."""
 
 
 NO_NUMBER = Reason("one of its effects uses a number that isn't stated for these individuals")
@@ -77,10 +77,10 @@ def instead_of(
     given : mapping of parameters to individuals
         Individuals of parameters that aren't given are chosen so that the step is applicable.
     ask : callable
-        Plans a problem.
+        Function that plans a problem.
     place : Step, optional
-        The step to be replaced, of the same level. By default, the most similar step at whose position `behavior` is
-        applicable.
+        The step to be replaced, which has the level of `behavior`. By default, the most similar step at whose position
+        `behavior` is applicable.
     """
     rules, before = BehaviorReader(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))
@@ -129,7 +129,7 @@ def _completed(problem: Problem, behavior: Behavior, found: Bindings) -> Iterato
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
-    """Return the result of a choice: the individual takes part in every change of the symbol in which the individual can.
+    """Return the result of a choice: whenever the individual can take part in a change of the symbol, it must take part.
 
     Raises
     ------
@@ -162,7 +162,10 @@ def _beyond(
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
-    """Return a behaviour that changes a symbol only with an individual in a suitable role, if there is a suitable role."""
+    """Return a behaviour that changes a symbol only if an individual has one of its roles.
+
+    If no role suits the individual, the behaviour is returned unchanged.
+    """
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip

@@ -71,7 +71,7 @@ class DerivedCells(dict[Key, str]):
 
 
 class Stratum:
-    """Mutually dependent defined situation types, with the values known at one age (number of changes) of the table.
+    """Mutually dependent defined situation types, with the truth values known since the last change of the table.
 
     The requested situations, and all situations that their rules read, are evaluated in rounds until no more become
     true; the remaining situations are false. Other situations aren't evaluated, and the interpreter's stack doesn't

@@ -6,7 +6,7 @@ moved". This module lists the violated conditions.
 
 A level sees a change if a symbol of the level gets another value of the level. A level doesn't see intermediate values of lower
 levels, such as a cup in a hand. Each visible change that persists requires an applicable behaviour of the level that makes the
-change. The behaviour may also make the visible changes just before the change.
+change. The same behaviour may also make the visible changes that directly precede the change.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class _Watch:
         return possible
 
     def mixed(self, level: int, symbol: Symbol) -> Facts:
-        """Return the current state in which one symbol has the last value that the level saw."""
+        """Return the current state, except that one symbol has the last value that the level saw."""
         values = self.facts.state()
         seen = self.views[level].value(symbol.situation, symbol.arguments)
         return Facts(self.problem, values if seen is None else {**values, symbol: seen})

@@ -276,7 +276,7 @@ OUT_OF_MEMORY = Reason("there isn't enough memory to continue planning")
 
 @dataclass(frozen=True)
 class Broken:
-    """A change by a lower-level step that no behaviour of the level above could make in the state.
+    """A change that a lower-level step makes, and that no behaviour of the level above could make in the same state.
 
     `step` is the path of the primitive that makes the change. `behavior` is the behaviour of the level above with the fewest
     failing `conditions`. `behavior` is None if no behaviour of the level has an effect that makes the change. `text` describes the
@@ -373,11 +373,11 @@ class Outcome:
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In
-    the other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for
-    all goals together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of
-    `work` is states times operators, about a microsecond each. With `brief`, a plan is shortened with little work, and
-    with `seconds` not at all.
+    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In the
+    other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
+    together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
+    times operators, about a microsecond each. If `brief`, a plan is shortened only with little work, and not at all if
+    `seconds` is given.
     """
 
     expansions: int = 200_000
@@ -438,7 +438,7 @@ def changed(before: State, after: State) -> list[Fact]:
 
 
 def separated(steps: Iterable[Step]) -> Iterator[Step]:
-    """Yield steps in which the sub-steps of steps that are refined together replace these steps; paths are unchanged."""
+    """Yield the given steps; steps that are refined together are replaced by their common sub-steps, with unchanged paths."""
     for step in steps:
         if step.joined:
             yield from separated(step.steps)

@@ -304,7 +304,8 @@ class Reading:
     def total(self, aggregate: Aggregate, arguments: tuple[str, ...]) -> Range:
         """Return the range of a sum or a count by its definition.
 
-        Solutions that must hold contribute their number. Solutions that may hold extend the range.
+        The number of a certain solution counts for both ends of the range. The number of a solution that is only possible
+        counts for one end, so that it widens the range.
         """
         key = aggregate.situation, arguments
         if key not in self._totals:
@@ -478,7 +479,7 @@ class Reading:
                 return Range(number, number)
 
     def amounts(self, behavior: Behavior, env: Env) -> dict[Symbol, tuple[Range, bool]] | None:
-        """Return the ranges of the amounts that a behaviour may change, each with whether the change is certain.
+        """Return the ranges of the amounts that a behaviour may change, each with a flag that tells whether the change is certain.
 
         Return None if the behaviour certainly isn't applicable, because an amount would have no value or violate its bounds.
         """

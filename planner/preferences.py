@@ -31,7 +31,7 @@ from confab.reasoner.symbols import Fact, Problem, Symbol
 Search: TypeAlias = "Callable[[Problem], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
-"""Maximum number of choices with a separate plan in the proof that no other choice is cheaper."""
+"""Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
 PRECISION = 1_000_000
 """Maximum denominator of the stated cost of meeting a soft goal; costs of plans are sums of floating-point numbers."""
 

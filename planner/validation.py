@@ -6,9 +6,9 @@ condition first. Therefore the time to check a plan grows with the length of the
 world.
 
 docs/levels.md defines the meaning of a plan with several levels. After the refinement of a step, the symbols that the step's
-level sees have the values that the step states. Changed symbols of the level below that have a rest value are at rest. The next
-step begins in the state after the refinement. Several steps that are refined together are applied one after another in what
-their level sees; together they state the resulting values.
+level sees have the values that the step states. Symbols of the level below that changed and have a rest value are then at rest.
+The next step begins in the state after the refinement. Several steps that are refined together are applied one after another to
+the state that their level sees; the resulting values are those that the steps state together.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ def carried_out(
     problem : Problem
     plan : Plan
     lookups : dict, optional
-        Receives the individuals on which the check depends. If the problem has all of these individuals, every larger problem of
-        the same scene has the same faults.
+        Dictionary to which the checker adds the individuals on which the check depends. If the problem has all of these
+        individuals, every larger problem of the same scene has the same faults.
     lifted : mapping of name to behaviour, optional
         The behaviours before the expansion of effects on every member of a class; individuals that these effects can change are
         also recorded in `lookups`.
@@ -147,8 +147,8 @@ class _Check:
     ) -> bool:
         """Execute the steps that refine a step of level `above`, or the task (level 0); return whether all were applicable.
 
-        In the task, the goal of a symbol takes precedence over the symbol's rest value. `inside` a step, the rest value is
-        required. Runs of lower-level steps may replace steps of the next level.
+        In the task, the goal of a symbol takes precedence over the symbol's rest value. If `inside` is true, the steps refine a
+        step, and the rest value is required. Runs of lower-level steps may replace steps of the next level.
         """
         level = next((level for level in self.levels if level > above), above)
         marks = []
@@ -213,7 +213,7 @@ class _Check:
         return True
 
     def joinable(self, step: Step) -> bool:
-        """Return whether steps that are refined together are of one level and have common sub-steps; record a fault."""
+        """Return whether steps that are refined together are of one level and share their sub-steps; record a fault if not."""
         behaviors = [self.problem.domain.behaviors.get(one.behavior) for one in step.together]
         levels = {behavior.level for behavior in behaviors if behavior is not None}
         if step.steps and len(levels) <= 1 and not any(one.steps or one.joined for one in step.joined):
@@ -224,7 +224,7 @@ class _Check:
         return False
 
     def stated(self, step: Step) -> dict[Cell, str] | None:
-        """Return the values that a step states, or that steps which are refined together state; the facts are unchanged.
+        """Return the values that a step, or steps that are refined together, state; the facts are unchanged.
 
         Steps that are refined together are applied one after another. Return None if one isn't applicable.
         """
@@ -246,7 +246,7 @@ class _Check:
         return None if made is None else wanted | made
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the values that a step gives to symbols in the current state; record a fault if it isn't applicable.
+        """Return the values that a step gives to symbols in the current state; record a fault if the step isn't applicable.
 
         Remembered symbols are left out, because `BehaviorReader.remember` computes them.
         """
@@ -428,7 +428,10 @@ class BehaviorReader:
         return False
 
     def remember(self, facts: Facts, level: int | None = None) -> None:
-        """Make each remembered symbol that a level (by default, any level) sees true if the symbol that it remembers is true."""
+        """Make remembered symbols true if the symbols that they remember are true.
+
+        The method changes only symbols that the level sees; by default, it changes all.
+        """
         for name, source in self.problem.domain.remembers.items():
             if level is not None and self.problem.domain.situations[name].level > level:
                 continue

@@ -21,7 +21,7 @@ def _import_pybullet_quietly() -> None:
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)
-        with suppress(ModuleNotFoundError):  # `sim.reach` works without PyBullet; most other modules raise on import
+        with suppress(ModuleNotFoundError):  # `sim.reach` works without PyBullet; most other modules don't
             import pybullet  # noqa: F401
     finally:
         os.dup2(kept, 2)

@@ -177,7 +177,7 @@ def cross_matrix(axis: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return vector products (..., 3) in a quarter of the time of `numpy.cross` for a few vectors."""
+    """Return vector products (..., 3); for a few vectors, this function takes a quarter of the time of `numpy.cross`."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     product = np.empty((*np.broadcast(x, u).shape, 3))

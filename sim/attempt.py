@@ -34,13 +34,13 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres to obstacles on short straight motions, less than `MARGIN`, since the load may slip."""
+"""Margin in metres to obstacles on short straight motions; it is less than `MARGIN`, since the load may have slipped before."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""A pose that is farther beyond the reach than this distance in metres is marked as impossible: the hand would not be level."""
+"""Distance beyond the reach, in metres, that marks a pose as impossible because the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
@@ -49,7 +49,7 @@ The margins in `TIGHT` are above `CLOSE`, since the load may slip on the way.
 """
 
 ROUNDED = 3
-"""Maximum number of samples before and after a corner of a path over which the corner is rounded."""
+"""A corner of a path is rounded over at most this number of samples before the corner, and as many after the corner."""
 
 THIN = 0.01
 """Assumed opening in metres of fingers that are closed around a handle."""

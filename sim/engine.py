@@ -506,7 +506,7 @@ class Engine:
         return rotation.T @ turned, rotation.T @ (base - point)
 
     def load(self, held: str | None) -> tuple[str, ...]:
-        """Return the held body and the bodies that stand at places on it or on one another, without a held body nothing."""
+        """Return the held body and the bodies that stand on it, directly or on one another; return nothing if no body is held."""
         found = [] if held is None else [held]
         for carrier in found:
             found += [name for name, (by, _, _) in self.known.items() if by == carrier and name in self.bodies]
@@ -527,7 +527,7 @@ class Engine:
         return Spheres(np.concatenate(centers), np.concatenate(radii))
 
     def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
-        """Return the lowest height between `least` and `most` above a point at which an upright load keeps the margin to obstacles.
+        """Return the lowest height above a point, from `least` to `most`, at which an upright load keeps the margin to obstacles.
 
         A load in a hole has to rise above the rim. The result is `least` if the load gets nearer to an obstacle on the way up,
         such as the top of a cupboard.

@@ -140,7 +140,7 @@ def _put(world: Engine, name: str, base: Array, orientation: tuple[float, float,
 
 @fault
 def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1, seconds: float = 0.0) -> None:
-    """Shift an object by metres along x and y; its contents stay behind."""
+    """Shift an object by `by`, in metres along x and y; its contents stay behind."""
 
     def shift(world: Engine) -> None:
         _put(world, body, world.truth(body)[1] + np.array([*by, 0.0]))
@@ -242,7 +242,7 @@ def drained(world: Engine, vessel: str, left: int = 0) -> None:
 
 @fault
 def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
-    """Shift a place by metres along x and y without an update of the reach facts."""
+    """Shift a place by `by`, in metres along x and y, without an update of the reach facts."""
     known = world.embodiment.places[place]
     x, y, z = known.position
     moved = replace(known, position=(x + by[0], y + by[1], z))
@@ -439,7 +439,7 @@ def noisy(world: Engine, metres: float) -> None:
 
 @fault
 def misaligned(world: Engine, by: tuple[float, float]) -> None:
-    """Shift the perceived positions of all bodies by metres along x and y, like a displaced camera."""
+    """Shift the perceived positions of all bodies by `by`, in metres along x and y, like a displaced camera."""
     true_sense = world.sense
 
     def sense(name: str) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ ABOVE = 0.01
 """Height in metres above a place, or above the top of an object, of the point that must be visible for a name to be shown."""
 
 NEARLY = 0.97
-"""Minimum share of the distance from the camera to a handle at which a ray's first hit counts as a hit of the handle."""
+"""A ray from a camera hits a handle if its first hit is at least at this share of the distance to the handle."""
 
 STACKED = 3
 """Number of rows in which names are stacked if they would overlap."""
@@ -71,7 +71,7 @@ class Film:
     steps : sequence of PrimitiveStep
         The primitives, for the plan strip.
     titles : mapping of path to text
-        Captions of steps by their position in the plan's tree. Steps above the primitives are shown only if they have a
+        Captions of steps, by the path of the step in the plan's tree. Steps above the primitives are shown only if they have a
         caption.
     camera : Camera, optional
         By default, a camera that shows the table in pictures of `width` by `height` pixels, both divisible by 16. If the

@@ -121,7 +121,7 @@ class LiveWorld:
         self.stopping = bool(self.concerned)
 
     def take_stock(self) -> None:
-        """Take the present postures and grasps as the reference for later checks after a failure.
+        """After a failure, take the present postures and grasps as the reference for later checks.
 
         The present posture of a blocked arm becomes its command, so that the arm stops pressing. The present grasp of a held
         object becomes the reference from which slip is measured.

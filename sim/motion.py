@@ -26,7 +26,7 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 """Maximum distance between checked poses of a path (metres, radians)."""
 
 COARSE = 6
-"""Interval of the samples of a path that are checked before all other samples, which rejects most blocked paths early."""
+"""Interval between the samples of a path that are checked first; checking these samples first rejects most blocked paths early."""
 
 JUMP = 0.35
 """Maximum motion in radians of a joint between neighbouring poses of a path; a larger motion indicates a singularity."""
@@ -272,7 +272,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree along the free part of the line to `target`, with `greedy` without a limit; return the new pose or None."""
+    """Extend a tree along the free part of the line to `target`, if `greedy` as far as possible; return the new pose or None."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:

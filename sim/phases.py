@@ -53,10 +53,13 @@ ANCHORS = 8
 ASIDE = sorted(
     product((0.0, -0.08), (0.0, -0.1, 0.1, -0.2, 0.2), (0.0, 0.1, 0.2)), key=lambda shift: sum(map(abs, shift))
 )
-"""Shifts in metres of the home pose, which are tried in turn, the smallest first."""
+"""Shifts in metres of the home pose; the shifts are tried one after another, the smallest first."""
 
 SLACK = 0.1
-"""Margin in radians to the limits of the arm's joints in the plan of a joint's path, which leaves room for corrections."""
+"""Margin in radians between the arm's joints and their limits in the plan of a joint's path.
+
+The margin leaves room for corrections.
+"""
 
 TURNED = 0.02
 """Margin in radians to the limits of the arm's joints if noise or a narrow grasp may require corrections."""
@@ -185,7 +188,7 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
 
 
 def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
-    """Return, for each joint value, the poses (n, 6) of hands that hold a feature while the feature's joint moves there.
+    """Return, for each joint value, the poses (n, 6) of hands that hold a feature while the feature's joint moves to this value.
 
     The hand keeps its pose in the feature's frame, except that the hand may turn about the feature's z axis.
     """
@@ -388,4 +391,4 @@ CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
     "place": lambda run: run.roles.get("target", "") in run.world.embodiment.places,
     "thing": lambda run: run.roles.get("target", "") not in run.world.embodiment.places,
 }
-"""Conditions for the execution of a phase, on the load at the beginning of the skill and on the skill's target."""
+"""Conditions for the execution of a phase; they concern the load at the beginning of the skill, or the skill's target."""

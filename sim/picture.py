@@ -394,7 +394,7 @@ def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, bas
 
 
 def _walls(origin: Array, rays: Array, heights: Array, radii: Array) -> tuple[Array, Array]:
-    """Return the distances at which rays first enter and last leave a surface of revolution; a ray that misses has infinity."""
+    """Return the distances at which rays first enter and last leave a surface of revolution; infinity for rays that miss it."""
     near, far = np.full(rays.shape[:2], np.inf), np.full(rays.shape[:2], -np.inf)
     for (h0, r0), (h1, r1) in pairwise(zip(heights, radii, strict=True)):
         slope = (r1 - r0) / (h1 - h0)

@@ -26,10 +26,10 @@ SIDES = (1.0, -1.0)
 """Directions of roll: to the right and to the left of the hand."""
 
 FOLD = 0.1
-"""Margin in radians to the stretched arm, kept if possible, since the load slips a little on the way."""
+"""Margin in radians to the stretched arm, since the load slips a little on the way; the margin is kept only if possible."""
 
 SHARES = (1.0, 0.95, 0.9, 0.8)
-"""Shares, tried in turn, of the shift that keeps the lip in place while a hand rolls back."""
+"""A shift of the hand keeps the lip in place while the hand rolls back; these shares of the shift are tried in turn."""
 
 MOST_STEPS = 2400
 """Maximum number of simulation steps of one roll."""

@@ -1,10 +1,10 @@
 """The places within reach of each hand, computed from the geometry of URDF, furniture and shapes, without a physics engine.
 
-Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose for every such
-height, except for heights at which no hand takes anything from any such place. Approach, grasp and lift must be within the
-joints' limits, and free of contact with furniture and the robot's trunk. Below an obstacle, a hand lifts an object less
-high. A place on a movable body is reached if the place is reached while the body is at some place. Physics finds whether the
-hand reaches the place while the body is at its present place.
+Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose at each of these
+heights; heights at which no hand reaches any place of the same kind don't count. Approach, grasp and lift must be within the
+joints' limits, and free of contact with furniture and the robot's trunk. Below an obstacle, a hand lifts an object less high. A
+place on a movable body is reached if the place is reached while the body is at some place. Physics finds whether the hand
+reaches the place while the body is at its present place.
 """
 
 from __future__ import annotations

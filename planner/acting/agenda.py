@@ -21,8 +21,8 @@ class Agenda:
     begun : mapping of path to State
         The situation before each step in progress.
     sound : bool
-        Whether the steps in progress could also have begun in a situation with the facts that were observed after the
-        steps began.
+        Whether the steps in progress would still have been applicable at their begin if the facts observed since then had
+        already held.
     """
 
     planned_for: Problem
@@ -65,7 +65,7 @@ class Postponed:
     aside : mapping of Symbol to (value, Reason)
         Goals that are impossible in the present situation.
     put_off : mapping of Symbol to (value, Reason)
-        Goals that are unreachable while doubts hold.
+        Goals that are unreachable without the facts in doubt.
     """
 
     aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)

@@ -71,12 +71,12 @@ def act(
     interventions : sequence of Intervention
         The interventions by people during the episode.
     planner : callable, optional
-        Plans from scratch, from a situation of rest; the default planner if left out.
+        Function that plans from scratch, from a situation in which all hands are at rest; the default planner if left out.
     retry_policy : RetryPolicy
     observer : callable, optional
-        Called with every `Event`.
+        Function that is called with every `Event`.
     repairs : bool
-        False replans from scratch instead of repairing.
+        If false, the executive plans from scratch instead of repairing the plan.
     caution : Caution, optional
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
 
@@ -242,7 +242,7 @@ class _Run:
         return chain, before, verdict
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
-        """Return whether at least one expected change is perceptible and no such change was perceived."""
+        """Return whether some of the expected changes are perceptible, but none of them was perceived."""
         found = [
             seen.get(fact.symbol, FALSE) == fact.value
             for fact in changes
@@ -421,7 +421,7 @@ class _Run:
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
 
     def make_room(self) -> bool:
-        """Ask the world, once, for spots besides the scene's places; return whether the world has any."""
+        """Ask the world once for free spots outside the scene's places; return whether there are any."""
         if self.retries.room_wanted:
             return False
         self.retries.room_wanted = True
@@ -434,7 +434,7 @@ class _Run:
         return bool(spots)
 
     def give_up(self, reason: Reason, status: End = End.GAVE_UP) -> None:
-        """Drop all goals, so that only rest values remain to be restored; end the episode if all goals were dropped before."""
+        """Drop all goals, so that the planner only restores rest values; if there were no goals left, end the episode."""
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status

@@ -83,7 +83,7 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
 def refuted_by(
     problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
 ) -> tuple[Refutation, ...]:
-    """Return the refutations by a failed primitive: the primitive and its ancestors are impossible under some facts.
+    """Return the refutations by a failed primitive: the primitive and its ancestors are impossible while some facts hold.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def refuted_by(
         level sees all of these facts.
     why : str
     likewise : sequence of Refutation
-        Primitives refuted for the same reason, for any hand. An ancestor is refuted if no other behaviour has its
+        Primitives that are refuted for the same reason, with any hand. An ancestor is refuted if no other behaviour has its
         effects. Refutations that `likewise` implies are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
@@ -115,7 +115,7 @@ def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield refutations of upper-level behaviours whose effect only the refuted behaviours `likewise` could make."""
+    """Yield refutations of upper-level behaviours whose effects can be made only by the refuted behaviours in `likewise`."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:

@@ -85,15 +85,15 @@ def repair_or_replan(
     planned : Problem
         The problem for which `rest` was planned: the expected situation, and the goal.
     planner : callable, optional
-        Plans from scratch, from a situation of rest; the default planner if left out.
+        Function that plans from scratch, from a situation in which all hands are at rest; the default planner if left out.
     using : Compiled, optional
-        From `confab.planner.hierarchical.planner.compiled`, for the same domain, individuals and static facts.
+        The result of `confab.planner.hierarchical.planner.compiled` for the same domain, individuals and static facts.
     in_progress : bool
         Whether the first step of `rest` may be finished as planned.
     limits : Limits
         Limits of the whole call, whether it repairs, replans, or does both.
     begun : bool
-        Whether the first step of `rest` has been begun: then it is finished although its level's precondition no longer holds.
+        Whether the first step of `rest` has begun; if so, the step is finished even if its own precondition no longer holds.
     """
     using, end = using or compiled(problem), limits.end()
     repaired = repair(problem, rest, planned, using, in_progress, limits, begun)

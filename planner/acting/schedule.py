@@ -47,7 +47,7 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     Raises
     ------
     ValueError
-        A primitive isn't applicable in the state before the primitive.
+        A primitive isn't applicable after the primitives before it.
     """
     states: list[State] = [problem.initial]
     writes: list[dict[Symbol, tuple[str | None, str]]] = []
@@ -93,12 +93,12 @@ def schedule(
     seconds_of : mapping of position to seconds, optional
         Duration of each primitive; one second by default.
     apart : callable
-        Returns whether there is room for two primitives at the same time.
+        Function of two primitives that returns whether there is room for both at the same time.
 
     Returns
     -------
     list of Slot
-        In the order of their beginnings.
+        The slots in the order of their begins.
     """
     seconds = {i: 1.0 if seconds_of is None else seconds_of[i] for i in range(len(primitives))}
     order = partial_order(problem, primitives)

@@ -161,7 +161,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Replace an individual as the value of a symbol by the individual's former place, or by the symbol's rest value."""
+    """Where an individual is the value of a symbol, put the individual's former place instead, or the symbol's rest value."""
     own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:

@@ -13,7 +13,7 @@ from confab.reasoner.symbols import Fact, Symbol
 
 
 def blocked(belief: Belief, fact: Fact, limits: Limits) -> Reason | None:
-    """Return the reason why a goal is unreachable, if only immovable objects block it, or None otherwise."""
+    """Return the reason why a goal is unreachable if only immovable objects block the goal; otherwise return None."""
     if not belief.obstacles:
         return None
     free = belief.without_obstacles({fact.symbol: fact.value})

@@ -166,7 +166,7 @@ def plan(
     mode : str
         ``strict``, ``guarded`` or ``leading``: the influence of experience.
     limits, using, improve, leave_levels
-        As for `confab.planner.hierarchical.planner.plan`.
+        The parameters of `confab.planner.hierarchical.planner.plan` with the same names.
 
     Returns
     -------

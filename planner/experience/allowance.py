@@ -9,7 +9,7 @@ from typing import TypeVar
 from confab.planner.hierarchical.workspace import Workspace
 
 WASTE, FREE = 10, 500_000
-"""Inverse of the share of expansions and effort that unsuccessful rules may use, and the effort credited before the call."""
+"""Inverse of the share of effort and of expansions that unsuccessful rules may use, and effort credited before the call."""
 Found = TypeVar("Found")
 
 
@@ -25,7 +25,7 @@ class Allowance:
     spent : int
         Effort of matching rules, in states times operators.
     wasted_effort : float
-        Effort of attempts that failed: of matching and of search.
+        Effort of failed attempts, for matching rules and for searches.
     wasted_expansions : int
         Expansions of failed attempts on the most abstract level.
     """

@@ -1,8 +1,8 @@
 """Choice among rule instances by cogency, which is learned from the facts of earlier choices and rejections.
 
-The facts about an individual in a role are generated from the domain: its classes that behaviours distinguish, its
-values and their goals, the objects whose value the individual is or should be, and its static relations to the other
-roles.
+The facts about an individual in a role are generated from the domain: the individual's classes that behaviours distinguish, its
+values and the goals for these values, the objects that have the individual as value or as goal value, and its static relations
+to the individuals in other roles.
 
 Cogency is eq. (1) of the paper in log odds: a rule contributes ln((c + ½)/(p + ½)) for c choices and p rejections or
 failures, and each fact contributes ln(p(fact | chosen)/p(fact | not)). An unseen fact contributes nothing; an unseen
@@ -113,7 +113,10 @@ class FactReader:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
-    """Return facts about the individuals in open roles of small classes: alone, and with each individual of the step."""
+    """Return the facts about each individual in an open role of a small class.
+
+    One fact is about the individual alone; further facts are about its pairs with the individuals of the step.
+    """
     found = list[Fact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:

@@ -53,7 +53,7 @@ class RulePolicy:
     joins : dict, optional
         Compiled rules of other calls of the same program; newly compiled rules are added.
     ranked : function of a method and individuals for its roles, optional
-        Returns the individuals in order of preference.
+        Function that returns the individuals in order of preference.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class RulePolicy:
         return self.allowance.ready()
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if no rule is for the goal."""
+        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if there is no rule for the goal."""
         goal = cell, self.call.goal[cell]
 
         def fewest() -> int:
@@ -345,8 +345,8 @@ class RulePolicy:
     def achieve_jointly(self, level: int, goals: Sequence[Goal]) -> Steps | None:
         """Achieve the conditions of the last steps of all goals first, then apply the last steps; return the steps.
 
-        This method is for goals that make each other unreachable. No individual is consumed by the rule instances of two goals.
-        On failure, the method returns None and may leave the table changed.
+        This method is for goals that make each other unreachable. The rule instances of two goals never consume the same
+        individual. On failure, the method returns None and may leave the table changed.
         """
         chosen, steps = list[tuple[Goal, RuleInstance]](), list[RefinedStep]()
         try:

@@ -296,7 +296,8 @@ class Instances:
     def undone(self, level: int, instance: RuleInstance) -> int:
         """Return the number of achieved goals that the step of a rule instance undoes.
 
-        For an instance with unmet conditions, return the number of goals that are undone by conditions with a single goal.
+        For an instance with unmet conditions, return the number of achieved goals that are undone by achieving those unmet
+        conditions that have a single goal.
         """
         if instance.unmet:
             alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)

@@ -123,7 +123,7 @@ def live(
 
 
 def grounds(steps: Sequence[Step]) -> list[Ground]:
-    """Return each step as the name of its behaviour and its arguments, also each of steps that are refined together."""
+    """Return the behaviour name and the arguments of each step; each of several steps that are refined together is listed."""
     return [(one.behavior, one.arguments) for step in steps for one in step.together]
 
 
@@ -226,7 +226,7 @@ def rules_and_methods(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
 def refined(call: Call, steps: Iterable[Step]) -> Lesson:
     """Apply steps; return, for each refined step, the method, the individuals in the method's roles, and the rules.
 
-    The refinement of several steps together is no method and no rule of any of them.
+    The joint refinement of several steps yields neither a method nor a rule for any of these steps.
     """
     lesson = Lesson()
     for step in steps:
@@ -317,7 +317,7 @@ def chosen(
 ) -> Lesson:
     """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules.
 
-    Steps that are refined together are chosen one after another in what their level sees.
+    If steps are refined together, the changes that each step states are applied before the choice of the next step.
     """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call, also=rules)

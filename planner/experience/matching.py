@@ -143,7 +143,7 @@ class _Join:
         return found + self.ready() + self.ahead(role)
 
     def ahead(self, role: str) -> list[str]:
-        """Return tests that the static relations of a role's individual have candidates for roles that aren't bound yet."""
+        """Return tests that unbound roles still have candidates, according to the static relations of a role's individual."""
         found = []
         for c in self.hard:
             if isinstance(c, RelationCondition) and not c.negated and role in c.arguments:

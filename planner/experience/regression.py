@@ -6,10 +6,10 @@ step; the step's preconditions then replace this condition. Each needed change o
 for the step. In a rule, individuals that no behaviour names become roles; a role has the narrowest class that a condition
 requires.
 
-Goal regression is due to Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977). Lifted rules
-are learned in a similar way by Moose (Chen et al., AAAI 2026). In this module, each rule stands for one causal link;
-chains of rules cover longer plans. A condition with a quantifier or alternatives is replaced by the condition of the individual
-or the alternative that held. The plan checker evaluates all conditions (`confab.planner.validation`).
+Goal regression is due to Waldinger, "Achieving several goals simultaneously", Machine Intelligence 8 (1977). Lifted rules are
+learned in a similar way by Moose (Chen et al., AAAI 2026). In this module, each rule stands for one causal link; chains of
+rules cover longer plans. A quantified condition is replaced by the conditions of the individual that satisfied it, and a
+disjunction by the alternative that held. The plan checker evaluates all conditions (`confab.planner.validation`).
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ class PlanTrace:
         tries = BINDINGS
 
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
-            """Return the conditions of a derivation of `c`, each with whether the condition holds before the step.
+            """Return the conditions of a derivation of `c`, each with a flag: whether the condition holds before the step.
 
             Return None if every derivation is circular.
             """
@@ -375,7 +375,7 @@ class PlanTrace:
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
-    """Return the classes of all variables, and conditions in which the conditions of a positive witness replace the witness."""
+    """Return the classes of all variables, and the conditions; a positive `Witness` is replaced by the conditions inside of it."""
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:

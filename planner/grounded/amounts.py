@@ -230,9 +230,9 @@ class Amounts:
     bits : mapping of (difference, sign) to bit
         The bit is set if the difference is ``>=``, ``>`` or ``=`` 0.
     size : int
-        Number of bits of a state below the number of its tuple.
+        Number of bits of a state for facts and comparisons; the number of the tuple is stored above these bits.
     moves : function of an operator
-        Returns the changes of amounts that the operator makes.
+        Function that returns the changes of amounts that the operator makes.
     """
 
     symbols: Sequence[Symbol]

@@ -58,7 +58,10 @@ class Derived:
 
     @cached_property
     def effort(self) -> int:
-        """Maximum number of alternatives examined after a change; parts of one bit count only if arrays are faster."""
+        """Maximum number of alternatives examined after a change.
+
+        Parts of a single bit count only if arrays can replace the examination.
+        """
         return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 
     def completed(self, state: int) -> int:

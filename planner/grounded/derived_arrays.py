@@ -120,7 +120,7 @@ def _numbers(mask: int) -> list[int]:
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
-    """Return, for each row, whether all bits are set; columns after the first column may contain only the first rows."""
+    """Return, for each row, whether all its bits are set; all columns but the first may end before the last row."""
     found: Flags = flags[columns[0]]
     for column in columns[1:]:
         found[: len(column)] &= flags[column]

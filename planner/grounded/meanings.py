@@ -136,7 +136,7 @@ def _meaning(
 
 
 def expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
-    """Return the pairs of a row and a bit in which the bits of its meaning replace each bit."""
+    """Return pairs of a row and a bit; each bit is replaced by the bits of its meaning."""
     counts = np.diff(means.starts)[bit]
     return np.repeat(row, counts), means.items[ranges(means.starts[bit], counts)]
 

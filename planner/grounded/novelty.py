@@ -1,10 +1,10 @@
 """The search order by novelty: states with a new fact come first.
 
-An open goal is a goal that doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The
-distance of a state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the
-last relaxed plan. A new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact
-that no earlier state with the same distance had. The test for novelty is one operation on two integers. The open list
-is sorted by novelty, then by the number of open goals and landmarks. Among equal states, the newest state comes first.
+An open goal is a goal that doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The distance
+of a state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed
+plan. A new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier
+state with the same distance had. The test for novelty is one operation on two integers. The open list is sorted by novelty,
+then by the number of open goals and landmarks. Among states of the same rank, the newest state comes first.
 
 Relaxed plans are computed only for expanded states that reach an open goal or landmark. Therefore the order ranks a hundred
 thousand states per second. The order drops only states from which the goal is unreachable. If the open list is empty, there is
@@ -26,7 +26,8 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import Counts
 
 CHILD, VISIT = 20, 2
-"""Time to make a successor, and time to visit a node of the successor tree, in bits that h_FF processes in this time."""
+"""Time to make a successor, and time to visit a node of the successor tree; the unit is the time in which h_FF processes one bit.
+"""
 
 
 class Progress(NamedTuple):

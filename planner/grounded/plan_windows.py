@@ -36,7 +36,8 @@ from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
 STATES, STEPS = 400, 12
-"""Maximum number of states, and of steps of the given plan, for the search for a cheapest plan before windows are tried."""
+"""Before windows are tried, a cheapest plan is searched with at most `STATES` states, if the given plan has at most `STEPS` steps.
+"""
 WAYS = 20
 """Number of alternatives of derived bits that are processed in the time of one operator."""
 SIZES = (8, 16, 32, 64)
@@ -44,7 +45,7 @@ SIZES = (8, 16, 32, 64)
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
 """Limits of the search of a window: the number of operators, and the minimum number of evaluations of h_FF.
 
-The search may use one evaluation for each `SHARE` of the work if this allows more evaluations.
+If the work divided by `SHARE` is greater than this minimum, the search may use that number of evaluations.
 """
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""

@@ -87,7 +87,7 @@ def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:
     starts, items : array of int
         Operator `i` requires the bits ``items[starts[i]:starts[i + 1]]``.
     masks : sequence of int
-        The masks of all bits of a symbol, one for each bit.
+        For each bit, the mask of all bits of the same symbol.
     """
     numbers = {mask: i for i, mask in enumerate(dict.fromkeys(masks))}
     symbol_of = np.array([numbers[mask] for mask in masks], np.int64)

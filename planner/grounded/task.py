@@ -92,9 +92,9 @@ class Task:
     derived : Derived
         The bits that are derived from other bits.
     change : function of an operator
-        Returns the operator's precondition and changes, in order of execution.
+        Function that returns the operator's precondition and changes, in order of execution.
     describe : function of an operator
-        Returns the operator's behaviour, arguments and bindings.
+        Function that returns the operator's behaviour, arguments and bindings.
     amounts : Amounts, optional
         The amounts of the task, or None if no operator changes an amount.
     prices : mapping of operator to Linear

@@ -1,9 +1,9 @@
 """The agenda: the planner achieves the goals one after another on one table and keeps the achieved goals.
 
-open:    goals that the planner tries to achieve in one step of the most abstract level.
-asleep:  blocked goals; a goal wakes when a symbol changes for which the goal waits.
-kept:    achieved goals; later steps may violate achieved goals temporarily, but must restore the goals.
-before:  ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is filled).
+open: goals that the planner tries to achieve in one step of the most abstract level. asleep: blocked goals; a goal wakes when a
+symbol that it waits for changes. kept: achieved goals; later steps may violate achieved goals temporarily, but must restore the
+goals. before: ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is
+filled).
 
 If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed
 attempt is repeated only after a symbol on which the goal depends has changed. Each step is refined and applied as soon
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""The effort of the searches before the lowest level is tested for unsolvability, in examined states of this level."""
+"""Effort of the searches after which the lowest level is tested for unsolvability, as a number of examined states of this level."""
 
 
 @dataclass
@@ -221,7 +221,7 @@ class Agenda:
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
 
     def advised(self, cell: Cell) -> bool:
-        """Achieve a goal by untried advice; return whether that succeeded."""
+        """Achieve a goal by advice that wasn't tried before; return whether that succeeded."""
         call, attempt = self.call, (self.call.program.levels[0], BY_RULES)
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
@@ -255,8 +255,8 @@ class Agenda:
     def restart(self, level: int) -> bool:
         """Achieve all goals together from the initial state, after a dead end; return whether that succeeded.
 
-        On failure, restore the previous steps. During the restart, refinements preferably leave symbols unchanged that no upper
-        level sees. Otherwise a goal could become unreachable without a visible change on an upper level.
+        On failure, restore the previous steps. During the restart, refinements avoid changes of symbols that no upper level
+        sees. Otherwise a goal could become unreachable without a visible change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
         if not call.steps or self.forward or level != call.program.levels[0]:

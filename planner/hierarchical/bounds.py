@@ -81,7 +81,9 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Return the outcome with a shortened plan: first by other orders of the goals with increasing work, then by windows.
+    """Return the outcome with a shortened plan.
+
+    First the goals are planned in other orders with increasing work; then cheaper steps replace consecutive steps.
 
     Shortening uses at most half of the time.
     """

@@ -46,7 +46,7 @@ class GoalAdvice(Advice, Protocol):
         """Return whether the effort wasted by rules is within its limit."""
 
     def rank(self, cell: Cell) -> int:
-        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if no rule is for the goal."""
+        """Return 1 if one step of a rule achieves a goal, 2 if rules need several steps, and 0 if there is no rule for the goal."""
 
     def waits(self, cell: Cell) -> bool:
         """Return whether another open goal should be achieved first."""
@@ -86,7 +86,7 @@ class Call:
         self.bound: float | None = None
         """A lower bound on the cost of every plan, if the primitives have different costs."""
         self.settled = False
-        """Whether the planner has tried to bring the symbols to rest that aren't at rest in the initial state."""
+        """Whether the planner has tried to bring to rest the symbols that aren't at rest in the initial state."""
 
     def advise(self, advice: GoalAdvice) -> None:
         """Set the advice that the planner follows before any search for goals and refinements."""

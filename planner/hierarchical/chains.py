@@ -21,7 +21,7 @@ from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE
 
 Barred: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
-"""A quantified behaviour, and the state in which the behaviour is barred, as the changes since the start."""
+"""A quantified behaviour that is barred in a state; the state is given by the changes since the start."""
 MOST_EXPANSIONS = 150
 """Maximum number of expansions of one search for a few steps."""
 

@@ -95,9 +95,9 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return the latest steps, up to `last`, that all changed the symbols of `last` only, and together restored the old values.
+    """Return the latest steps that change exactly the symbols that `last` changes, and that together restore the old values.
 
-    Return an empty list if there are no such steps.
+    The result ends with `last`; it is empty if there are no such steps.
     """
     cells = last.changes[0].keys()
     its = [latest[cell] for cell in cells]

@@ -76,7 +76,7 @@ class BoundProgram:
 
 
 FEW = 8
-"""Maximum number of candidates that are all tried; of more candidates, one candidate of each symmetry class is tried."""
+"""Maximum number of candidates that are all tried; if there are more, one candidate of each symmetry class is tried."""
 
 
 class Program:
@@ -293,7 +293,7 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an expression for the candidates of a term; of many candidates, a free candidate of each symmetry class."""
+        """Return an expression for the candidates of a term; of many candidates, it yields a free one of each symmetry class."""
         taken = next((identifier("holders", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 

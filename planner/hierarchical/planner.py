@@ -43,7 +43,7 @@ The maximum work corresponds to a few seconds.
 FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
 TRIALS = 1_000_000
-"""Maximum number of times that a behaviour is tried in a state of a level that can't be grounded."""
+"""If a level can't be grounded, maximum number of trials; a trial is a test whether one behaviour is applicable in one state."""
 NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
 """Share of the time limit that is used for search; the other time is for releasing memory."""
@@ -135,7 +135,7 @@ def _plan(
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
-    """Search the lowest level as a whole; give up if levels must not be left or the level is too large."""
+    """Search the lowest level as a whole; give up if `leave_levels` is false, or if the level is too large."""
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
     if upper and not leave_levels:
@@ -159,7 +159,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
 
 
 def step_by_step(call: Call, limits: Limits, why: str) -> Outcome:
-    """Search the lowest level as in the paper's mode, which evaluates any calculation in each state; `why` it isn't grounded.
+    """Search the lowest level like the paper's mode, which needs no grounding; `why` is the reason why the level isn't grounded.
 
     The number of states is bounded, because each behaviour is tried in each state.
     """

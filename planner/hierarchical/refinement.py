@@ -34,7 +34,7 @@ ATTEMPTS, FEW_ATTEMPTS = 40, 4
 class RefinedStep(NamedTuple):
     """An applied step; `bindings` are the individuals of its variables, and `steps` are its refinement.
 
-    `joined` are further steps, without sub-steps, that `steps` refine together with this step.
+    `joined` are further steps that `steps` refine together with this step; they have no sub-steps of their own.
     """
 
     level: int
@@ -94,7 +94,7 @@ class Refiner:
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
         """The known refinements, by task and state; a refinement is replayed if the same task occurs in the same state."""
         self.careful = False
-        """Whether refinements preferably leave symbols unchanged that the level above doesn't see."""
+        """Whether refinements avoid changes of symbols that the level above doesn't see."""
         self.hasty = False
         """Whether refinements are searched only in small scopes."""
         self.advice: Advice | None = None
@@ -145,7 +145,7 @@ class Refiner:
         level : int
         targets : mapping of cell to value
         keep : function of a cell and its first value
-            Returns the required final value of the cell, or None if any value is allowed.
+            Function that returns the required final value of the cell, or None if any value is allowed.
         budgets : sequence of SearchBudget
             Budgets that are tried one after another.
         task : RefinementTask, optional

@@ -1,7 +1,7 @@
 """Regrouping: runs of steps of one level become refinements of upper-level steps with the same effect.
 
-A run with the effect of no single step of the level above becomes the refinement of several steps together (docs/levels.md). Each
-of these steps takes place in the run: in some state of the run, all facts that the step makes true hold.
+If a run doesn't have the effect of any single step of the level above, it becomes the joint refinement of several steps
+(docs/levels.md). Each of these steps takes place in the run: in some state of the run, all facts that the step makes true hold.
 """
 
 from __future__ import annotations
@@ -21,14 +21,17 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import FALSE, Behavior, Problem, ValueEffect
 
 Seen: TypeAlias = "tuple[str, ...]"
-"""The values that a level sees of the changed symbols; a value that the level doesn't see is empty."""
+"""The values of the changed symbols as a level sees them; a value that the level doesn't see is replaced by an empty text."""
 
 LONGEST = 60
 """Maximum number of steps that are grouped under one step of the level above."""
 WORK = 100_000
-"""Maximum number of steps that are tried when steps that are refined together are searched for the steps of a plan."""
+"""Maximum number of steps that are tried in the search for several upper-level steps that a run refines together."""
 MOST_FILLED = 1_000
-"""Maximum number of steps that are tried for one fact, one for each choice of individuals that the fact doesn't determine."""
+"""Maximum number of instances of a behaviour that are tried for one fact.
+
+The instances differ in the individuals that the fact doesn't determine.
+"""
 
 
 def under_the_levels_above(problem: Problem, plan: Plan, using: Compiled | None = None) -> Plan:
@@ -103,7 +106,8 @@ class _Course:
         all changed symbols that the level doesn't see are at rest.
         """
         seen, resting, end = self.seen, self.resting, len(self.steps)
-        groups: dict[tuple[int, int], list[Ground]] = {}  # the steps of the level above the steps between two positions
+        # for two positions, the steps of the upper level under which the steps between the positions are grouped
+        groups: dict[tuple[int, int], list[Ground]] = {}
         for i in resting:
             self.enter(i)
             last = min(i + LONGEST, end)
@@ -125,7 +129,7 @@ class _Course:
         return [self.node(i, j, groups.get((i, j))) for i, j in best]
 
     def node(self, begin: int, end: int, grounds: Sequence[Ground] | None) -> Step:
-        """Return the step, or the steps that are refined together, above the steps between two positions."""
+        """Return the upper-level step, or the steps that are refined together, that group the steps between two positions."""
         if grounds is None:
             return self.steps[begin]
         self.enter(begin)
@@ -141,7 +145,8 @@ class _Course:
     def leading(self, begin: int, end: int, left: int) -> tuple[list[Ground], int]:
         """Return steps of the level that lead from one position to another, and the remaining work.
 
-        The search prefers states with few wrong values, and then the order of the course. If it fails, return no steps.
+        The search prefers states with few wrong values; among these, it prefers states in the order in which the given steps
+        make their facts true. If the search fails, return no steps.
         """
         course, candidates = self.seen[begin : end + 1], self.candidates(begin, end)
         first, last = course[0], course[-1]
@@ -198,7 +203,7 @@ class _Course:
             self.table.put_all({cell: seen[i] for cell, i in self.place.items() if seen[i] != there[i]})
 
     def successors(self, candidates: Iterable[Ground]) -> Iterator[tuple[Ground, Seen]]:
-        """Yield the applicable candidates, each with what the level sees after it.
+        """Yield the applicable candidates, each with the values that the level sees afterwards.
 
         Candidates that change a symbol that the steps don't change are left out.
         """
@@ -219,7 +224,7 @@ class _Course:
                 yield (name, arguments), tuple(after)
 
     def candidates(self, begin: int, end: int) -> list[Ground]:
-        """Return the steps of the level that could make a fact true that becomes true between two positions."""
+        """For all facts that become true between two positions, return the steps of the level that could make one of them true."""
         found = dict[Ground, None]()
         facts = dict[tuple[Cell, str], None]()
         for before, after in zip(self.seen[begin:end], self.seen[begin + 1 : end + 1], strict=True):
@@ -257,7 +262,8 @@ class _Course:
 def _fewest(groups: Mapping[tuple[int, int], Sequence[Ground]], length: int) -> list[tuple[int, int]]:
     """Return a division of steps into groups and single steps, each as its begin and its end.
 
-    As few steps as possible are single; then the groups have as few upper steps as possible, in as many groups as possible.
+    The division has as few single steps as possible; among such divisions, it has the fewest upper-level steps, and then the
+    most groups.
     """
     best: list[tuple[int, int, int, int]] = [
         (0, 0, 0, 0)

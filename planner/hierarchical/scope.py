@@ -1,9 +1,9 @@
 """A scope: a part of the world that is grounded and searched on one level if no short chain of relevant steps suffices.
 
-The individuals in *focus* occur in the targets, or in chains towards the targets. Steps involve only individuals in
-focus. *Frozen* individuals have a fixed state. The values of individuals in focus are frozen, and the individuals that
-conditions quantify over. Because of the frozen individuals, quantified conditions have the same truth value as in the
-whole world.
+The individuals in *focus* occur in the targets, or in chains towards the targets. Steps involve only individuals in focus.
+*Frozen* individuals have a fixed state. The frozen individuals are the values of individuals in focus, and the individuals over
+which conditions quantify. Because of the frozen individuals, quantified conditions have the same truth value as in the whole
+world.
 
 The state of the individuals in focus is exact. Therefore the steps of a successful search are applicable in the whole world. A
 failed search proves nothing. The caller refines the steps, and bars steps that have no refinement. The grounding package is

@@ -64,7 +64,7 @@ class SymmetryClasses:
         return found
 
     def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
-        """Return the known members, and an additional member for each other state of a member in the same symmetry class.
+        """Return the known members, and further members that differ in their state from all known members of their symmetry class.
 
         In a large class, only a few members at both ends are examined, because the planner assigns values from one end.
         """

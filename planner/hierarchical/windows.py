@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""Number of level-1 steps that a shortened plan may lose for each saved primitive of mean cost; the plan must lose
-fewer steps."""
+"""For each saved primitive of mean cost, a shortened plan must lose fewer level-1 steps than this number."""
 KEPT = 1.5
 """Factor by which the cost must decrease if primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
@@ -151,6 +150,7 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
 def broken(problem: Problem, plan: Plan) -> int:
     """Return the number of changes of a plan that violate a condition of an upper level.
 
-    A change by steps that several steps of a level refine together also violates a condition if the level couldn't make it.
+    A change in the joint refinement of several steps also violates a condition if no single behaviour of their level could make
+    the change.
     """
     return sum(len(left.broken) for left in levels_left(problem, Plan(renumbered(separated(plan.steps)))))

@@ -52,7 +52,7 @@ class Workspace:
     most_work : float
         Maximum work in scopes, in states times operators; `LimitError` is raised above this work.
     brief : bool
-        Whether the plan is shortened with little work, or with a time limit not at all.
+        Whether the plan is shortened only with little work, and not at all if there is a time limit.
     dead_end_check : function
         Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
     """

@@ -71,7 +71,7 @@ def reinforce(
     state : State
         The situation in which the behaviour was chosen; the paper doesn't specify the state.
     problem : Problem
-        Defines the values that each symbol can have.
+        The problem, which defines the values that each symbol can have.
     level : int
         The behaviour's level; the situation excludes symbols and values of lower levels.
     learning : float

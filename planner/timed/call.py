@@ -193,7 +193,7 @@ def _written(window: tuple[Fraction, Fraction | None]) -> str:
 
 
 def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dict[str, str]]:
-    """Return the new name of each actor whose turn another actor takes, by the number of the activity."""
+    """For each activity, return the new names of the actors that other actors replace."""
     renamed: dict[int, dict[str, str]] = {}
     for resource, line in enumerate(turns):
         for own, number in line:

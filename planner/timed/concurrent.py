@@ -1,15 +1,14 @@
 """Plans that require concurrency: the begins and the ends of steps are operators of a grounded task.
 
-Some behaviours give a symbol a value only during their execution. The planner cuts a behaviour of this kind into a
-begin and an end. Other behaviours are cut only if the planner finds no plan without these cuts. A first search ignores
-durations, and its plan is scheduled. If the plan has no schedule, a second search keeps a simple temporal network of
-events. The network contains the events since the last time at which no step was running (the *window*). The second
-search drops nodes in which a step can't end in time. The heuristic is the length of a relaxed plan plus the number of
-running steps.
+Some behaviours give a symbol a value only during their execution. The planner splits a behaviour of this kind into a begin and
+an end. Other behaviours are split only if the planner finds no plan without these splits. A first search ignores durations, and
+its plan is scheduled. If the plan has no schedule, a second search keeps a simple temporal network of events. The network
+contains the events since the last time at which no step was running (the *window*). The second search drops nodes in which a
+step can't end in time. The heuristic is the length of a relaxed plan plus the number of running steps.
 
-The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The distinction
-of behaviours that need no cut follows Coles et al., "Extending the use of inference in temporal planning as forwards search",
-ICAPS 2009.
+The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The
+distinction of behaviours that needn't be split follows Coles et al., "Extending the use of inference in temporal planning as
+forwards search", ICAPS 2009.
 """
 
 from __future__ import annotations
@@ -111,10 +110,10 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
 
 @dataclass(frozen=True)
 class _Cut:
-    """A problem in which some behaviours are cut into a begin and an end.
+    """A problem in which some behaviours are split into a begin and an end.
 
-    If `guarded`, a cut behaviour reserves the symbols that it requires throughout its duration. No other behaviour may change or
-    reserve a reserved symbol.
+    If `guarded`, a split behaviour reserves the symbols that it requires throughout its duration. No other behaviour may change
+    or reserve a reserved symbol.
     """
 
     whole: Problem
@@ -123,7 +122,7 @@ class _Cut:
 
     @cached_property
     def problem(self) -> Problem:
-        """The problem with begins and ends instead of the cut behaviours."""
+        """The problem in which begins and ends replace the split behaviours."""
         domain = self.whole.domain
         situations, behaviors = dict(domain.situations), dict[str, Behavior]()
         for name, behavior in domain.behaviors.items():
@@ -144,7 +143,7 @@ class _Cut:
         return replace(self.whole, domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}))
 
     def held(self) -> frozenset[str]:
-        """Return the situation types that cut behaviours require throughout and that other behaviours change."""
+        """Return the situation types that split behaviours require throughout and that other behaviours change."""
         behaviors = self.whole.domain.behaviors
         return frozenset(
             situation
@@ -161,7 +160,7 @@ class _Cut:
     def guard(self, behavior: Behavior) -> Behavior:
         """Return a behaviour with additional preconditions, so that it changes no reserved symbol.
 
-        The begin of a cut behaviour reserves symbols, and the end of the behaviour releases these symbols.
+        The begin of a split behaviour reserves symbols, and the end of the behaviour releases these symbols.
         """
         name, _, part = behavior.name.partition("@")
         held = self.held()
@@ -245,7 +244,7 @@ class _Node:
 
 @dataclass
 class _Finder:
-    """The search for sequences of operators of a cut task."""
+    """The search for sequences of operators of a task with split behaviours."""
 
     cut: _Cut
     task: Task
@@ -292,7 +291,7 @@ class _Finder:
             yield whole
 
     def ending(self, operator: int) -> int | None:
-        """Return the operator that ends a step which the given operator begins, or None if the step can't end."""
+        """Return the operator that ends the step begun by the given operator, or None if the step can't end."""
         name, arguments = self.named[operator]
         return self.end_of.get((name.partition("@")[0], arguments))
 
@@ -429,7 +428,7 @@ class _Finder:
         return self.accesses[operator]
 
     def bits(self, cells: Iterable[tuple[str, tuple[str, ...]]], terms: Mapping[str, str]) -> int:
-        """Return the mask of symbols in which the individuals in `terms` replace variables."""
+        """Return the mask of the given symbols; in these symbols, the individuals in `terms` replace variables."""
         found = 0
         for situation, arguments in cells:
             cell = situation, tuple(terms.get(a, a) for a in arguments)

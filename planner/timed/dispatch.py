@@ -2,8 +2,9 @@
 
 A primitive begins when all events that its begin must follow have happened and a window allows it. So a delay shifts only the
 primitives that depend on the late one. The end of a primitive isn't controlled. If an end must follow another event, the
-primitive begins only if this order holds for all durations within the stated spread; otherwise it is held back. After each end
-at another time than expected, turns that haven't begun are exchanged to keep deadlines and to shorten the makespan.
+primitive begins only if this order holds for all durations within the stated spread; otherwise the primitive is held back. When
+a primitive ends earlier or later than expected, turns that haven't begun are exchanged to keep deadlines and to shorten the
+makespan.
 
 Networks whose durations are observed, not controlled, are described by Vidal and Fargier, "Handling contingency in temporal
 constraint networks", Journal of Experimental and Theoretical Artificial Intelligence 11 (1999).
@@ -102,7 +103,7 @@ class Dispatch:
         return [i for i in self.waiting if self._possible(i, time, safe) <= time]
 
     def wakes(self, now: Fraction) -> Fraction | None:
-        """Return the next time at which a primitive can begin although no primitive ends before, or None."""
+        """Return the next time at which a primitive can begin even if no primitive ends before that time, or None."""
         time = self._units(now)
         safe = self._safe(time)
         later = [at for i in self.waiting if time < (at := self._possible(i, time, safe)) < inf]
@@ -200,9 +201,11 @@ class Dispatch:
         return lasts, begins
 
     def _safe(self, time: int) -> Callable[[int], float]:
-        """Return a function from a primitive to the time from which on its end follows all events that it must follow.
+        """Return a function that maps a primitive to its earliest safe begin.
 
-        The time holds for all durations within the spread.
+        With a safe begin, the end follows all events that it must follow.
+
+        The begin is safe for all durations within the spread.
         """
         if self.controlled:
             return lambda i: 0
@@ -224,7 +227,7 @@ class Dispatch:
         return safe
 
     def _possible(self, i: int, time: int, safe: Callable[[int], float]) -> float:
-        """Return the first time at which a primitive can begin if no primitive ends before; `inf` if there is none."""
+        """Return the first time at which a primitive can begin even if no primitive ends before; `inf` if there is none."""
         at = self.network.at[i]
         if at is not None:
             return max(at, time)
@@ -305,7 +308,7 @@ def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -
     dispatch : Dispatch
         A new execution.
     actual : callable
-        Returns the actual duration of a primitive from its number and its expected duration.
+        Function that returns the actual duration of a primitive, given the number of the primitive and its expected duration.
     """
     now, running = Fraction(0), list[tuple[Fraction, int]]()
     begins: dict[int, tuple[Fraction, Fraction]] = {}

@@ -102,7 +102,7 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
 def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
     """Return, for each actor, the other actors of the same classes whose symbols have the same initial values.
 
-    An actor in the goal has no alternatives.
+    An actor that the goal names has no alternatives.
     """
     actors = list(actors)
     kinds: dict[str, set[str]] = {

@@ -1,7 +1,7 @@
 """Schedules of activities: the order of the turns of each resource, the actor of each turn, and the begins of activities.
 
-The first schedule is greedy. Turns are taken in the order of the sequence, and the actor that is free first takes the turn. Then
-a tabu search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
+The first schedule is greedy. The turns are assigned in the order of the sequence, each to the actor that is free first. Then a
+tabu search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
 problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
 """
 

@@ -45,7 +45,7 @@ PLANNING, SCHEDULING = 2_500, 60
 BARREN = 150
 """Maximum number of successive changes without a better schedule."""
 BUSY = Fraction(103, 100)
-"""Ratio of the actors' total time to their total work up to which a schedule isn't improved further."""
+"""A schedule isn't improved further if the actors' total time is at most this number times their total work."""
 MOST_KNOWN = 4
 """Maximum number of known sequences of steps that are tried for a stretch."""
 MOST_COMPILED = 200
@@ -379,7 +379,7 @@ class _Search:
         return {s: v for s, v in self.problem.goal.items() if s in aims or s not in self._open}
 
     def asked(self, aim: Aim) -> State:
-        """Return the values that the step of an aim requires for symbols of its arguments."""
+        """Return the values that the step of an aim requires for the symbols of its arguments."""
         if isinstance(aim, Symbol):
             return {}
         behavior = self.problem.domain.behaviors[aim[0]]

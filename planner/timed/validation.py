@@ -58,7 +58,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """Facts that record the symbols that a condition reads, and the values whose holders a condition reads."""
+    """A view of facts that records which symbols a condition reads, and the values whose holders a condition reads."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -273,7 +273,7 @@ class _Clock:
     def in_the_end(self) -> Iterator[Fault]:
         """Yield a fault for each goal that isn't reached in time.
 
-        Also yield a fault for each symbol whose last change is by another step than in the sequence of the plan.
+        Also yield a fault for each symbol whose last change is made by a different step than in the sequential plan.
         """
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
