@@ -1,8 +1,8 @@
 """Regression: translation of a condition after a behaviour to an equivalent condition before the behaviour.
 
 For example, ``IN(parcel) = van`` holds after LOAD(?item, ?into) in two cases: the parcel is ?item and the van is ?into, or the
-parcel isn't ?item and is in the van before. Conditions in alternatives and witnesses are translated, too. Equalities of equal
-terms, or of terms without a common individual, are evaluated, so that the result may be true or false.
+parcel isn't ?item and is in the van before. Conditions in alternatives and witnesses are translated, too. An equality of two
+equal terms becomes true, and an equality of terms that can't denote the same individual becomes false.
 
 Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; extended to functional situation types and numeric effects.
 """
@@ -93,7 +93,7 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Return whether a condition may determine a variable, which the condition's negation would leave undetermined."""
+    """Return whether a condition may determine the value of a variable; the negation of the condition would not."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 

@@ -18,7 +18,7 @@ from typing import TypeAlias
 Number: TypeAlias = "Fraction | float"
 """A fraction, or `NOTHING`, which is the only allowed float."""
 NOTHING = float("nan")
-"""The amount of a symbol without an amount (NaN): calculations with NaN result in NaN, and comparisons with NaN are false."""
+"""Value NaN, which stands for a missing amount: calculations with NaN result in NaN, and comparisons with NaN are false."""
 
 
 LARGEST = 10**60
@@ -73,7 +73,7 @@ class Amount:
 
 @dataclass(frozen=True)
 class Measure:
-    """The number that a static relation, such as a distance, states for some individuals as the last element of a row."""
+    """The number that a static relation, such as a distance, assigns to some individuals; it is the last element of a row."""
 
     relation: str
     arguments: tuple[str, ...]
@@ -98,7 +98,7 @@ COMPARING: Mapping[str, Callable[[Number, Number], bool]] = {
     ">": operator.gt,
 }
 MORE, LESS = "more", "less"
-"""The direction in which an amount has to change to satisfy its goal."""
+"""The two directions in which an amount may have to change to satisfy its goal."""
 OPERATIONS = ("assign", "scale", "increase", "decrease")
 """Operations of effects on amounts, in the order in which the effects of one behaviour on one symbol are applied."""
 

@@ -6,17 +6,13 @@ condition also has ``:negated true``.
 ========================  =====================================================================
 class                     properties
 ========================  =====================================================================
-`:ValueCondition`         ``:situationType``, arguments, ``:value``
-`:RelationCondition`      ``:relation``, arguments; the last of several is the ``:value``
-`:ClassCondition`         ``:about``, ``:ofClass``
-`:EqualityCondition`      ``:about``, ``:value``
-`:Witness`                ``:witness`` (the variable), ``:condition`` for each condition
-`:AnyOf`                  ``:alternative`` for each condition or `:AllOf`
-`:AllOf`                  ``:condition`` for each condition
-`:Comparison`             ``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right``
-`:Calculation`            those of a comparison, or only an amount, or only ``:amount``
-`:ValueEffect`            those of a value condition, ``:when`` for each condition
-`:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
+`:ValueCondition`         ``:situationType``, arguments, ``:value`` `:RelationCondition`      ``:relation``, arguments; the last
+of several arguments is the ``:value`` `:ClassCondition`         ``:about``, ``:ofClass`` `:EqualityCondition`      ``:about``,
+``:value`` `:Witness`                ``:witness`` (the variable), ``:condition`` for each condition `:AnyOf`
+``:alternative`` for each condition or `:AllOf` `:AllOf`                  ``:condition`` for each condition `:Comparison`
+``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right`` `:Calculation`            those of a
+comparison, or only an amount, or only ``:amount`` `:ValueEffect`            those of a value condition, ``:when`` for each
+condition `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
 ========================  =====================================================================
 
 Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is stated by a situation type with its arguments, or by
@@ -59,7 +55,7 @@ LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
 """Properties whose values are other literals, with the datatypes."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
-"""Maximum depth of nested conditions and calculations; the conjunctions in a disjunction aren't counted."""
+"""Maximum depth of nested conditions and calculations. Conjunctions (`:AllOf`) aren't counted."""
 MOST_CONDITIONS = 10_000
 """Maximum number of conditions inside one condition; a condition is counted each time that it occurs."""
 DECIMALS = 30
@@ -285,8 +281,8 @@ def decimal_text(number: Fraction) -> str:
 class NodeReader:
     """Reader of conditions and numeric expressions from nodes.
 
-    `term` and `short` return the names of terms, classes, relations and situation types; subclasses implement both
-    functions and check the names.
+    Subclasses implement `term` and `short`, which return the names of terms, classes, relations and situation types, and check
+    these names.
 
     Attributes
     ----------
@@ -368,7 +364,7 @@ class NodeReader:
         return self.short(self.one(iri, "relation"))
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition that a term denotes a member of the class with an IRI."""
+        """Return the condition that a term denotes a member of the class with the IRI `kind`."""
         return ClassCondition(term, self.short(kind), negated)
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
@@ -376,7 +372,7 @@ class NodeReader:
         return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return the conjuncts of a conjunction or the alternatives of a disjunction in the order of the result."""
+        """Return the conjuncts of a conjunction, or the alternatives of a disjunction, in the order of the read condition."""
         return tuple(parts)
 
     def entered(self, iri: str, what: str) -> None:
@@ -402,7 +398,7 @@ class NodeReader:
         return found
 
     def read(self, iri: str) -> Condition:
-        """Return the condition of a declared node."""
+        """Return the condition of a node, according to the node's class."""
         negated = self.flag(iri, "negated")
         if self.is_a(iri, "ValueCondition"):
             return ValueCondition(*self.symbol(iri), negated)

@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
-    """Yield the situation types in conditions, each with a flag: whether the conditions depend on the type's negation.
+    """Yield the situation types in conditions, each with a flag that tells whether the conditions depend on the type's negation.
 
     >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
     [('FULL', True)]

@@ -29,14 +29,16 @@ PATIENCE = 600.0
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file atomically: readers see the old or the new content, even after a crash. Errors: see `written_whole`.
+    """Write a file atomically: readers see the old or the new content, even after a crash.
+
+    Raise the same errors as `written_whole`.
 
     Parameters
     ----------
     path : Path
     content : str, bytes or iterable of str
     check : callable, optional
-        Called with the path of the temporary file; if `check` raises an error, the old file is kept.
+        Function that is called with the path of the temporary file; if it raises an error, the old file is kept.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     if path == STDOUT:
@@ -97,7 +99,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
 
 
 def check_replaceable(path: Path, kind: str) -> None:
-    """Raise the errors that `written_whole` would raise for content of a kind, before the content is computed.
+    """Raise the errors that `written_whole` would raise for content of a kind; callers use this before they compute the content.
 
     Raises
     ------
@@ -136,7 +138,10 @@ def check_folder(path: Path) -> None:
 
 
 def made_folder(path: str | Path) -> Path:
-    """Create a folder, and the folder that contains it, unless both exist; return the path. Errors: see `check_folder`."""
+    """Create a folder, and the folder that contains it, unless both exist; return the path.
+
+    Raise the same errors as `check_folder`.
+    """
     check_folder(Path(path))
     Path(path).parent.mkdir(exist_ok=True)
     Path(path).mkdir(exist_ok=True)
@@ -172,7 +177,7 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Lock a file during a ``with`` block; other callers for files in the same folder wait.
+    """Lock a file during a ``with`` block; callers that lock another file in the same folder have to wait.
 
     The folder is locked, so that no lock file remains. Links are followed, so that all paths to a file share one lock. A warning is
     logged if the caller has to wait.

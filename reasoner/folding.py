@@ -34,7 +34,7 @@ class Folding:
     ----------
     classes : mapping of class to individuals
     kinds : mapping of term to class
-        The class of each variable that isn't bound by a witness.
+        The class of each variable, except variables that a witness binds.
     known : set of Condition
         Conditions that are true in the context.
     """

@@ -1,8 +1,8 @@
 """Generation of test scenes as ordinary ontology files from Turtle templates.
 
-A family is a Turtle file in ``ontology/families``. A line ``#* SECTION`` begins a block that is repeated for each row of the
-section; the row's values replace the words ``_WORD_``. This module names no class, situation type or behaviour of a domain; a
-template uses objects of a `first` and a `second` kind.
+A family is a Turtle file in ``ontology/families``. A line ``#* SECTION`` begins a block of text. The block is repeated for each
+row of the section, with the row's values in place of the words ``_WORD_``. This module names no class, situation type or
+behaviour of a domain: a template has objects of two kinds, `first` and `second`.
 
 ==============================  ========================================================================
 section                         words
@@ -16,8 +16,9 @@ section                         words
 ==============================  ========================================================================
 
 ``#* like NAME`` inserts the blocks of ``parts/NAME.ttl`` before the family's own blocks. ``#* placement NAME`` selects one of
-`PLACEMENTS`. The places form a grid of two rows: 1 … n near, n + 1 … 2 n far. Each hand reaches a strip of columns. The strips of
-neighbouring hands overlap by two thirds; each of two hands reaches three quarters of the columns.
+`PLACEMENTS`. The places form a grid of two rows: the places 1 … n are near the hands, and the places n + 1 … 2 n are far. Each
+hand reaches a strip of columns. The strips of neighbouring hands overlap by two thirds. If there are two hands, each hand reaches
+three quarters of the columns.
 """
 
 from __future__ import annotations
@@ -86,7 +87,10 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 
 
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
-    """Write a scene that is named after its file, atomically and in pieces; parameters as in `generate`."""
+    """Write a generated scene to a file atomically, in pieces; the scene is named after the file.
+
+    The parameters are those of `generate`.
+    """
     write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
 
@@ -160,7 +164,7 @@ def _rows(section: str, once: Row, layout: Layout, clutter: int, random: Random)
             }
             for i in (sorted(random.sample(chosen, (half + 1) // 2)) if section.startswith("some ") else chosen)
         )
-    return [once]  # the section `once`, and text below a directive
+    return [once]  # one row for the section `once` and for text below a directive
 
 
 # ----------------------------------------------------------------------------------------------------------- placements

@@ -52,7 +52,7 @@ class Kind:
     name : str
         The name of the kind in messages, with its article.
     foreign : bool
-        Whether Confab doesn't write such files; foreign files are never overwritten.
+        True for kinds of files that Confab doesn't write; such files are never overwritten.
     columns : tuple of str, optional
         The columns of query results; None for unknown columns, and for files without columns.
     """
@@ -71,7 +71,7 @@ class Kind:
 
 
 def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
-    """Yield the pieces of a text and then a stamp, a comment that identifies the kind of the text until it is edited.
+    """Yield the pieces of a text and then a stamp: a comment that identifies the kind of the text until the text is edited.
 
     >>> print("".join(stamped("a text", ["one"])).strip())
     one
@@ -197,7 +197,10 @@ def _told_by(triple: ox.Quad) -> str | None:
 
 
 def _rows(file: Path, suffix: str | None) -> Kind:
-    """Return the kind of any other text: query results if its first line contains columns in the format of the suffix."""
+    """Return the kind of a text that no other check recognises.
+
+    The text has query results if its first line lists columns in the format of the suffix.
+    """
     with file.open(encoding="utf-8", errors="replace", newline="") as lines:
         first = lines.readline(HEAD_BYTES).rstrip("\r\n")
     columns: tuple[str, ...] = ()

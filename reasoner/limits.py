@@ -1,7 +1,7 @@
 """The deadline of a call, stored in a context variable and therefore not passed as a parameter.
 
 The caller sets the deadline by `within`; loops call `check` or read `left`. In nested blocks the earliest deadline applies, so
-that a part of a call can have a share of the time.
+that a part of a call can be limited to a share of the time.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class Names:
         return f"Names of {len(self._iris)} terms"
 
     def agree(self, other: Names) -> bool:
-        """Return whether all IRIs have the same short names in another mapping."""
+        """Return whether every IRI has the same short name in another mapping."""
         return all(other._names.get(iri) == name for iri, name in self._names.items())
 
     def __contains__(self, name: object) -> bool:
@@ -79,7 +79,7 @@ class Named(dict[str, V]):
         raise KeyError(f"no {self.kind} '{name}'{nearest(str(name), self)}" + (f"; {self.hint}" if self.hint else ""))
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Raise `AttributeError`; for a key, the message shows how its value is accessed."""
+        """Raise `AttributeError`; if the attribute is a key of the mapping, the message shows the right notation."""
         hint = f"; use [{name!r}]" if name in self else ""
         raise AttributeError(f"a mapping of names has no attribute {name!r}{hint}")
 
@@ -102,7 +102,7 @@ def local_name(iri: str) -> str:
 
 
 SHORT = 4
-"""Maximum length of a word in which two exchanged letters make the similarity less than 0.75."""
+"""Maximum length of words in which an exchange of two letters reduces the similarity below 0.75."""
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
@@ -127,7 +127,10 @@ GUESSING: list[str] = []
 
 
 class RightNames(ABCMeta):
-    """Metaclass of classes with `right_names`: errors for unknown attributes of the class name the call that creates an object."""
+    """Metaclass of classes with `right_names`.
+
+    If a user asks such a class for an unknown attribute, the error suggests the call that creates an object.
+    """
 
     if not TYPE_CHECKING:  # type checkers report wrong names by themselves
 
@@ -146,7 +149,7 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
     kind : str
         Description of the object, e.g. ``a scene``.
     made : str, optional
-        The call that creates such an object; the error of the constructor without arguments mentions it.
+        The call that creates such an object; if the constructor is called without arguments, the error mentions this call.
     """
 
     def decorated(cls: C) -> C:
@@ -240,7 +243,7 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
     Parameters
     ----------
     function : callable
-        Further arguments, ``**options: Unpack[module.Options]``, are known by the keys of the typed dictionary.
+        For ``**options: Unpack[module.Options]``, the keys of the typed dictionary count as arguments, too.
     bound : int
         Number of leading parameters that aren't named in a call: 1 for a method.
     """

@@ -1,6 +1,6 @@
 """The nesting depth of documents.
 
-The depth is checked before parsing, because some parsers need time, memory or stack that grow much faster than the depth.
+The depth is checked before parsing, because the time, memory or stack that some parsers need grows much faster than the depth.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from contextlib import suppress
 from xml.parsers import expat
 
 MOST_NESTED = 1_000
-"""Maximum nesting depth of a document, which all used parsers can read. Ontologies have about ten levels."""
+"""Maximum nesting depth of a document; all parsers in use can read this depth. Ontologies have about ten levels."""
 PIECE = 256
 """Number of bytes that are counted together; the depth may be overestimated by this number."""
 TURTLE = re.compile(

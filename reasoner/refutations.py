@@ -14,7 +14,10 @@ from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact,
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with arguments (empty for any individual), the facts that make the behaviour impossible, and the reason."""
+    """A behaviour with its arguments, the facts that make it impossible, and the reason.
+
+    An empty argument stands for any individual.
+    """
 
     behavior: str
     arguments: tuple[str, ...]
@@ -29,7 +32,7 @@ class Refutation:
         )
 
     def covers(self, other: Refutation) -> bool:
-        """Return whether this refutation applies in every case in which `other` applies."""
+        """Return whether this refutation is at least as general: it applies in every case in which `other` applies."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
         return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
 

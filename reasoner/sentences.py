@@ -25,7 +25,7 @@ from confab.reasoner.symbols import (
 )
 
 Words = Callable[[Fact | str], str]
-"""Function that returns the words for a fact, or for the name of an individual, class or relation."""
+"""A function that returns the words for a fact, or for the name of an individual, class or relation."""
 REGULAR = (
     "balance come connect contain face fit get hang hold join know "
     "lead lie live need own rest sit stand stay suit want wear wish work"
@@ -92,7 +92,7 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         asked[-1] = replace(asked[-1], negated=False)
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
-    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # denotes the individual
+    mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
     clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
     if not clauses:
         return f"there is {whole}"
@@ -123,12 +123,12 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
 
 
 def _is_subject(mark: str, clause: str) -> bool:
-    """Return whether the individual that a mark stands for is the subject of a clause and occurs only there."""
+    """Return whether the individual for which a mark stands is the subject of a clause and doesn't occur elsewhere in it."""
     return clause.startswith(f"{mark} ") and clause.count(mark) == 1
 
 
 def _relative(mark: str, clause: str) -> str | None:
-    """Return a clause as a relative clause about the individual that a mark stands for, or None if this is impossible."""
+    """Return a clause as a relative clause about the individual for which a mark stands, or None if this is impossible."""
     if _is_subject(mark, clause):
         return f"that {clause.removeprefix(f'{mark} ')}"
     if clause.endswith(f" {mark}") and clause.count(mark) == 1 and " and " not in clause:

@@ -37,7 +37,7 @@ FALSE = "false"
 @known_as("a symbol")
 @dataclass(frozen=True, order=True)
 class Symbol:
-    """A situated object symbol ``<o, S>``: a situation type with its arguments, of which the first is the object."""
+    """A situated object symbol ``<o, S>``: a situation type with its arguments; the first argument is the object."""
 
     situation: str
     arguments: tuple[str, ...]
@@ -73,9 +73,9 @@ class Perceived:
     by : str
         The perceiver.
     exclusive : bool
-        Whether two individuals can't have the same value at the same time, except for special values.
+        Whether only one individual at a time can have a value; several individuals can have a special value.
     special : tuple of (str, str)
-        Names and special values, e.g. ``("valueInHand", "in_hand")``.
+        Pairs of a name and a special value, e.g. ``("valueInHand", "in_hand")``.
     """
 
     by: str
@@ -90,10 +90,11 @@ class SituationType:
     """A property of objects that varies between states; the situation type is also the class of the property's values.
 
     - `arguments` are the classes of the arguments, and `range` is the class of the values.
-    - A property that isn't functional is `boolean`: the property's value becomes the last argument of a symbol, whose own value is
-      `TRUE` or `FALSE`.
+    - A property that isn't functional is `boolean`: the property's value becomes the last argument of the symbol, and the
+      symbol's own value is `TRUE` or `FALSE`.
     - `level` is the first level on which the symbols exist.
-    - `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
+    - `rest` is the value that a refinement must restore. `default` is the initial value of a symbol for which the scene states no
+      value.
     - With a `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
     - `perceived` states how the values are perceived in physics; None for values that aren't perceived.
     - `properties` are the names of the value properties.
@@ -116,7 +117,9 @@ class SituationType:
 
 @dataclass(frozen=True)
 class ValueCondition:
-    """The condition ``situation(arguments) = value``; if the value is an unbound variable, the condition determines the variable.
+    """The condition ``situation(arguments) = value``.
+
+    If the value is an unbound variable, the condition determines the variable's value.
 
     A symbol that doesn't exist has no value: the condition is false, and its negation is true.
     """
@@ -170,10 +173,10 @@ class Witness:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on every state: a situation type is never true, or always true for all individuals of its argument classes.
+    """A condition on every state: a situation type is never true, or is always true for all individuals of its argument classes.
 
-    `about` has the situation types that the author constrains if these aren't `situation` itself: one that is true at most once, or
-    one that is true only after another one.
+    If the constraint expresses that a situation type is true at most once, or only after another situation type, `about` has
+    these situation types.
     """
 
     situation: str
@@ -190,8 +193,8 @@ class Constraint:
 class AnyOf:
     """The condition that at least one alternative (a conjunction) is true; if negated, no alternative is true.
 
-    A disjunction binds no variables outside itself. `constraint` is used only in messages: the constraint that a precondition
-    enforces.
+    A disjunction doesn't bind variables for conditions outside the disjunction. If a precondition enforces a constraint, messages
+    name this `constraint`.
     """
 
     alternatives: tuple[tuple[Condition, ...], ...]
@@ -216,10 +219,10 @@ Condition: TypeAlias = (
 
 @dataclass(frozen=True)
 class ValueEffect:
-    """The effect that ``situation(arguments)`` becomes `value` if all conditions in `when` hold in the state before.
+    """The effect that ``situation(arguments)`` becomes `value` if all conditions in `when` hold in the state before the behaviour.
 
-    Conditions in `when` may determine variables. With `each`, the effect is on every member of the class of this
-    variable. In a `Problem`, `spread` has replaced an effect with `each` by one effect per member.
+    Conditions in `when` may determine variables. If the variable `each` is given, every member of its class has the effect. In a
+    `Problem`, one effect per member has replaced such an effect (`spread`).
     """
 
     situation: str
@@ -231,7 +234,9 @@ class ValueEffect:
 
 @dataclass(frozen=True)
 class AmountEffect:
-    """The effect that an amount is assigned, increased, decreased or scaled if all conditions in `when` hold in the state before.
+    """The effect that an amount is assigned, increased, decreased or scaled.
+
+    It takes place if all conditions in `when` hold in the state before the behaviour.
 
     The number is evaluated in the state before the behaviour; changes of the same symbol are added.
     """
@@ -251,7 +256,7 @@ Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
 class Span(Enum):
-    """The part of a step's duration in which a condition must hold, or at which an effect takes place."""
+    """The part of a step's duration in which a condition must hold, or the end of the duration at which an effect takes place."""
 
     START = "atStart"
     THROUGHOUT = "throughout"  # an effect with this span takes place at the end
@@ -268,7 +273,7 @@ class Timing:
         Seconds, evaluated in the state at the start. None stands for the duration of the refinement or, for a primitive behaviour,
         the measured duration.
     actors : tuple of str
-        Terms whose individuals can take part in only one step at a time.
+        Terms that denote the actors; an actor can take part in only one step at a time.
     conditions, effects : tuple of pairs
         All conditions and effects, each with its span.
     """
@@ -294,7 +299,7 @@ class Times:
     Attributes
     ----------
     deadlines : mapping of Symbol to seconds
-        The time from which on a goal must hold.
+        The latest time at which each goal becomes true; the goal must hold from then on.
     windows : mapping of individual to pairs of seconds
         Time windows in which an individual is available; None as the end means no end. An individual without windows is always
         available.
@@ -330,11 +335,11 @@ class Parameter:
 class Behavior:
     """A lifted behaviour (action schema).
 
-    - Effects are applied in order; effects that make facts false come first. As in PDDL, a fact that is made both false and true is
-      true.
+    - Effects are applied in order; effects that make facts false come first. As in PDDL, if a behaviour makes a fact both false
+      and true, the fact is true.
     - A behaviour isn't applicable if it would violate the bounds of an amount.
     - `price` replaces `cost`; a precondition requires that the price is a number (`priced`).
-    - `spread` contains the individuals that occur only because effects on all members of a class were expanded.
+    - `spread` contains the individuals that the behaviour mentions only because an effect on all members of a class was expanded.
     - `timing` states the spans of conditions and effects (`confab.reasoner.timing`).
     """
 
@@ -420,7 +425,10 @@ class Rule:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The rule as a behaviour that makes its situation type true, for functions that search for achievers."""
+        """The rule in the form of a behaviour that makes the situation type true.
+
+        Functions that search for achievers use this form.
+        """
         head = ValueEffect(self.situation, tuple(p.name for p in self.parameters), TRUE)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
 
@@ -462,7 +470,7 @@ class Aggregate:
 
     @cached_property
     def kept(self) -> bool:
-        """Whether states contain the amount (sums and counts); conditions replace maxima and minima instead."""
+        """Whether states contain the amount. They contain sums and counts; maxima and minima are replaced by conditions."""
         return self.function in ("sum", "count")
 
     @cached_property
@@ -472,7 +480,7 @@ class Aggregate:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The aggregate as a behaviour that changes its amount, for functions that determine dependencies."""
+        """The aggregate in the form of a behaviour that changes the amount; functions that determine dependencies use this form."""
         head = AmountEffect(self.situation, tuple(p.name for p in self.parameters), "increase", self.amount)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, cost=0.0, amounts=(head,))
 
@@ -496,10 +504,10 @@ class GroundBehavior:
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
-    `rules` contains the rules of each derived situation type, and `aggregates` the derived amounts. `constraints` maps the name of
-    a derived count of violations, whose maximum is 0, to the constraint. `remembers` maps each remembered situation type to the
-    situation type that it remembers, in order of dependency: its symbol is true from the first state on in which the symbol of the
-    other type with the same arguments is true.
+    `rules` contains the rules of each derived situation type, and `aggregates` the derived amounts. `constraints` maps the name
+    of a derived count of violations, whose maximum is 0, to the constraint. `remembers` maps each remembered situation type to
+    the situation type that it remembers, in order of dependency: a remembered symbol becomes true when the symbol of the other
+    type with the same arguments becomes true, and stays true.
     """
 
     situations: Mapping[str, SituationType]
@@ -539,9 +547,9 @@ class Problem:
     goal : State
         Goal values of some symbols.
     parents : mapping of class to its direct superclasses
-        Used by statistics that generalise over classes, and not by the search.
+        The superclasses are used by statistics that generalise over classes, and not by the search.
     value_levels : mapping of individual to level
-        The first level on which a value exists, if this level isn't 1.
+        The first level on which each value exists; values without an entry exist from level 1 on.
     times : Times, optional
         Deadlines, time windows and measured durations (`confab.reasoner.timing`).
     weights : mapping of Symbol to Fraction
@@ -560,7 +568,7 @@ class Problem:
     weights: Mapping[Symbol, Fraction] = field(default_factory=dict)
 
     def only(self, unmet: Collection[Symbol]) -> Problem:
-        """Return the problem without some soft goals, in which the other goals must be met."""
+        """Return the problem without the soft goals `unmet`; all other goals must be met."""
         goal = {symbol: value for symbol, value in self.goal.items() if symbol not in unmet}
         return replace(self, goal=goal, weights={})
 
@@ -579,7 +587,7 @@ class Problem:
         return self.first_level(symbol) <= level and self.value_levels.get(value, 1) <= level
 
     def goal_on(self, level: int) -> dict[Symbol, str]:
-        """Return the goal on a level: the task's goal, and the rest values of the symbols in `at_rest`."""
+        """Return the goal on a level: the task's goals, and the rest values that `at_rest` returns."""
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
@@ -667,7 +675,7 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
 
 
 def made_of(effect: Effect, one: str) -> Effect:
-    """Return the effect on one member for an effect on all members of a class."""
+    """Return the instance of an effect on all members of a class for one member."""
     if effect.each is None:
         return effect
     terms = {effect.each.name: one}
@@ -703,10 +711,10 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
-    """Return preconditions that keep the amounts that a behaviour changes within bounds, if conditions can express this.
+    """Return preconditions that keep the amounts that a behaviour changes within bounds, as far as conditions can express this.
 
-    Each precondition negates the violation of a bound. The precondition therefore holds for amounts that don't exist, which effects
-    don't change.
+    Each precondition states that a bound isn't violated. It therefore holds for an amount that doesn't exist and that no effect
+    changes.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

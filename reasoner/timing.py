@@ -1,8 +1,8 @@
 """Durations, actors and time spans of behaviours (docs/levels.md, "In time").
 
-The preconditions and effects of a behaviour are its *projection*: the conditions before the behaviour and the effects
-after the behaviour, if no other step overlaps the behaviour. All planners use the projection. `Timing` states in
-addition when each condition must hold and when each effect takes place.
+The preconditions and effects of a behaviour are its *projection*: the conditions before the behaviour and the effects after the
+behaviour, if no other step overlaps the behaviour. All planners use the projection. In addition, `Timing` states when each
+condition must hold and when each effect takes place.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours that give a symbol a value only during their execution, if another behaviour or the goal may need it.
+    """Return the behaviours that give a symbol a value only during their execution, if the value may be required elsewhere.
+
+    The goal or another behaviour may require the value.
 
     A plan with such a behaviour needs concurrency: in a sequence of steps, no other step ever finds the value.
     """

@@ -54,12 +54,12 @@ class WorkerError(RuntimeError):
 
 
 def tie(end: int) -> None:
-    """Let the kernel kill the process group of this process when the other end of a pipe is closed.
+    """Let the kernel kill the process group of this process when the other end of a pipe has been closed.
 
     Parameters
     ----------
     end : int
-        File descriptor of the reading end, from which nothing is read.
+        File descriptor of the pipe's reading end; nothing is read from it.
     """
     if sys.platform == "linux":
         fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp())
@@ -141,7 +141,7 @@ def call(
     timeout : float, optional
         Maximum elapsed seconds.
     started : callable, optional
-        Is called with the process, so that other code can end the process by `kill`.
+        Function that is called with the process, so that other code can end the process by `kill`.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def main(end: int, seconds: int, command: list[str]) -> None:
     """Replace this process by a command that ends when the other end of a pipe is closed."""
     tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # an existing limit of this process
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # a limit that this process already has
     most = seconds + 1 if hard == resource.RLIM_INFINITY else min(seconds + 1, hard)
     resource.setrlimit(resource.RLIMIT_CPU, (min(seconds, most), most))
     os.execvp(command[0], command)

@@ -50,8 +50,8 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
     """Return a behaviour with additional preconditions that prevent violations of constraints.
 
     No constraint is violated before the behaviour, so the behaviour can only add violations. The condition for adding a violation
-    becomes a negated precondition. A durative behaviour keeps its effects on the number of violations instead, because the schedule
-    checks the bound of this number.
+    becomes a negated precondition. A durative behaviour gets no such precondition. It has effects on the number of violations,
+    whose bound the schedule checks.
     """
     if behavior.timing is not None or not behavior.changes & domain.constraints.keys():
         return behavior
@@ -76,7 +76,7 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
 
 
 def _folded(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour whose effects on derived amounts have only conditions that can change."""
+    """Return a behaviour in which constant conditions are removed from the effects on derived amounts."""
     if not behavior.changes & domain.aggregates.keys():
         return behavior
     known = frozenset(behavior.preconditions) if behavior.timing is None else frozenset[Condition]()

@@ -112,7 +112,7 @@ def extrema_replaced(domain: Domain) -> Domain:
     Raises
     ------
     DomainError
-        An effect, a price, a duration or a sum reads a maximum or minimum; the message names the reading part and the read value.
+        An effect, a price, a duration or a sum reads a maximum or minimum; the message names both.
     """
     aggregates = domain.aggregates
     if all(one.kept for one in aggregates.values()):

@@ -1,15 +1,15 @@
 """Effects by which a behaviour updates a sum or a count.
 
 Soundness: A tuple of individuals contributes to a total if the tuple satisfies the aggregate's conditions. The contribution of a
-tuple can change only if an effect changes a symbol in these conditions or in the aggregated number. Each tuple whose contribution
-may change is a *candidate* of a pair of an effect and a symbol in the aggregate: the tuple agrees with the effect in the
-arguments, and in the value before or after the effect. The number of a candidate is added if the conditions hold only after the
-behaviour (`confab.reasoner.afterwards`), and subtracted if the conditions hold only before the behaviour. A tuple that is a
-candidate of several pairs is counted for the first pair only.
+tuple can change only if an effect changes a symbol in these conditions or in the aggregated number. For each pair of an effect
+and a symbol in the aggregate, the *candidates* are the tuples whose contribution the effect may change: their symbol has the
+effect's arguments, and its value before or after the effect. If the conditions hold for a candidate only after the behaviour
+(`confab.reasoner.afterwards`), the candidate's number is added to the total. If the conditions hold only before the behaviour,
+the number is subtracted. A tuple that is a candidate of several pairs is counted for the first pair only.
 
-If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount
-is added to the total. The change is added for every tuple that satisfies the conditions after the behaviour. The
-changes are independent of each other.
+If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount changes the
+total directly. The change is added for every tuple that satisfies the conditions after the behaviour. The changes are independent
+of each other.
 
 If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
 Therefore, nothing is subtracted from a count with maximum 0, and a tuple may be counted for several pairs. A tuple that only loses
@@ -56,7 +56,7 @@ MOST_CONDITIONS = 5_000
 """Maximum number of conditions, including nested conditions, of a behaviour that updates derived amounts (one second to
 compile)."""
 MOST_COMPARED = 300
-"""Maximum number of candidates of a total that are compared with each other (one second)."""
+"""Maximum number of candidates of a total that are compared with each other; the comparison takes one second."""
 
 
 def kept(
@@ -100,9 +100,9 @@ def _timed(
     situations: Mapping[str, SituationType],
     classes: Mapping[str, Sequence[str]],
 ) -> Behavior:
-    """Return a behaviour in whose timing a total changes together with each fact on which the total depends.
+    """Return a durative behaviour that changes a total at the same times as the facts on which the total depends.
 
-    The effects of each span are a separate change, in the state in which the conditions of this span hold.
+    The effects at the start and the effects at the end change the total separately, under the conditions for each of these times.
     """
     timing = behavior.timing
     assert timing is not None
@@ -123,11 +123,12 @@ def _timed(
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Tuples whose contribution to a total may change, because they agree with an effect on a symbol of the aggregate.
+    """The tuples whose contribution to a total may change by an effect on a symbol of the aggregate.
 
-    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None for
-    an amount). `before` states whether the tuples agree with the value before or after the effect. `term` is the term of a linear
-    number that the effect changes; such an effect doesn't start or end a contribution.
+    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None
+    for an amount). If `before`, the tuples have the value that the symbol has before the effect, otherwise the value after the
+    effect. If the effect only changes one term of a linear number, `term` is this term; such an effect doesn't start or end a
+    contribution.
     """
 
     effect: Effect
@@ -209,7 +210,10 @@ class _Keeping:
                     yield self._candidate(effect, part.arguments, None, False)
 
     def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
-        """Return the candidate of an effect and a symbol, without the member of a class if a witness binds this member."""
+        """Return the candidate of an effect and a symbol.
+
+        If a witness binds the member of an effect on each member of a class, the candidate doesn't name the member.
+        """
         effect = self.after.apart(effect)
         if effect.each is None:
             return _Candidate(effect, named, value, before)
@@ -280,7 +284,7 @@ class _Keeping:
     def _completed(
         self, tuple_: Mapping[str, str], each: Parameter | None
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
-        """Yield tuples with a term for every variable: determined by a condition, a member of a class, or each individual."""
+        """Yield tuples with a term for every variable: a determined term, a member of a class, or each individual in turn."""
         found, more = dict(tuple_), list[Formula]()
         determined = True
         while determined:
@@ -310,7 +314,7 @@ class _Keeping:
     def _changes(
         self, effect: Effect, term: Term, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
     ) -> Iterator[AmountEffect]:
-        """Yield the effect on the total of a change of one amount, for the tuples that contribute after the behaviour."""
+        """Yield the change of the total that the change of one amount causes, for tuples that contribute after the behaviour."""
         assert isinstance(effect, AmountEffect)
         amount, operation, scaled = term
         arguments = tuple(tuple_.get(argument, argument) for argument in amount.arguments)
@@ -337,7 +341,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return the conditions under which a tuple contributes: constant ones, and changing ones before and after a step."""
+        """Return the conditions under which a tuple contributes: constant ones, and those before and after the behaviour."""
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]

@@ -1,9 +1,9 @@
 """Effects by which a behaviour updates a remembered situation type.
 
-A remembered symbol becomes true after a behaviour if the symbol that it remembers is true after this behaviour. The count of the
-remembered symbol's solutions, which is 0 or 1, has the same conditions. Therefore the regression of counts
-(`confab.reasoner.aggregates.keeping`) also derives the effects on remembered symbols. The maximum of the count is 0, so that an
-effect depends only on the state after the behaviour.
+A remembered symbol becomes true after a behaviour if the symbol that it remembers is true after this behaviour. This is also the
+condition under which the count of the remembered symbol's solutions changes from 0 to 1. Therefore the regression of counts
+(`confab.reasoner.aggregates.keeping`) also derives the effects on remembered symbols. The count gets the maximum 0, because the
+effects on such a count depend only on the state after the behaviour.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def solutions_of(name: str, situation: SituationType, negated: bool = False) -> 
 def in_order_of_update(domain: Domain) -> list[Aggregate]:
     """Return the aggregates of a domain, and a count for each remembered situation type, in order of dependency.
 
-    The count of a remembered symbol is 1 if the symbol that it remembers is true, and 0 otherwise.
+    Each count is 1 if the symbol that is remembered is true, and 0 otherwise.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def in_order_of_update(domain: Domain) -> list[Aggregate]:
 
 
 def count_of(name: str, domain: Domain) -> Aggregate:
-    """Return the count whose value is 1 for the arguments of a remembered situation type if the remembered symbol is true.
+    """Return the count that is 1 for the arguments of a remembered situation type if the symbol that it remembers is true.
 
     Raises
     ------
@@ -109,7 +109,10 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
 
 
 def _alone(effect: AmountEffect, classes: Mapping[str, Sequence[str]]) -> Iterator[AmountEffect]:
-    """Yield an effect; if each member of a class has it and isn't an argument, yield one effect for each member."""
+    """Yield an effect.
+
+    If each member of a class has the effect, and the member isn't an argument of the symbol, yield one effect per member.
+    """
     if effect.each is None or effect.each.name in effect.arguments:
         yield effect
         return

@@ -1,7 +1,7 @@
 """The graph's statements about bodies as tables: attributes, links, classes and indices of each node.
 
-The vocabulary is ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``) and one query
-all links; all further accesses are lookups in these tables.
+The vocabulary is ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``), and one
+query reads all links. All further accesses are lookups in these tables.
 """
 
 from __future__ import annotations
@@ -134,9 +134,9 @@ class BodyFacts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the numbers of a skill or perceiver (`general`) for a behaviour or situation type (`special`).
+        """Return the settings of a skill (`general`) for a behaviour (`special`), or of a perceiver for a situation type.
 
-        Numbers of the behaviour or situation type override numbers of the skill or perceiver; adjustments override both.
+        Numbers that the behaviour or situation type states override numbers of the skill or perceiver; adjustments override both.
         """
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):

@@ -1,4 +1,4 @@
-"""Reading of robots' interfaces from the graph: actions, their arguments and results, and readings of the robot's world model.
+"""Reading of robots' interfaces from the graph: the robot's actions with arguments and results, and the fields of its world model.
 
 The vocabulary is the section *Interfaces of robots* of ``ontology/embodiment.ttl``.
 """
@@ -60,7 +60,7 @@ class InterfaceCall:
 
 @dataclass(frozen=True)
 class Meaning:
-    """The meaning of a result status: success, or a failure code and the situation types that must change before a retry."""
+    """The meaning of a result status: success, or a failure code with the situation types that must change before a retry."""
 
     success: bool
     code: str

@@ -36,7 +36,7 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield perceived joints that are never open or never shut, always open or always shut, or open and shut at once."""
+    """Yield joints with faulty thresholds: never or always open, never or always shut, or open and shut at once."""
     uses = [use for use in embodiment.perceivers.values() if use.perceiver == JOINT]
     perceived = {name for use in uses for name in use.links}
     for link in _links(embodiment):
@@ -97,7 +97,7 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield places on furniture or links that are on no supporting surface or inside a solid.
+    """Yield the places of furniture and links that aren't on a supporting surface, or that are inside a solid.
 
     Places near meshes and tilted solids aren't checked.
     """
@@ -137,12 +137,15 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
 
 
 def _without_flat_top(part: Part) -> bool:
-    """Return whether a solid has no horizontal top, or has a kind for which no top is calculated."""
+    """Return whether a solid has no horizontal top, or is of a kind (such as a mesh) whose top isn't calculated."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 
 def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
-    """Return the horizontal distance in metres of a point from an upright solid; at most 0 for a point above, below or inside."""
+    """Return the horizontal distance in metres of a point from an upright solid.
+
+    It is at most 0 for a point above, below or inside the solid.
+    """
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":
         return math.hypot(dx, dy) - part.size[0] / 2

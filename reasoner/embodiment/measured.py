@@ -20,7 +20,7 @@ SINGLE = ("tilt", "joint")
 """Quantities measured on one individual."""
 
 OF_JOINTS = ("opened", "shut", "lower", "upper")
-"""Numbers of a link that can be a bound."""
+"""Numbers of a link that can be bounds of a measured situation type."""
 
 ONE_VALUED = (
     "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property . ?property a owl:FunctionalProperty }"
@@ -39,7 +39,7 @@ def valued(store: ox.Store) -> frozenset[str]:
 
 
 def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alone: bool) -> tuple[Guard, ...]:
-    """Return the bounds within which a measured situation type is true; `alone` states whether the type has a single argument.
+    """Return the bounds within which a measured situation type is true; `alone` tells whether the type has a single argument.
 
     Raises
     ------

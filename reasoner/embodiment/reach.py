@@ -49,7 +49,7 @@ def save_reach(
         The scene.
     names : Names
     pairs : iterable of (hand, place)
-        Short names of each hand and a place that it reaches.
+        Pairs of short names: a hand, and a place that the hand reaches.
     inputs_hash : str
         Hash of the geometry and the settings; if it changes, the file is outdated.
     """

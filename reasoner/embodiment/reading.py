@@ -82,7 +82,7 @@ def _fixture(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Fixtur
 
 
 def _places(facts: BodyFacts) -> list[str]:
-    """Return the nodes that are places: nodes with coordinates or a carrier, except robots, stands and parts of furniture."""
+    """Return the places: all nodes with coordinates or a carrier, except robots, stands and parts of furniture."""
     other = {
         node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
     }
@@ -141,7 +141,7 @@ def _body(facts: BodyFacts, node: str, shape: str, names: Callable[[str], str]) 
 
 
 def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Filling]:
-    """Return the fillings: individuals with stated beads, possibly stated for their most specific class."""
+    """Return the fillings: individuals that have beads, or whose most specific class has beads."""
     found: dict[str, Filling] = {}
     for node in facts.ordered(facts.classes):
         kinds = [kind for kind in facts.nearest_first(node) if "serving_beads" in facts.attributes.get(kind, {})]

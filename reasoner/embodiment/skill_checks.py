@@ -27,7 +27,7 @@ def roles_of(use: SkillUse) -> set[str]:
 
 
 def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield each phase that mentions a role without a term of the behaviour, with the role."""
+    """Yield each phase that mentions a role that no term of the behaviour plays, together with the role."""
     for phase in use.phases:
         for word in (phase.by, *phase.to.split(), *phase.touches):
             role = word.partition(".")[0]
@@ -36,7 +36,7 @@ def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield each phase with an expression that contains an unknown name, with the name."""
+    """Yield each phase in whose expressions an unknown name occurs, together with the name."""
     for phase in use.phases:
         bounds = [guard.bound for guard in (*phase.until, *phase.checks)]
         for expression in (*phase.offset, phase.above, phase.value, phase.speed, phase.wait, *bounds):
@@ -47,7 +47,7 @@ def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield each phase whose motion has no stated end, with the missing attribute."""
+    """Yield each phase whose motion has no stated end, together with the missing attribute."""
     for phase in use.phases:
         if phase.motion in ("free", "line", "yielding", "joint", "over", "drive") and not phase.to:
             yield phase, "to"
@@ -58,7 +58,7 @@ def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield phases that mention a role without a term of the behaviour."""
+    """Yield phases that mention a role that no term of the behaviour plays."""
     for use in embodiment.skills.values():
         for phase, role in unplayed(use):
             yield (

@@ -1,8 +1,8 @@
 """Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
-Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap their own case,
-neighbouring links or furniture. A neighbouring link that moves may be shut or fully open; an overlap is a fault only if
-the overlap occurs in both cases.
+Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap the base of their mechanism,
+neighbouring links or furniture. A neighbouring link that can move may be shut or fully open. An overlap with such a link is a
+fault only if it occurs in both cases.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _base_inside(mechanism: Mechanism, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield the deepest overlap of a mechanism's base with each neighbouring body."""
+    """Yield, for each neighbouring body, its deepest overlap with the base of a mechanism."""
     base = [block for block in blocks_of(mechanism, {}) if block.owner == mechanism.name]
     for _, _, one, other in _deepest(_meeting(base, around, 0.0)):
         yield _flaw(one, other, overlap(one, other), "", f"move {mechanism.name} or {other.owner} apart")
 
 
 def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterator[Flaw]:
-    """Yield the deepest overlap of a link with each body that it passes through."""
+    """Yield, for each body that a link passes through, the deepest overlap."""
     taken = _taken_along(mechanism, link)
     values = np.linspace(link.lower, link.upper, SAMPLES) if link.kind != "fixed" else np.zeros(1)
     met: list[Met] = []

@@ -27,7 +27,10 @@ REFINED = 24
 
 @dataclass(frozen=True)
 class Block:
-    """A box, cylinder or sphere in the world frame, with its `owner`; `half` contains half extents, or radii of round kinds."""
+    """A box, cylinder or sphere in the world frame, with its `owner`.
+
+    The half extents of a box, or the radii of a round solid, are in `half`.
+    """
 
     owner: str
     part: str
@@ -75,7 +78,10 @@ class Block:
 
 
 def overlap(one: Block, other: Block) -> float:
-    """Return the distance in metres by which a solid must be moved to be separated from another solid; negative for a gap."""
+    """Return the distance in metres by which a solid must be moved to be separated from another solid.
+
+    It is negative if there is a gap.
+    """
     apart = other.center - one.center
     if not apart.any():
         apart = np.array([1e-9, 0.0, 0.0])
@@ -155,7 +161,7 @@ def fixture_block(fixture: Fixture) -> Block:
 
 
 def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
-    """Yield the solids of an object whose base centre has the given frame; the inside of a vessel is treated as solid."""
+    """Yield the solids of an object whose base has its centre at the given frame. A vessel is treated as solid throughout."""
     turned, base = frame
     numbers, shape = body.shape.numbers, body.shape
     wall = numbers.get("wall", 0.004) if shape.kind == "vessel" else 0.0

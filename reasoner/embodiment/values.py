@@ -1,9 +1,8 @@
 """Dataclasses of the embodiment for `sim/`: robots, fixtures, places, objects, skills and perceivers, without RDF.
 
-Lengths are in metres, masses in kilograms, angles in radians, forces in newtons. Positions are in the world frame with
-z up, unless stated otherwise. `confab.reasoner.embodiment.reading` reads the data from the graph, and `sim/` builds a
-physical world from the data. Every name of an object, behaviour or situation type in `sim/` is from these data or from
-the plan.
+Lengths are in metres, masses in kilograms, angles in radians, forces in newtons. Positions are in the world frame with z up,
+unless stated otherwise. `confab.reasoner.embodiment.reading` reads the data from the graph, and `sim/` builds a physical world
+from the data. `sim/` takes every name of an object, behaviour or situation type from these data or from the plan.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ class Part:
 class Feature:
     """A frame on a link at which a hand acts: x is the direction of the fingers, y leads from finger to finger, z is along a bar.
 
-    The hand may be rotated about z by `low` to `high`. `parts` are the solids that the fingers touch.
+    The hand may be rotated about z by an angle between `low` and `high`. `parts` are the solids that the fingers touch.
     """
 
     name: str
@@ -137,7 +136,7 @@ class Link:
 
     - `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame; this
       frame is the link's frame if the joint value is 0.
-    - The joint counts as open (or switched on) from `opened` on, and as shut up to `shut`.
+    - The joint counts as open (or switched on) if its value is at least `opened`, and as shut if its value is at most `shut`.
     - `friction` (newtons or newton metres) and `damping` resist a motion; a `spring` pushes towards 0.
     - A joint that `latches` stays at `opened` after a push beyond `opened`, until the next push.
     - `urdf_link` is the link's name in the mechanism's URDF file.
@@ -220,8 +219,8 @@ class Filling:
 class Guard:
     """A bound on a measured quantity, such as ``force >= 30``, that ends a motion or must hold after a motion.
 
-    `sign` is 1 for ``>=`` and -1 for ``<=``. `bound` is an expression (see `Phase`). If a required bound doesn't hold, the skill
-    fails with `code`.
+    `sign` is 1 for ``>=`` and -1 for ``<=``. `bound` is an expression (see `Phase`). If the bound is required and doesn't hold,
+    the skill fails with `code`.
     """
 
     quantity: str
@@ -244,9 +243,11 @@ class Phase:
     - `offset` is a shift of the goal in the hand's frame, and `above` is an upward shift.
     - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
     - `by` is the role of the hand that executes the phase.
-    - `fingers` (open, shut or grasp) move before the hand. `touches` contains roles or features that the hand may touch.
+    - `fingers` (open, shut or grasp) states what the fingers do before the hand moves. `touches` contains roles or features that
+      the hand may touch.
     - The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold.
-    - The phase is executed only if all conditions in `when` hold. A `foreseen` phase is only checked for feasibility in advance.
+    - The phase is executed only if all conditions in `when` hold. A `foreseen` phase isn't executed; its feasibility is checked
+      in advance.
     """
 
     name: str
@@ -272,9 +273,9 @@ class Phase:
 class SkillUse:
     """The skill that executes a primitive behaviour.
 
-    `parameters` contains the roles of the behaviour's parameters in order, and `variables` contains the roles of the
-    determined variables. `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without
-    `phases` is a Python function. `links` maps each role to the links that can play this role.
+    `parameters` contains the roles of the behaviour's parameters in order, and `variables` contains the roles of the determined
+    variables. `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python
+    function. `links` maps each role to the links (such as drawers) that can play this role.
     """
 
     behavior: str
@@ -290,8 +291,9 @@ class SkillUse:
 class PerceiverUse:
     """The perceiver that measures a situation type, with its thresholds and special values.
 
-    `choices` are the situation type's values in declared order, and `links` are the links that have the situation type.
-    A measured situation type is true within the bounds `holds`; `asked` contains the arguments of all boolean symbols.
+    `choices` are the situation type's values in declared order, and `links` are the links that have the situation type. A
+    measured situation type is true if its quantities are within the bounds `holds`; `asked` contains the arguments of all boolean
+    symbols.
     """
 
     situation: str

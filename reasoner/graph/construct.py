@@ -22,7 +22,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     Raises
     ------
     KnowledgeError
-        The query isn't SPARQL, or its result isn't triples or is empty.
+        The query isn't SPARQL, or its result is empty or doesn't consist of triples.
     LimitError
         The query exceeds the limits of `confab.reasoner.graph.query_process.ask`.
     """

@@ -1,7 +1,7 @@
 """Safe reading of RDF documents: RDF/XML is passed to the parser without external or recursive entities.
 
-The XML parser expat reads the document type, which is then replaced by a document type with only plain entities. (Protégé 4
-abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are removed.
+The XML parser expat reads the declaration of the document type. A declaration with only plain entities then replaces it. (Protégé
+4 abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are removed.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """OWL 2 RL inference before planning, which adds inferred triples to the graph `inferred`.
 
-Only static facts are inferred. Facts of situation types are excluded because behaviours change these facts; only the
-domain and the range of their properties are applied. A class that is defined by situations is compiled into conditions
-instead (`confab.reasoner.reading.definitions`).
+Only static facts are inferred. Facts of situation types are excluded, because behaviours change these facts; from their
+properties, only domains and ranges are used. A class that is defined by situations is compiled into conditions instead
+(`confab.reasoner.reading.definitions`).
 
-The reasoner runs only if `needed` finds axioms with consequences beyond subclasses, which are read without inference. The limits
-of RL are listed in docs/inference.md.
+Subclasses are read without inference. The reasoner runs only if `needed` finds other axioms that have consequences. The limits of
+RL are listed in docs/inference.md.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ SELECT DISTINCT ?individual ?class WHERE {
 
 
 def needed(graph: KnowledgeGraph) -> bool:
-    """Return whether the ontology has axioms that imply more than its subclass axioms."""
+    """Return whether the ontology has axioms, besides subclass axioms, from which facts follow."""
     return bool(graph.query(NEEDED, GIVEN))
 
 

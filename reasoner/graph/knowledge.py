@@ -52,7 +52,7 @@ class Remote(Protocol):
     """A remote store that answers SPARQL 1.1 queries, such as `confab.reasoner.graph.stores.Endpoint`."""
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
-        """Return the result of a query; if `noted`, `confirm` repeats the query later."""
+        """Return the result of a query. If `noted`, the store remembers the query, and `confirm` repeats the query later."""
 
     def confirm(self) -> None:
         """Raise `KnowledgeError` if the result of a noted query has changed."""
@@ -90,12 +90,12 @@ class KnowledgeGraph:
     prefixes : mapping of prefix to namespace
         The prefixes of internal queries: `PREFIXES` and prefixes that files declare.
     declared : mapping of prefix to namespace
-        The prefixes that files declare, the prefixes of the scene's file first. The empty prefix has the meaning that
-        the scene's file gives.
+        The prefixes that files declare, the prefixes of the scene's file first. The empty prefix stands for the namespace that
+        the scene's file declares.
     faults : list of str
         The reasons why planning in the scene is impossible, if the scene was loaded with `tolerant`.
     written : mapping of individual to place
-        The position in a SPARQL update of each individual that was compiled from the update.
+        For each individual that was compiled from a SPARQL update, the position in this update.
     remote : Remote, optional
         A remote store that is queried instead of `store`; it is never changed.
     round_trips : int
@@ -225,7 +225,7 @@ def load(
     store : pyoxigraph.Store, optional
         An empty store for the triples; by default a new store in memory.
     tolerant : bool
-        Whether to load any RDF file, and to store the reasons why it isn't a complete scene in `faults` of the graph.
+        Whether to load an RDF file even if it isn't a complete scene; the attribute `faults` of the graph then has the reasons.
     faults : list of Fault, optional
         Receives the faults in behaviours that are written as updates; without the list, such faults raise an error.
 
@@ -263,7 +263,7 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
 
 
 def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
-    """Return the prefixes in the file of each behaviour or rule that is written in SPARQL."""
+    """Return, for each behaviour or rule that is written in SPARQL, the prefixes that its file declares."""
     prefixes: dict[str, dict[str, str]] = {}
     for file in graph.files.values():
         with readable(file) as (content, form):
@@ -450,7 +450,7 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
 
 
 def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
-    """Return the file of an imported ontology: from the catalog beside the importer, the shipped catalog, or by its name."""
+    """Return the file of an imported ontology, found in the catalog beside the importer, in the shipped catalog, or by its name."""
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):
         if catalog not in read:

@@ -39,14 +39,14 @@ TEXTS = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'(?:[^\\]|\\.)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""Tokens in which words have no meaning: literals, IRIs and comments."""
+"""Pattern of the parts of a query in which words aren't keywords or names: literals, IRIs and comments."""
 WORDS = re.compile(
     rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
 )
-"""A token without meaningful words, or a prefixed name."""
+"""Pattern of a literal, an IRI, a comment or a prefixed name."""
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
-"""The list of expected tokens in an error message of the parser."""
+"""Pattern of the list of expected tokens in an error message of the parser."""
 NAMESPACES = re.compile(r"\bPREFIX\s+([\w-]*):\s*<([^<>]*)>", re.IGNORECASE)
 PLACE = re.compile(r"error at (\d+):(\d+): ")
 FROM = re.compile(
@@ -54,7 +54,7 @@ FROM = re.compile(
     r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
     re.DOTALL | re.IGNORECASE,
 )
-"""A token without meaningful words, or a ``FROM`` clause."""
+"""Pattern of a literal, an IRI, a comment or a ``FROM`` clause."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
@@ -65,7 +65,7 @@ Answer: TypeAlias = "tuple[str, list[str], Any]"
 
 @dataclass(frozen=True)
 class QueryLimits:
-    """Limits of a query: seconds, rows, megabytes of memory; `service` permits queries to other endpoints."""
+    """Limits of a query: seconds, rows, megabytes of memory; `service` permits ``SERVICE`` clauses (other endpoints)."""
 
     seconds: float = SECONDS
     rows: int = ROWS
@@ -145,7 +145,10 @@ class QueryWorker:
             self.ask("ASK {}")
 
     def interrupt(self) -> None:
-        """Stop the running query of another thread, whose `ask` raises `LimitError`; do nothing while the process starts."""
+        """Stop the query for which another thread is waiting.
+
+        The thread's call of `ask` then raises `LimitError`. While the process starts, nothing is done.
+        """
         if self._sending.acquire(blocking=False):
             self._send(None)
             self._sending.release()
@@ -153,7 +156,7 @@ class QueryWorker:
     def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
         """Return the result of a query on a dataset: by default the dataset of its ``FROM`` clauses, or the union of all graphs.
 
-        The errors are those of the function `ask`, and `KnowledgeError` for a graph that doesn't exist.
+        Raise the errors of the function `ask`, and `KnowledgeError` for a graph that doesn't exist.
         """
         self.graph.round_trips += 1
         dataset = _existing(self.graph, dataset or clauses(self.graph, query) or (UNION, None))
@@ -233,7 +236,7 @@ class QueryWorker:
 
 
 def allowed(query: str, limits: QueryLimits) -> str:
-    """Return a query unchanged; raise `KnowledgeError` if the query asks other endpoints without permission."""
+    """Return a query unchanged; raise `KnowledgeError` if the query contains a ``SERVICE`` clause that the limits don't permit."""
     if not limits.service and SERVICE.search(TEXTS.sub(" ", query)):
         raise KnowledgeError(
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"

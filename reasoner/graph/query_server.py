@@ -29,7 +29,7 @@ def main() -> None:
     store.bulk_extend(ox.parse(setup["quads"], format=ox.RdfFormat.N_QUADS))
     while True:
         question = received()
-        if question is not None:  # None is a late request to stop the last query
+        if question is not None:  # None requests a stop, but the last query has already ended
             sys.stdout.buffer.write(forked(store, question, setup))
             sys.stdout.buffer.flush()
 

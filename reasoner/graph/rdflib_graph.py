@@ -27,7 +27,7 @@ def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Gr
 
 
 class _SameNames(dict[str, str]):
-    """Mapping of blank node names to themselves, so that rdflib keeps the names of the knowledge graph."""
+    """Identity mapping of blank node names, so that rdflib keeps the names of the knowledge graph."""
 
     def get(self, name: str, default: object = None) -> str:
         """Return the name itself."""

@@ -79,7 +79,7 @@ class Endpoint:
     Attributes
     ----------
     noted : mapping of request to digest of its result
-        The requests that `confirm` repeats.
+        The requests that `confirm` repeats, each with a digest of its result.
     """
 
     url: str
@@ -104,7 +104,7 @@ class Endpoint:
     def _pool(self) -> urllib3.PoolManager:
         retry = urllib3.Retry(
             total=self.retries,
-            read=min(1, self.retries),  # repeat a query that timed out only once
+            read=min(1, self.retries),  # a query that timed out is repeated only once
             backoff_factor=BACKOFF,
             status_forcelist=BUSY,
             allowed_methods=None,  # queries change nothing, so POST requests can be repeated
@@ -235,7 +235,8 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
     Raises
     ------
     KnowledgeError
-        A query fails as in `Endpoint.query`, or the endpoint contains no such scene, no scene, or several scenes.
+        A query fails as in `Endpoint.query`, the endpoint doesn't contain the given scene, or no scene is given and the endpoint
+        contains no scene or several scenes.
     """
     endpoint = Endpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)
     graph = KnowledgeGraph("", remote=endpoint)

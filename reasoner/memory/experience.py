@@ -1,19 +1,17 @@
 """Learned experience: rules, orders of goals and methods, with tallies of their use.
 
 ==========  ===================================================================================================
-Rule        a behaviour that achieves a kind of goal under some conditions
-Order       a kind of goal that is achieved before another kind, if their goals share individuals
-Method      steps that refine a behaviour, with roles as arguments
-GoalKind    the goals of one situation type about individuals of one class
-Tally       numbers of times that an item was chosen successfully, was passed over, and failed
-Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
+Rule        a behaviour that achieves a kind of goal under some conditions Order       a kind of goal that is achieved before
+another kind, if two such goals share individuals Method      steps that refine a behaviour, with roles as arguments GoalKind
+the goals of one situation type about individuals of one class Tally       numbers of times that an item was chosen successfully,
+was passed over, and failed Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore
-have equal names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`): the
-empty fact counts the item itself, other facts count situations of the individuals in the item's roles. Tallies of epoch
-0 never age. Each further epoch belongs to one episode of a replica, and contains preferences between individuals (for
-example between two hands), whose weight decays with later episodes.
+Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
+names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
+counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
+fact. Tallies of epoch 0 never age. Each further epoch belongs to one episode of a replica, and contains preferences between
+individuals (for example between two hands), whose weight decays with later episodes.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from confab.reasoner.symbols import Fact as Goal
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its arguments."""
 Fact: TypeAlias = "tuple[str, str]"
-"""A question about the individuals in the roles of an item, and its answer; question and answer are empty for the item itself."""
+"""A question about the individuals in the roles of an item, and the answer. Both are empty texts for the item itself."""
 ITSELF: Fact = ("", "")
 
 
@@ -50,7 +48,7 @@ class Rule:
     Attributes
     ----------
     goal : ValueCondition
-        Its terms are roles (``?cup``) or individuals of the domain.
+        The goal, whose terms are roles (``?cup``) or individuals of the domain.
     asks : tuple of Condition
         Conditions under which the rule is applicable.
     does : behaviour and arguments
@@ -108,9 +106,9 @@ class Order:
 class OpenRole:
     """A role of a method that isn't a parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value fills the role at the
-    role's first use: the situation type, and the roles that are the symbol's arguments. `becomes` is the situation type
-    whose value the individual becomes; an individual that no symbol has as its value is then preferred.
+    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value fills the role at the role's
+    first use: the situation type, and the roles that are the symbol's arguments. If the individual becomes the value of a symbol,
+    `becomes` is the symbol's situation type; individuals that aren't the value of another symbol are then preferred.
     """
 
     kind: str
@@ -194,7 +192,7 @@ class Experience:
     Parameters
     ----------
     replica : str
-        ID of the replica that learns in this memory; only one writer may use it.
+        ID of the replica that learns in this memory; only one writer may use the ID.
     episodes : mapping of replica to number
         Number of episodes of each replica.
     said : mapping of name to rule, order, method or kind of goal
@@ -232,7 +230,10 @@ class Experience:
                 table[fact] = table.get(fact, Tally()) + tally
 
     def merge(self, other: Experience) -> None:
-        """Merge another memory by the maximum of common tallies; the result doesn't depend on the order or repetition of merges."""
+        """Merge another memory into this one: of two copies of a tally, the greater numbers are kept.
+
+        Merges can be repeated, and made in any order.
+        """
         self.said.update(other.said)
         for replica, number in other.episodes.items():
             self.episodes[replica] = max(self.episodes.get(replica, 0), number)
@@ -250,7 +251,10 @@ class Experience:
         return found
 
     def preferences(self, decay: float) -> dict[str, dict[Fact, tuple[float, float]]]:
-        """Return weighted numbers of choices and rejections by name and fact; each later episode scales weights by `decay`."""
+        """Return weighted numbers of choices and rejections by name and fact.
+
+        Every later episode multiplies the weights by `decay`.
+        """
         found: dict[str, dict[Fact, tuple[float, float]]] = {}
         for (replica, epoch), name, fact, tally in self:
             if epoch:

@@ -1,10 +1,10 @@
 """Files and stores of experience: learned items as triples and tallies as annotated axioms, in Turtle that Protégé can open.
 
-Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and
-item (`:countsFor`). The property `:associatedWith` links the counter to the item and to the lifted facts that held. An
-``owl:Axiom`` on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting
-`:probability`. Replicas never share a counter, and all other nodes are named by their content, so that the union of two
-files contains both memories. An edited rule keeps its tallies.
+Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and item
+(`:countsFor`). The property `:associatedWith` links the counter to the item and to the lifted facts that held. An ``owl:Axiom``
+on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never
+share a counter, and all other nodes are named by their content, so that the union of two files contains both memories. A rule
+that was edited in the file keeps its tallies.
 
 Each link is written as one line, which is read by a regular expression. Files in another layout, such as that of Protégé, are read
 by the Turtle parser.
@@ -32,7 +32,7 @@ from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
 
 FORMAT = 5
 TALLY = ("chosen", "passedOver", "failed")
-PRIOR = 1.0  # pseudo-counts in every probability: half a choice and half a pass
+PRIOR = 1.0  # added to each of two numbers in every probability
 
 HEAD = """@prefix : <{core}> .
 @prefix owl: <{owl}> .
@@ -106,7 +106,9 @@ def new_replica() -> str:
 
 
 def probability(tally: Tally) -> float:
-    """Return the probability that a candidate is chosen and succeeds, with a prior of half a choice and half a pass.
+    """Return the probability that a candidate is chosen and succeeds.
+
+    The prior adds 0.5 to each of the numbers `chosen` and `passed_over`.
 
     >>> probability(Tally(chosen=3, passed_over=0))
     0.875
@@ -136,7 +138,10 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 def turtle(
     experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
 ) -> Iterator[str]:
-    """Yield a memory as Turtle, item by item; `only` restricts the text to one replica's tallies, `words` returns labels."""
+    """Yield a memory as Turtle, item by item.
+
+    With `only`, the text has the tallies of one replica; `words` returns the label of an item.
+    """
     iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
     replica = _text(experience.replica)

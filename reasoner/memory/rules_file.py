@@ -148,7 +148,7 @@ class RuleReader(NodeReader):
         return "?" + unquote(iri).rsplit(".", 1)[-1] if self.is_a(iri, "Variable") else self.short(iri)
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return parts in an order that doesn't depend on IRIs."""
+        """Return the parts of a condition, sorted so that the order doesn't depend on IRIs."""
         return tuple(sorted(parts, key=repr))
 
     def short(self, iri: str) -> str:

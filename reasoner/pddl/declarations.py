@@ -61,7 +61,9 @@ class Pddl:
     actions: dict[str, Action] = field(default_factory=dict)
     axioms: list[Axiom] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)  # derived predicates that must never hold
-    remembers: dict[str, str] = field(default_factory=dict)  # predicates that hold once the other predicate has held
+    remembers: dict[str, str] = field(
+        default_factory=dict
+    )  # predicates that stay true after the other predicate was true
     sometime: list[Form] = field(default_factory=list)  # further goals
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)

@@ -1,9 +1,9 @@
-"""Durative actions of PDDL 2.1: their conditions and effects with times, and the durative action as one instantaneous action.
+"""Durative actions of PDDL 2.1: their conditions and effects with times, and their translation to one instantaneous action.
 
 The instantaneous action is equivalent to the durative action if no other action overlaps it:
 
-- its precondition omits conditions over all or at the end that an effect at the start achieves;
-- its effect omits effects at the start that an effect at the end overwrites.
+- its precondition omits a condition (``over all`` or ``at end``) that an effect at the start achieves;
+- its effect omits an effect at the start if an effect at the end overwrites it.
 """
 
 from __future__ import annotations

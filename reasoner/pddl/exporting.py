@@ -1,4 +1,4 @@
-"""Export of one level of a scene to PDDL, restricted to STRIPS where possible because many planners support little more.
+"""Export of one level of a scene to PDDL. The export uses STRIPS where possible, because many planners support little more.
 
 A class becomes a type, or a unary predicate if the class overlaps another class. Every individual becomes an object,
 including individuals that are only values. A situation type becomes a predicate of its arguments and, unless the type
@@ -144,7 +144,7 @@ class _Export:
         self.costs = any(action.cost != 1 for action in self.actions.values()) or bool(self.preferences)
 
     def exported(self) -> Exported:
-        """Return the texts of the domain and the problem with their name mappings."""
+        """Return the texts of the domain and the problem, with the mapping of PDDL names to the scene's names."""
         named = self.words.name("domain", local_name(self.problem.scene))
         constants = {term.name for term in self.named_in_domain() if not term.variable}
         found = [one for fact in self.facts for one in (fact.terms if isinstance(fact, Atom) else fact[0].terms)]

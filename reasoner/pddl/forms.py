@@ -86,7 +86,7 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
 
 
 def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[[Atom], bool | None]) -> Iterator[Form]:
-    """Yield the conjuncts of a formula, with one conjunct per object in place of a universally quantified conjunct.
+    """Yield the conjuncts of a formula; a universally quantified conjunct becomes one conjunct per object.
 
     Conjuncts that always hold are omitted.
 

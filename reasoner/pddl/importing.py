@@ -86,7 +86,10 @@ BASE = "https://w3id.org/confab/pddl/"
 
 @dataclass(frozen=True)
 class Place:
-    """The translation of a predicate: a situation type, the positions of object and value, and a value that is no argument."""
+    """The translation of a predicate: its situation type, the positions of the object and the value, and possibly a fixed value.
+
+    The fixed value is used if no argument of the predicate is the value.
+    """
 
     situation: str
     part: Part | None = None
@@ -113,9 +116,10 @@ def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
     ----------
     pddl : Pddl
     scene : str, optional
-        Last part of the scene's IRI; by default, the name of the PDDL problem.
+        The last part of the scene's IRI; by default, the name of the PDDL problem.
     level : int
-        The level of all behaviours. With a level above 1, less abstract behaviours can be added on lower levels.
+        The level of all behaviours. The default 1 is the most abstract level, so that less abstract behaviours can be added on
+        further levels.
     """
     table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
@@ -405,7 +409,10 @@ class _Import:
 
     @cached_property
     def signatures(self) -> dict[str, list[str]]:
-        """The types of each predicate's arguments: the declared type, or the supertype of a variable that is an argument."""
+        """The types of each predicate's arguments.
+
+        A type is the lowest common supertype of the declared type and of all variables that occur as the argument.
+        """
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
         parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
         parts += [(axiom.parameters, (axiom.condition, None)) for axiom in self.pddl.axioms]

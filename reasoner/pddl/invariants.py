@@ -1,9 +1,9 @@
 """Invariant synthesis for a PDDL domain.
 
 An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. The predicates of an
-invariant form one state variable of the object. An invariant starts as a guess with one changing predicate. The guess is proved if
-every action that adds a fact of the invariant also deletes a fact of the invariant. If the proof fails, a predicate that the
-action deletes is added to the guess, for example *in* to *at*.
+invariant form one state variable of the object. An invariant starts as a guess with one changing predicate. The guess is proved
+if every action that adds a fact of the invariant also deletes a fact of the invariant. If the proof fails for an action, a
+predicate that the action deletes is added to the guess. For example, *in* is added to *at*.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action preserves the invariant; otherwise return the parts whose addition might repair it."""
+        """Return None if every action preserves the invariant; otherwise return parts whose addition might repair the invariant."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]

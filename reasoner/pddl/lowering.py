@@ -3,9 +3,9 @@
 ==============================  ==================================================================
 in the scene                    in PDDL
 ==============================  ==================================================================
-effect on a value                the old value is deleted; an unknown one becomes a parameter
-negated value, inequality       parameter for the actual value, which must be different
-"no individual has the value"   extra predicate of the value, or of each individual and the
+effect on a value                the old value is deleted; an unknown one becomes a parameter negated value, inequality
+parameter for the actual value, which must be different "no individual has the value"   extra predicate of the value, or of each
+individual and the
                                 value (`confab.reasoner.pddl.absence`)
 symbol that may not exist       static predicate of the arguments for which it exists
 defined situation               its definition; ``:derived`` if it is recursive
@@ -66,7 +66,7 @@ from confab.reasoner.symbols import (
 
 Terms = Mapping[str, Term]
 CASES = 4
-"""Maximum number of other values of a symbol if a conditional effect on the symbol is split into one action per value."""
+"""A conditional effect on a symbol is split into one action per value only if the symbol has at most this many other values."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class Lowering:
                 return no(both([there, compared]), negated)
 
     def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
-        """Return the formula that a boolean symbol is true: the conditions of its rules, or an atom for recursive rules."""
+        """Return the formula that a boolean symbol is true: the conditions of its rules or, if the rules are recursive, an atom."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
@@ -189,7 +189,9 @@ class Lowering:
                 holds = both([*guards, self.all_of(rule.conditions, terms, scope)])
                 if holds != NEVER:
                     inside = {term.name for term in head.terms}
-                    left = [term for term in terms.values() if term.name not in inside]  # the head lacks the world
+                    left = [
+                        term for term in terms.values() if term.name not in inside
+                    ]  # the atom has no argument for the world
                     yield head, head.terms, some(left, holds)
 
     # ---------------------------------------------------------------------------------------------------- actions
@@ -197,7 +199,7 @@ class Lowering:
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
         """Yield behaviours that together are equivalent to a behaviour: one for each case of the behaviour's conditional effects.
 
-        An effect is split only if its condition is that one symbol has a value, and the symbol has at most `CASES` other values.
+        An effect is split only if its condition states the value of a single symbol that has at most `CASES` other values.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -259,7 +261,7 @@ class Lowering:
         return Action(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
 
     def parameter(self, wanted: str, members: Iterable[str], scope: Scope) -> Term:
-        """Add a parameter for a value that the preconditions determine to an action, and return the parameter."""
+        """Add to an action a parameter for a value that the preconditions determine, and return the parameter."""
         term = Term(scope.fresh(wanted), "object", frozenset(members))
         scope.parameters.append(term)
         return term
@@ -453,8 +455,8 @@ class Lowering:
     def within_bounds(self, scope: Scope) -> Iterator[Formula]:
         """Yield the formulas that all totals are within their bounds.
 
-        The formulas are preconditions of every action and part of the goal. A state with a total out of bounds is thereby a dead
-        end.
+        The formulas are preconditions of every action and part of the goal. A state in which a total is out of bounds is
+        therefore a dead end.
         """
         for situation in self.totals:
             kind = self.words.situations[situation]

@@ -31,7 +31,7 @@ SECTIONS = {
 }
 
 EARLIER = {"sometime": 2, "sometime-before": 3, "at-most-once": 2}
-"""Constraints that concern several states of a plan, with their number of items."""
+"""Constraints that concern several states of a plan, each with the number of items in its form."""
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
@@ -353,8 +353,9 @@ class _Reader:
     def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
         """Parse constraints on all states of a plan, also inside ``and`` and ``forall``.
 
-        A constraint becomes a derived predicate that holds if the constraint is violated, and that is forbidden. The constraints
-        about earlier states read predicates that remember whether other derived predicates have held. ``sometime`` becomes a goal.
+        A constraint becomes a derived predicate that is true if the constraint is violated, and that must never be true. The
+        constraints about earlier states read predicates that remember whether other derived predicates have held. ``sometime``
+        becomes a goal.
         """
         for part in parts:
             head = part.head if isinstance(part, Form) else ""
@@ -377,7 +378,7 @@ class _Reader:
                 raise self.fail(part, f"'{head or '…'}' is not supported in (:constraints …); wanted one of {known}")
 
     def earlier(self, part: Form, each: Sequence[Form]) -> None:
-        """Add the predicates for ``sometime``, ``sometime-before`` or ``at-most-once`` below quantifiers."""
+        """Add the predicates for ``sometime``, ``sometime-before`` or ``at-most-once`` inside the quantifiers `each`."""
         lists = [outer.items[1] for outer in each if self.quantified(outer, {})]
         typed = tuple(one for words in lists if isinstance(words, Form) for one in self.typed(words.items))
         variables = self.scope(typed, {})
@@ -409,7 +410,7 @@ class _Reader:
         return atom
 
     def remember(self, name: str, source: Form, typed: tuple[Typed, ...]) -> Form:
-        """Add a predicate that holds once an atom has held; return the atom of the predicate."""
+        """Add a predicate that becomes true when an atom becomes true, and stays true; return the atom of the predicate."""
         atom = self.declare(name, typed)
         self.pddl.remembers[atom.head] = source.head
         return atom
@@ -560,7 +561,7 @@ class _Reader:
         return (form.head, *(self.word(item, "a term").text for item in got))
 
     def meet(self, kind: str, declared: Typed) -> bool:
-        """Return whether some declared type is a subtype of both types."""
+        """Return whether some declared type is a subtype of both given types."""
         return any({kind, declared.type} <= set(self.pddl.above(lower)) for lower in self.pddl.types)
 
     def term(self, item: Word | Form, variables: Mapping[str, str]) -> str:

@@ -54,7 +54,9 @@ CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
 """Mapping from names to labels, for example to the original PDDL names."""
 _Stated: TypeAlias = "tuple[str, str, str, Properties]"
-"""A fact: subject, value property (or an empty text), value, and the properties of the node if no value property exists."""
+"""A fact: its subject, its value property (or an empty text), its value, and, without a value property, the properties of its
+node.
+"""
 
 
 def turtle(problem: Problem, title: str, description: str, labels: Said | None = None) -> str:
@@ -272,7 +274,10 @@ class _SceneWriter:
         yield from self.terms(nodes, one)
 
     def behavior_nodes(self, where: str, terms: Iterable[Parameter]) -> NodeWriter:
-        """Return a writer of the conditions and effects of a behaviour or rule `where`; the name is the prefix of all its nodes."""
+        """Return a writer of the conditions and effects of a behaviour or rule.
+
+        The names of all nodes begin with its name `where`.
+        """
         taken = {t.name: f":{where}.{t.name[1:]}" for t in terms}
         sought = set(taken.values())
 
@@ -384,7 +389,7 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Append the statement of a condition's or effect's time span unless the span is the whole duration, and return its IRI."""
+    """Return the IRI of a condition or effect. Its time span is stated unless the span is the whole duration."""
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri

@@ -15,7 +15,7 @@ from confab.reasoner.pddl.formulas import Atom, Formula, FunctionTerm, Number, O
 from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
-"""Class whose only individual is the argument of a symbol that has no argument in PDDL."""
+"""Class whose only individual is the argument of each symbol that has no argument in PDDL."""
 RESERVED = """
 all always and assign at-end at-most-once at-start constants decrease define derived domain effect either end
 exists forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number
@@ -63,7 +63,10 @@ class Vocabulary:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the PDDL type of each class that becomes a type (the largest of overlapping classes), and each supertype."""
+        """Return the PDDL types of the classes that become types, and the supertype of each type.
+
+        Of two classes that overlap partially, only the larger class becomes a type.
+        """
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
@@ -134,7 +137,10 @@ class Vocabulary:
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
     def differs(self, term: Term, constant: Term) -> Formula:
-        """Return the formula that a term doesn't denote a given individual, by a predicate instead of PDDL's equality."""
+        """Return the formula that a term doesn't denote a given individual.
+
+        The formula uses a predicate instead of PDDL's equality.
+        """
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
         found = self.static(
             "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
-"""A variable begins at its ``?``, as in ``(aircraft?a)``. A type begins at its name, as in ``(?b -boat)``."""
+"""Pattern of a token. A variable begins at its ``?``, as in ``(aircraft?a)``. A type begins at its name, as in ``(?b -boat)``."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 
 
 class _Whole(Names):
-    """Names that are whole IRIs, except the names of truth values."""
+    """A mapping of IRIs to names in which each IRI is its own name, except the IRIs of truth values."""
 
     def short(self, iri: str) -> str:
         return {CORE + TRUE: TRUE, CORE + FALSE: FALSE}.get(iri, iri)
@@ -62,7 +62,7 @@ class _Whole(Names):
 
 
 def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
-    """Return the given behaviours with IRIs as names and without replacing classes by their definitions."""
+    """Return the given behaviours, with IRIs as names and with classes that aren't replaced by their definitions."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
@@ -73,9 +73,9 @@ def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
 class Frame:
     """The domain of a problem and the classes of some individuals: everything in a problem except its facts and its goal.
 
-    `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values.
-    In `domain`, conditions don't read maxima or minima, and behaviours don't update sums and counts yet. `lifted` contains the
-    behaviours before effects on all members of a class are expanded.
+    `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values. In
+    `domain`, maxima and minima have been replaced in all conditions, but behaviours don't yet update sums and counts. `lifted`
+    contains the behaviours before effects on all members of a class are expanded.
     """
 
     schema: Schema
@@ -173,7 +173,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     Raises
     ------
     KnowledgeError
-        A behaviour changes a derived situation type, or a derived situation type isn't boolean or depends on its own negation.
+        A behaviour changes a derived situation type. Or a derived situation type isn't boolean, or depends on its own negation.
     """
     changed = {
         parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
@@ -318,7 +318,10 @@ def _on_their_levels(
     aggregates: Mapping[str, Aggregate],
     before: Past,
 ) -> Iterator[SituationType]:
-    """Yield the situation types with their levels; a derived type exists from the first level that has all types it depends on."""
+    """Yield the situation types with their levels.
+
+    The level of a derived type is the first level that has all types on which it depends.
+    """
     known = {s.name: s for s in situations}
     earlier = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
@@ -366,7 +369,10 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` for terms with equal names, wrong numbers of arguments, or situation types unknown on the level."""
+    """Raise `KnowledgeError` if a behaviour is faulty.
+
+    Two terms have equal names, a number of arguments is wrong, or a situation type doesn't exist on the behaviour's level.
+    """
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
         raise KnowledgeError(
@@ -400,7 +406,10 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 def _situations(
     schema: Parts, read: Schema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
-    """Return the sorted situation types; and, for each value property, its situation type and whether this type is boolean."""
+    """Return the sorted situation types.
+
+    Also return, for each value property, its situation type and whether this type is boolean.
+    """
     found, properties = [], {}
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)

@@ -39,7 +39,7 @@ from confab.reasoner.symbols import (
 )
 
 TASK = "Task"
-"""Class of the individual that is the argument of derived goals."""
+"""Class of the individual that is the argument of a goal's derived situation type."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """Notation of a number or bounds in a goal on an amount."""
 
@@ -124,7 +124,10 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 
 
 def _with_situation(problem: Problem, words: Sequence[str]) -> str:
-    """Return a hint to the only fact with the first word as object and the last word as value; empty for no or several facts."""
+    """Return a hint to the only situation type that fits two words, or an empty text.
+
+    A type fits if the first word can be its object and the last word its value.
+    """
     about, value = (words[0], words[-1]) if words else ("", "")
     found = [
         each.name
@@ -207,7 +210,9 @@ def _is_fact(wanted: Condition, problem: Problem) -> bool:
 
 
 def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition) -> tuple[Problem, Symbol]:
-    """Return a problem with a new boolean situation type whose rule is a condition, and the symbol of this type.
+    """Return a problem with a new boolean situation type, and the symbol of this type.
+
+    The symbol is true if the condition `wanted` holds.
 
     The argument of the symbol is the task. A goal with alternatives or quantifiers thereby becomes a fact like other goals.
     """
@@ -227,7 +232,9 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
 
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the wanted value of a goal; for a negated goal, the only other value on the lowest level that has the symbol.
+    """Return the wanted value of a goal.
+
+    For a negated goal, this is the only other value of the symbol on the lowest level that has the symbol.
 
     Raises
     ------
@@ -250,7 +257,7 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return the goals that a goal node denotes: one for each member of a class if the node names a class as an argument."""
+    """Return the goals that a goal node denotes: if an argument of the node is a class, one goal for each member of the class."""
     if iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)

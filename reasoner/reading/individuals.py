@@ -16,7 +16,7 @@ from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
 PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
-"""Properties that lead from a fact that is a node to its individuals."""
+"""Properties that lead from the node of a fact to the individuals of this fact."""
 NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
 INDEX = CORE + "index"
 FACT = CORE + "SituatedObjectInstance"
@@ -28,7 +28,7 @@ class Individuals:
     Attributes
     ----------
     triples : ordered set of triples
-        All facts about the individuals in `seen`, and facts about other individuals that mention a searched individual.
+        All facts about the individuals in `seen`, and the facts about other individuals that were found by their values.
     seen : set of individuals
     """
 
@@ -46,7 +46,7 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Read and return the triples about individuals, members of classes, and subjects with given values of properties."""
+        """Read and return the triples about individuals, members of classes, and subjects with property values in `back`."""
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, targets in (back or {}).items():
             if not targets:
@@ -88,7 +88,7 @@ class Individuals:
         return found
 
     def members(self) -> list[Member]:
-        """Return each class of the individuals that have been read, with the individual and its index."""
+        """Return a row for each class of each individual that has been read: individual, class, and index of the individual."""
         named = set[str]()
         kinds: list[tuple[str, str]] = []
         indices: dict[str, int] = {}
@@ -129,7 +129,7 @@ def values_of(iris: Iterable[str]) -> str:
 
 
 def constants_of(schema: Schema) -> set[str]:
-    """Return the individuals that a schema mentions in conditions, effects and definitions, or as rest and default values."""
+    """Return the individuals in the conditions, effects and definitions of a schema, and its rest values and default values."""
     goals = goal_conditions(schema)
     names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
     found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}

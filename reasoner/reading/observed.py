@@ -1,6 +1,6 @@
 """Observed facts of a scene, stored in a separate file.
 
-Each observed fact is a situated object instance, an individual with an object, a situation type and a value. Property assertions
+Each observed fact is a situated object instance: a node that states an object, a situation type and a value. Property assertions
 aren't used, because the observed place of a cup would contradict the cup's place in the scene. A planning call that starts from
 observations replaces the scene's values by the observed values.
 """

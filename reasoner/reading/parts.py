@@ -112,7 +112,7 @@ class Parts(NodeReader):
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
-        """Return the variable of a witness; and, if situations define its class, the conditions of the definition."""
+        """Return the variable of a witness. If its class is defined by situations, also return the conditions of the definition."""
         return self.parameter(iri), self.membership(iri)
 
     def membership(self, iri: str) -> tuple[Condition, ...]:
@@ -148,7 +148,7 @@ class Parts(NodeReader):
         return self.names.short(relation)
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
-        """Return the condition that a term is a member of a class, or the conditions of its definition."""
+        """Return the condition that a term is a member of a class; a class defined by situations is replaced by its definition."""
         return self.definitions.condition(term, kind, negated)
 
     def measured(self, iri: str) -> Amount | Measure:
@@ -179,7 +179,10 @@ class Parts(NodeReader):
         return found
 
     def read(self, iri: str) -> Condition:
-        """Return the condition of a node, which is universally quantified over members if a class stands for its members."""
+        """Return the condition of a node.
+
+        If a class stands for its members in the node, the condition must hold for every member.
+        """
         kinds = self.classes_in(iri)
         for kind in kinds:
             self.standing[kind] = f"?each{len(self.standing) or ''}"
@@ -294,7 +297,10 @@ class Parts(NodeReader):
         return found
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
-        """Return a rule; an individual among its arguments is replaced by a new parameter with an equality condition."""
+        """Return a rule.
+
+        If an individual is among its arguments, a new parameter with an equality condition replaces the individual.
+        """
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:
             raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")

@@ -56,9 +56,8 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 class Reading:
     """A scene as a planning problem, with the mapping from the problem's names to IRIs.
 
-    `whole` states whether the problem contains all individuals of the scene, or only the individuals that the task can
-    need (`confab.reasoner.reading.relevance`). `schema` contains the part of the ontology that doesn't depend on
-    individuals.
+    `whole` states whether the problem contains all individuals of the scene, or only the individuals that the task can need
+    (`confab.reasoner.reading.relevance`). `schema` contains the part of the ontology that is independent of individuals.
     """
 
     problem: Problem
@@ -91,7 +90,7 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
 
 
 def read_names(graph: KnowledgeGraph) -> Names:
-    """Return the same short names for a whole scene as `read`, without reading facts."""
+    """Return the short names that `read` would give to the terms of a whole scene, without reading facts."""
     return names_of(read_schema(graph), _members(graph))
 
 

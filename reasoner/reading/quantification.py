@@ -1,9 +1,10 @@
 """Quantification: a behaviour with parameters becomes a SPARQL query whose rows are the quantified behaviours.
 
-The query has one sub-select per parameter, which yields the individuals of the parameter's class. The ID of a
-quantified behaviour follows from the declared order of behaviours, then of parameters, then of individuals (PAPER.md
-section 4). `quantify` calculates the IDs without an ORDER BY clause, which makes the query ten times as fast and lets a
-time limit stop the query. Applicability isn't tested: the number M in the paper counts all quantified behaviours.
+The query has one sub-select per parameter. A sub-select yields the individuals of the parameter's class. Quantified behaviours
+are numbered in the declared order of their behaviours, then by the declared order of the individuals for the first parameter,
+then for the second parameter, and so on (PAPER.md section 4). `quantify` calculates the IDs without an ORDER BY clause, which
+makes the query ten times as fast and lets a time limit stop the query. Applicability isn't tested: the number M in the paper
+counts all quantified behaviours.
 """
 
 from __future__ import annotations
@@ -62,9 +63,9 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
 def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str:
     """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
 
-    If `ordered`, the rows are sorted by ID unless individuals share an index, or lack an index and belong to several
-    ontologies. If the reading contains only a part of the scene, the query is restricted to the individuals of this
-    part.
+    If `ordered`, the rows are sorted by ID. The order may differ from the IDs if individuals have the same index, or have no
+    index and belong to several ontologies. If the reading contains only a part of the scene, the query is restricted to the
+    individuals of this part.
 
     Raises
     ------

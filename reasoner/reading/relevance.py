@@ -1,15 +1,15 @@
-"""Task recognition: selection of the individuals in a large world that a task can need, by few queries.
+"""Task recognition: few queries select the individuals in a large world that a task can need.
 
-The selected individuals (the slice) are closed: if a behaviour can change a symbol of the slice, the slice also contains all
-individuals in the behaviour's conditions and other effects. Planning in the slice therefore gives the same result as planning in
-the whole world (proof: docs/quantification.md; tests: test_recognition.py, test_closure.py). Recognition has two steps:
+The set of selected individuals, the *slice*, is closed: if a behaviour can change a symbol of the slice, the slice also contains
+all individuals in the behaviour's conditions and other effects. Planning in the slice therefore gives the same result as planning
+in the whole world (proof: docs/quantification.md; tests: test_recognition.py, test_closure.py). Recognition has two steps:
 
-1. `routes` reads only the behaviours. For each behaviour that can change a symbol, the function finds routes from the symbol's
-   object to the other terms of the behaviour: forward to a value (the place of the object), along a static relation (a hand
-   that reaches the place), or backward from a value (other objects at the place). If a term has no route, the slice contains
-   all individuals of the term's class.
-2. `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one step, until a
-   query finds no new individual. A task without a plan in the slice then has no plan in the world.
+1. `routes` reads only the behaviours. For each behaviour that can change a symbol, the function finds routes (chains of
+   properties in the graph) from the symbol's object to the other terms of the behaviour. A route goes forward to a value (the
+   place of the object), along a static relation (a hand that reaches the place), or backward from a value (other objects at the
+   place). If no route leads to a term, the slice contains all individuals of the term's class.
+2. `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one property,
+   until a query finds no new individual. If the task has no plan in the slice, it then has no plan in the world.
 """
 
 from __future__ import annotations
@@ -51,17 +51,20 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
-"""Maximum number of queries that follow routes by one step each, before one query with a property path completes the slice."""
+"""Maximum number of queries that follow the routes by one property each; then one query with a property path completes the
+slice.
+"""
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # costs of steps; the cheapest step to a term is chosen
 
 
 @dataclass
 class Routes:
-    """Properties that lead from relevant individuals to further relevant individuals, as IRIs.
+    """The properties (as IRIs) by which task recognition gets from relevant individuals to further relevant individuals.
 
     - `forward` contains the properties that are followed from subject to object.
-    - `backward` maps each property that is followed from object to subject to the constants from which it is followed, too.
-      A constant is a value that a behaviour names, such as "nothing"; many symbols may have this value.
+    - The keys of `backward` are the properties that are followed from object to subject. The values are the constants from which
+      a property is followed, too. A constant is a value that a behaviour names, such as "nothing"; many symbols may have this
+      value.
     - `classes` contains the classes whose individuals are all relevant.
     """
 
@@ -123,16 +126,17 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """Return the routes from a goal's individuals to all individuals that relevant behaviours can involve or change.
 
-    A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type. All
-    situation types in conditions and effects of relevant behaviours and rules are relevant. If a fact is looked up by some of its
-    terms, routes also lead from these terms in effects to the behaviour's other terms.
+    A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type.
+    All situation types in conditions and effects of relevant behaviours and rules are relevant. If facts of a situation type are
+    looked up by one of their terms, such as a place, an effect on such a fact may concern the slice. Routes therefore also lead
+    from this term of the effect to the behaviour's other terms.
 
     Parameters
     ----------
     known : Frame
         The frame of the constants.
     more_situations : iterable of str
-        Relevant situation types in addition to the situation types in the task's goals.
+        Situation types that are relevant in addition to the situation types in the task's goals.
     """
     found = Routes(forward=set(known.properties) - known.schema.numbers, classes=_goal_classes(known.schema))
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
@@ -175,19 +179,19 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
-"""The (situation type, position of a term) by which facts are looked up, each with the constants that the term may denote."""
+"""Maps each pair (situation type, position of a term) by which facts are looked up to the constants that the term may denote."""
 
 
 class _Doing:
-    """A behaviour or rule in task recognition, with the routes from each effect to all of its terms and changes.
+    """A behaviour or rule in task recognition, with the routes from each of its effects to all of its terms.
 
     Attributes
     ----------
     situations : set of str
-        The situation types in its conditions and effects.
+        The situation types in the conditions and effects of the behaviour.
     step : set of str
-        The parameters, the variables in positive conditions, and the variables in `always`. (A total also depends on the
-        individuals of a variable that occurs in no condition.)
+        The parameters, the variables in positive conditions, and the variables in `always`. (For a total, `always` has the
+        variables that occur in no condition, since the total depends on their individuals, too.)
     """
 
     def __init__(self, behavior: Behavior, always: Collection[str] = ()) -> None:
@@ -208,7 +212,7 @@ class _Doing:
     def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
         """Add the routes from each effect to all individuals of the behaviour, and to all symbols that the behaviour changes."""
         if not self.spanned:
-            for scope in self.asks[1:]:  # scopes of negated conditions and of alternatives
+            for scope in self.asks[1:]:  # the other scopes belong to negated conditions and alternatives
                 _span(scope, self.step, set(), known, found, looked_up)
             for _, (first, *groups), named in self.effects:
                 _span(first, self.step, named, known, found, looked_up)
@@ -301,8 +305,8 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 class _Step:
     """A route from one term of a condition to another: the properties to follow, and the cost.
 
-    `constants` are the individuals that the source may denote. `looks_up` is the situation type and the source's
-    position among the arguments; None if the source alone determines the symbol.
+    `constants` are the individuals that the source may denote. `looks_up` is the situation type with the source's position among
+    the arguments; it is None if the source alone determines the symbol.
     """
 
     source: str
@@ -315,9 +319,9 @@ class _Step:
 
 
 def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
-    """Yield the routes between any two terms of a positive condition along stated facts.
+    """Yield the routes along stated facts between any two terms of a positive condition.
 
-    Facts that are nodes are always followed from their first argument.
+    A fact that is a node is always followed from its first argument.
     """
     arguments: tuple[str, ...]
     match condition:
@@ -412,7 +416,10 @@ class _Search(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read all individuals that the routes reach from a frontier, and possibly more, because a path ignores constants."""
+        """Read all individuals that the routes reach from a frontier.
+
+        More individuals may be read, because a property path ignores constants.
+        """
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
             node = "|".join(f"<{p}>" for p in PLACES)
@@ -427,10 +434,12 @@ class _Search(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return the IRIs in known namespaces with the local name of an individual or class that has been read.
+    """Return the IRIs that differ only in the namespace from an individual or class that has been read.
 
-    Each candidate IRI is looked up separately. An individual is included only if a class of the individual is stated. A
-    class is included only if it has individuals that aren't nodes of the schema.
+    Only known namespaces are searched.
+
+    Each candidate IRI is looked up separately. An individual is included only if a class of the individual is stated. A class is
+    included only if it has individuals besides the nodes of the schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -468,7 +477,7 @@ def _goal_situations(schema: Schema) -> set[str]:
 
 
 def _goal_individuals(schema: Schema) -> set[str]:
-    """Return the individuals in goals and in facts that have no arguments."""
+    """Return the individuals in goals, and in facts without arguments."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
     named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}

@@ -3,8 +3,8 @@
 ============================  ==========================================================================
 in the ontology               in `confab.reasoner.symbols`
 ============================  ==========================================================================
-``M :remembers S``            ``Domain.remembers``: M is true from the first state on in which S is true
-``S :atMostOnce true``        ``S.again`` is never true: S is true, and ``S.ended`` remembers that S,
+``M :remembers S``            ``Domain.remembers``: M is true in the first state in which S is true, and in all later states ``S
+:atMostOnce true``        ``S.again`` is never true: S is true, and ``S.ended`` remembers that S,
                               which ``S.begun`` remembers, was false later
 ``S :onlyAfter E``            ``S.before.E`` is never true: S is true, and ``S.after.E`` doesn't remember
                               that E was true while S was false
@@ -65,7 +65,10 @@ class Past:
         return name
 
     def never(self, name: str, about: tuple[str, ...]) -> None:
-        """Add the constraint that a situation type is never true; `about` are the situation types that the author constrains."""
+        """Add the constraint that a situation type is never true.
+
+        The situation types that the ontology's author constrains are in `about`.
+        """
         self.constraints[f"{name}.exceptions"] = Constraint(name, about=about)
 
     def _add(self, name: str, like: str) -> None:
@@ -89,7 +92,7 @@ def concerns_the_past(schema: Schema) -> bool:
 
 
 def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> Past:
-    """Return all situation types, with the remembered ones and the constraints that concern several states.
+    """Return all situation types, together with the remembered situation types and the constraints that concern several states.
 
     Raises
     ------
@@ -122,7 +125,7 @@ def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> P
 
 
 def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
-    """Return the IRI of the situation type that a situation type remembers; raise `KnowledgeError` if it can't remember it."""
+    """Return the IRI of the situation type that another situation type remembers; raise `KnowledgeError` if this is impossible."""
     source, name = parts.one(iri, "remembers"), parts.names.short(iri)
     _check_boolean(parts, found, iri, "remembers", iri, source)
     for said in ("fromLevel", "restValue", "defaultValue"):

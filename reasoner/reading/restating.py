@@ -92,7 +92,10 @@ def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[
 
 
 def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterator[ox.Triple]:
-    """Yield the triples of a refutation, a precondition that excludes the combination of its arguments and facts."""
+    """Yield the triples of a refutation, which becomes a precondition.
+
+    With the arguments of the refutation, the behaviour isn't applicable while the facts hold.
+    """
     behavior = reading.names.iri(one.behavior)
     terms = [row[1] for row in graph.select(PARAMETERS, SCENE, behavior=behavior)]
     if len(terms) != len(one.arguments):
@@ -117,12 +120,15 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
 
 
 def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
-    """Return the value property of each situation type with a value property; keys and values are IRIs."""
+    """Return a mapping of the situation types with a value property to this property; keys and values are IRIs."""
     return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
 
 
 def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
-    """Yield the triples of a fact: a statement of its value property if possible, otherwise a node. A false fact has no triples."""
+    """Yield the triples of a fact: one triple with its value property if possible, otherwise the triples of a node.
+
+    A false fact has no triples.
+    """
     iri, symbol, value = reading.names.iri, fact.symbol, fact.value
     if value == FALSE:
         return

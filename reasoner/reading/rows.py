@@ -21,7 +21,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
-FIRST_INDEX_OF_NONE = 10**9  # nodes without an index come last, sorted by name
+FIRST_INDEX_OF_NONE = 10**9  # sorts nodes without an index last, by their names
 DATA = frozenset(
     CORE + name
     for name in (
@@ -60,11 +60,11 @@ class Schema:
     - `nodes` contains situation types, behaviours with their parts, relations and tasks.
     - `pairs` contains the situation types whose value property isn't functional.
     - `whole` contains the amounts whose value property has the range of whole numbers.
-    - `tuples` states whether some facts are nodes; `facts` contains the facts without arguments.
+    - `tuples` tells whether some facts are nodes; `facts` contains the facts without arguments.
     - `expressions` contains the definitions of classes, `axioms` contains the axioms about value properties, and `swrl`
       contains the SWRL rules.
     - `ontologies` contains the IRIs of the loaded files.
-    - `exclusive` contains the situation types for which physics gives a value to only one individual at a time.
+    - `exclusive` contains the situation types of which, in physics, only one individual at a time can have a given value.
     """
 
     nodes: Mapping[str, Node]
@@ -83,7 +83,7 @@ class Schema:
 
     @cached_property
     def by_kind(self) -> Mapping[str, Sequence[str]]:
-        """The nodes of each class that a node is stated to belong to, sorted by IRI."""
+        """The nodes of each stated class, sorted by IRI."""
         found: dict[str, list[str]] = defaultdict(list)
         for iri, node in self.nodes.items():
             for kind in node[TYPE]:
@@ -121,7 +121,7 @@ def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, lis
 
 
 def core_triple(row: Sequence[Term]) -> Triple:
-    """Return a triple as text; raise `KnowledgeError` if a literal is the value of a property whose values are nodes."""
+    """Return a triple as texts; raise `KnowledgeError` if the value is a literal although the values of the property are nodes."""
     subject, predicate, value = row
     named = text(predicate)
     return (
@@ -130,7 +130,7 @@ def core_triple(row: Sequence[Term]) -> Triple:
 
 
 def link(row: Sequence[Term], blank: bool = False) -> Triple:
-    """Return a triple between two individuals as text; blank nodes are allowed only if `blank`.
+    """Return a triple between two individuals as texts; blank nodes are allowed only if `blank`.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
 
 
 def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
-    """Return a fact as text; the value is a number if the property is one of `numbers`."""
+    """Return a fact as texts; the value must be a number if the property is one of `numbers`."""
     subject, predicate, value = row
     if text(predicate) not in numbers:
         return link(row)

@@ -12,7 +12,7 @@ from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nod
 from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
-"""Properties whose values are whole texts (updates and queries)."""
+"""Properties whose values are texts of updates and queries."""
 KINDS = (
     "SituationType",
     "Behavior",
@@ -51,10 +51,10 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
   UNION {{ {swrl.RULES} BIND("swrl" AS ?part) }}
 }}"""
-"""Selects the rows that every planning call in a world needs; a row with the part ``tuples`` means that some facts are nodes.
+"""Query for the rows that every planning call in a world needs; a row with the part ``tuples`` tells that some facts are nodes.
 
-The query has no ORDER BY, because sorting takes a store longer than finding the rows. Results are sorted where the order matters
-(`nodes_of`, `classes_of`, `initial_state`).
+The query has no ORDER BY, because a store needs more time to sort the rows than to find them. Results are sorted where the order
+matters (`nodes_of`, `classes_of`, `initial_state`).
 """
 
 

@@ -1,7 +1,7 @@
-"""A part of a scene that is extended by the lookups of a check, independently of the routes of task recognition.
+"""A part of a scene that grows by the individuals that a check looks up, independently of the routes of task recognition.
 
-A checker looks up individuals: members of a class that initially satisfy conditions. One query finds all looked-up individuals,
-and their values are read. The lookups are repeated until they find no new individual.
+A checker looks up the members of a class that initially satisfy conditions. One query finds the individuals for all lookups, and
+their values are read. The lookups are repeated until no new individual is found.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""Conditions, each as the IRI of a situation type or relation with a flag per argument; a flag marks the looked-up individual."""
+"""The form of a lookup's conditions: for each condition, the IRI of a situation type or relation, and a flag per argument that
+tells whether the argument is the individual that is looked up.
+"""
 
 
 class Surroundings:
@@ -60,7 +62,7 @@ class Surroundings:
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read some individuals, the members of some classes, and all individuals to which the values lead."""
+        """Read some individuals, the members of some classes, and all individuals that are values of individuals read before."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)
@@ -77,7 +79,7 @@ class Surroundings:
 
     @property
     def agree(self) -> bool:
-        """Whether the names of the slice have the same meaning in the surroundings."""
+        """Whether the names of the slice denote the same individuals and terms in the surroundings."""
         return self.names.agree(self.frame.names)
 
     @property
@@ -91,7 +93,7 @@ class Surroundings:
         return reading_of(self.graph.scene, self.frame, facts, tuples, whole=False).problem
 
     def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
-        """Read the individuals that lookups find for each row of known terms; return whether an individual is new."""
+        """Read the individuals that lookups find for each row of known terms; return whether a new individual was found."""
         classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
         for (witness, known), rows in lookups.items():
             for row in rows:
@@ -118,7 +120,7 @@ class Surroundings:
         return bool(fresh)
 
     def _asked(self, variable: str, conditions: Iterable[Condition]) -> Iterator[tuple[str, tuple[str | None, ...]]]:
-        """Yield each condition on stated facts as its IRI and terms; None stands for the variable."""
+        """Yield, for each condition on stated facts, its IRI and its terms; None stands for the variable."""
         iri, situations, rules = self.frame.names.iri, self.frame.domain.situations, self.frame.domain.rules
         for condition in conditions:
             match condition:
@@ -134,7 +136,7 @@ class Surroundings:
             yield name, tuple(None if t == variable else iri(t) for t in terms)
 
     def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
-        """Return a graph pattern that binds ``?x`` to the individuals with stated facts of a shape, for each row of known terms."""
+        """Return a pattern that binds ``?x`` to the individuals whose stated facts match a shape, for each row of known terms."""
         number, parts = 0, []
         at = "|".join(f"<{place}>" for place in PLACES)
         for i, (name, places) in enumerate(shape):

@@ -13,8 +13,8 @@ further class atoms of ``?x``                `ClassCondition`, or the conditions
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
-A variable that occurs only in the body is determined by a functional value property, or becomes the variable of a `Witness`.
-Rules are DL-safe: variables denote only named individuals of the scene.
+For a variable that occurs only in the body, a functional value property determines its value, or it becomes the variable of a
+`Witness`. Rules are DL-safe: variables denote only named individuals of the scene.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class _Imp:
         return sorted(found)
 
     def _numbers(self, body: Sequence[Atom]) -> None:
-        """Determine the numeric expressions that variables denote."""
+        """Find the numeric expressions that the variables of the body denote."""
         numbers = self.definitions.numbers
         for predicate, said in body:
             if predicate in numbers and len(said) == 2 and self.variable(said[1]):

@@ -18,8 +18,8 @@ in the update                               as individuals
 ``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of the rule, `:over` the variables that have a type pattern
 ==========================================  =====================================================================
 
-All conditions are evaluated in the state before the behaviour, including the conditions of further operations. A variable has the
-same value in all operations.
+All conditions, including the conditions of further operations, are evaluated in the state before the behaviour. A variable has
+the same value in all operations.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from confab.reasoner.updates.words import (
 )
 
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
-"""The change of an amount by operator: the operator combines the old amount and a term."""
+"""The kind of change for each operator that combines the old amount with a term."""
 
 
 class UpdateCompiler:
@@ -67,7 +67,7 @@ class UpdateCompiler:
         self.known: set[str] = set()
 
     def write(self, update: Update) -> None:
-        """Compile an update: its first operation gives preconditions and effects, further operations give conditional effects."""
+        """Compile an update. Its first operation states preconditions and effects; further operations state conditional effects."""
         own, operations = parsed(update.text)
         self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
         for name, (node, kind, number) in self.scope.declared.items():
@@ -96,7 +96,10 @@ class UpdateCompiler:
             self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
 
     def write_rule(self, query: Update) -> None:
-        """Compile a CONSTRUCT query: its head is the rule's conclusion, its WHERE states the conditions or aggregated tuples."""
+        """Compile a CONSTRUCT query.
+
+        Its head is the rule's conclusion, and its WHERE states the rule's conditions or the aggregated tuples.
+        """
         own, rule = constructed(query.text)
         self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
         self.nodes.links = {}

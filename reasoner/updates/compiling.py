@@ -18,7 +18,9 @@ UPDATES = """SELECT ?behavior ?property ?value WHERE {
   FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
   FILTER(?property != :construct || NOT EXISTS { ?behavior :situationType ?situation })
 } ORDER BY ?behavior ?property ?value"""
-"""Selects the updates of behaviours without individuals; stores that were filled from files contain the individuals already."""
+"""Query for the updates that haven't been compiled into individuals; stores that were filled from files already contain the
+individuals.
+"""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
   ?behavior a/rdfs:subClassOf* :Behavior . { ?behavior :update ?text } UNION { ?behavior :extends ?other }
   ?term :termType ?type . FILTER(STRSTARTS(STR(?term), CONCAT(STR(?behavior), ".")) || EXISTS { ?behavior :parameter ?term })
@@ -133,7 +135,7 @@ def _compile(
 
 
 def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield all behaviours that a behaviour extends, and the behaviour itself last; a cycle yields a behaviour twice."""
+    """Yield all behaviours that a behaviour extends, and the behaviour itself last. In a cycle, a behaviour is yielded twice."""
     if behavior in above:
         yield behavior
         return

@@ -34,14 +34,20 @@ class Conditions:
     numbers: Numbers
 
     def sought(self, group: Group, known: Collection[str], at: int) -> list[str]:
-        """Return the condition nodes of a nested group, inside witnesses if the group introduces variables with a type."""
+        """Return the condition nodes of a nested group.
+
+        If the group introduces variables with a type, witnesses enclose the conditions.
+        """
         if not group.chosen:
             self.scope.determine(group)
             return self.all_of(group, {*known, *group.names})
         return [self.witness(group, known, at)]
 
     def witness(self, group: Group, known: Collection[str], at: int) -> str:
-        """Return the outermost of the nested witnesses for a group's variables, with each condition as far outside as possible."""
+        """Return the outermost of the nested witnesses for a group's variables.
+
+        Each condition is moved as far outward as possible.
+        """
         inside = {*known, *group.names}
         names = list(group.chosen)
         depth = {name: level for level, name in enumerate(names)}
@@ -64,7 +70,7 @@ class Conditions:
         for level, (node, sought, kind) in enumerate(made):
             found = self.all_of(Group(levels[level]), inside)
             found += [deeper for deeper, *_ in made[level + 1 : level + 2]]
-            if not found:  # the only condition is the class
+            if not found:  # the class is the only condition
                 found = [self.nodes.condition("ClassCondition", at, class_properties(self.scope.terms[sought], kind))]
             self.nodes.said[node]["condition"] = found
         return made[0][0]
@@ -180,7 +186,7 @@ class Conditions:
         return self.absence(conditions[0])
 
     def absence(self, witness: str) -> str:
-        """Change a negated witness that only tests one value to an absence condition, if possible, and return its node."""
+        """Change a negated witness to an absence condition if the witness tests only one value; return the node."""
         said = self.nodes.said[witness]
         sought, inner = said.get("witness", [""])[0], said.get("condition", [])
         if sought.rpartition(".")[2] != ANYONE[1:] or len(inner) != 1:
@@ -219,7 +225,7 @@ class Conditions:
         return self.nodes.condition("ValueCondition", at, self.situation(one, known))
 
     def arguments(self, one: Triple, known: Collection[str]) -> list[str]:
-        """Return the nodes of the subject and the objects of a triple, without a final ``true``."""
+        """Return the nodes of the subject and the objects of a triple; a final ``true`` is left out."""
         said = one.object if isinstance(one.object, tuple) else (one.object,)
         at = one.predicate.at
         if said and isinstance(said[-1], Truth):

@@ -1,7 +1,7 @@
 """Conversion of the behaviours in a Turtle file to SPARQL updates or to individuals.
 
-The file is split into statements, and only the statements about behaviours and their parts are replaced. A behaviour that the
-other form can't express remains unchanged, and the reason is reported.
+The file is split into statements. Only the statements about behaviours and their parts are replaced. A behaviour that the other
+form can't express remains unchanged, and the reason is reported.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class _File:
 
 
 def convert(path: Path, form: Form) -> Converted:
-    """Return a Turtle file in which all behaviours have the same form.
+    """Return a Turtle file with all of its behaviours in the given form.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Return whether a triple of a part can be dropped, because the other form expresses it, or it only labels a condition."""
+    """Return whether a triple can be dropped: it only labels a condition, or the other form of the behaviour expresses it."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
@@ -329,7 +329,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
         nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
     schema = read_schema(graph)
     nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
-    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # updates don't express prices, so the calculation is kept
+    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # updates can't express prices, so the calculation is kept
     while (
         more := {v for node in priced for values in schema.nodes[node].values() for v in values}
         & schema.nodes.keys() - priced
@@ -354,7 +354,10 @@ def situations_of(schema: Schema) -> Situations:
 
 
 def plainly(behavior: Behavior) -> object:
-    """Return a canonical form, which is equal for behaviours that differ only in the names of bound variables and in order."""
+    """Return a canonical form of a behaviour.
+
+    Behaviours have equal forms if they differ only in the names of bound variables and in the order of their parts.
+    """
     effects = ((e.situation, e.arguments, e.value, _plain(e.when), e.each) for e in behavior.effects)
     return (
         behavior.name,
@@ -371,7 +374,7 @@ def plainly(behavior: Behavior) -> object:
 
 
 def spans_of(behavior: Behavior) -> frozenset[object]:
-    """Return the conditions and effects of a behaviour that hold only at its start or its end, each with its span."""
+    """Return the conditions and effects that concern only the start or only the end of a behaviour, each with its span."""
     if behavior.timing is None:
         return frozenset()
     asked = ((span, _plain([c])) for span, c in behavior.timing.conditions if span is not Span.THROUGHOUT)

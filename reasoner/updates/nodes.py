@@ -20,7 +20,7 @@ class Nodes:
     ----------
     behavior : str
     said : mapping of node to properties
-        Maps names of core properties to values; `TYPE` maps to the node's classes.
+        The properties of each node, as a mapping of the core property's name to values; the key `TYPE` has the node's classes.
     places : mapping of node to Place
     links : Properties
         The properties of the behaviour itself.

@@ -19,7 +19,7 @@ ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 
 @dataclass(frozen=True)
 class Measured:
-    """An amount with its arguments, or a static relation that maps its arguments to a number."""
+    """An amount with its arguments, or a static relation that assigns a number to its arguments."""
 
     kind: str
     of: str
@@ -95,7 +95,10 @@ class Numbers:
         return node
 
     def side(self, node: str, name: str, side: Side, at: int) -> None:
-        """Add an operand to a node: as properties (an amount on the left, a number on the right) or as a separate node."""
+        """Add an operand to a node.
+
+        An amount on the left and a number on the right become properties of the node; other operands become separate nodes.
+        """
         if name == "left" and isinstance(side, Measured):
             self.nodes.said[node] |= side.properties
             return

@@ -1,4 +1,7 @@
-"""Resolution of the variables in an update: to terms of the behaviour or to numbers, by the patterns that introduce them."""
+"""Resolution of the variables in an update.
+
+The pattern that introduces a variable determines whether it is a term of the behaviour or a number.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ class Group:
     """The parts of a group graph pattern, without the patterns that only introduce variables.
 
     - `chosen` maps each variable that a type pattern introduces to its class.
-    - `determined` maps each variable that a value condition introduces to its class, or its situation type, and its position.
+    - `determined` maps each variable that a value condition introduces to its class (or situation type) and its position.
     - `numbers` maps each variable that denotes a number to the triple or BIND expression that gives the number.
     """
 
@@ -60,7 +63,7 @@ class Scope:
     numbers: dict[str, Any] = field(default_factory=dict)
 
     def bind(self, name: str, kind: str, role: str, node: str, place: Place, sought: bool = False) -> None:
-        """Map a variable to a term node; a different variable with the same name gets a different node."""
+        """Map a variable to a term node. Two different variables with the same name get different nodes."""
         found = self.declared.get(name, ("", "", 0))
         if not node and found[0]:
             node = found[0]

@@ -1,4 +1,4 @@
-"""The text of an update with its prefixes, positions in the text, and the properties that an update can use."""
+"""The text of an update with its prefixes, the positions in this text, and the properties that an update can use."""
 
 from __future__ import annotations
 

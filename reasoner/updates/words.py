@@ -204,7 +204,7 @@ def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
 
 
 def _copied(*elements: Any) -> tuple[Any, ...]:
-    """Return copies of grammar elements that share the token by which pyparsing marks an optional part that is missing."""
+    """Return copies of grammar elements. The copies share the token by which pyparsing marks a missing optional part."""
     missing = pyparsing.Opt(pyparsing.Empty()).defaultValue
     return deepcopy(elements, {id(missing): missing})
 
@@ -278,7 +278,7 @@ def _operation(request: Any, text: str) -> Operation:
 
 @dataclass(frozen=True)
 class _Block:
-    """The triples of DELETE WHERE in the form of a group's part."""
+    """The triples of a DELETE WHERE operation, in the form of a part of a group."""
 
     triples: Sequence[Triple]
     name: str = "Read"

@@ -75,7 +75,7 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 
 
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
-    """Return the conditions and effects of each operation; the first operation has no conditions besides the preconditions.
+    """Return the conditions and effects of each operation; the first operation has only the preconditions as conditions.
 
     Operations are in the order of the effects. Effects that make facts false are added to an operation with the same conditions.
     """
@@ -192,11 +192,11 @@ class _Writer:
         return f"{subject} {self.spell(situation)} {_listed([*rest, self.put(value)])}"
 
     def group(self, conditions: Sequence[Condition], known: dict[str, bool], labels: Sequence[str] = ()) -> list[str]:
-        """Return one line for each condition.
+        """Return one line of the update for each condition.
 
-        `known` maps the variables bound so far to whether their type has been written. Variables that the conditions determine are
-        added to `known` for all lines, because SPARQL ignores the order of patterns. Only a class condition on a determined
-        variable has to follow the condition that determines the variable.
+        The keys of `known` are the variables bound so far; the values tell whether the type of the variable has been written.
+        Variables that the conditions determine are added to `known` for all lines, because SPARQL ignores the order of patterns.
+        Only a class condition on a determined variable has to follow the condition that determines the variable.
         """
         said = list(_flat(zip(conditions, [*labels, *[""] * len(conditions)], strict=False)))
         for one, _ in said:
@@ -290,7 +290,10 @@ class _Writer:
             yield f"{self.put(value)} a {self.spell(kind)} ."
 
     def asked_of_class(self, term: str) -> bool:
-        """Return whether a class condition on a term exists; without a type pattern, it would be read as the type of the term."""
+        """Return whether a class condition on a term exists.
+
+        If the term had no type pattern, the condition would be read as the term's type.
+        """
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
             for condition in self.behavior.conditions
@@ -299,7 +302,7 @@ class _Writer:
 
 
 def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:
-    """Yield the labelled conditions; the conjuncts of an `AnyOf` with one alternative replace the `AnyOf`."""
+    """Yield the labelled conditions; an `AnyOf` with only one alternative is replaced by the conjuncts of this alternative."""
     for condition, label in conditions:
         match condition:
             case AnyOf((group,), False):
@@ -309,7 +312,10 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of a disjunction that only enumerates individuals; None for others."""
+    """Return the variable and the individuals of a disjunction.
+
+    Return None unless the disjunction only enumerates individuals of one variable.
+    """
     found: list[str] = []
     name = ""
     for group in alternatives:

@@ -29,7 +29,7 @@ from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
 
 EVERY_OTHER = re.compile(r"\?each\d")
-"""Names of the variables for members of a class that a condition refers to (`confab.reasoner.reading.parts`)."""
+"""Pattern of the names of variables that stand for the members of a class in a condition (`confab.reasoner.reading.parts`)."""
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
@@ -82,7 +82,10 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
-    """Find effects on all members of a class whose `when` refers to all members of another class with common members."""
+    """Find effects on all members of a class whose condition `when` refers to all members of another class.
+
+    Only classes with common members are reported.
+    """
     if case.reading is None:
         return
     problem = case.reading.problem
@@ -102,10 +105,10 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
-    """Find values that behaviours or goals require and that are neither initial values nor values of an effect.
+    """Find values that behaviours or goals require, although they are neither initial values nor values of an effect.
 
-    If a value is unreachable only because of another unreachable value, one finding reports both values. Behaviours
-    without objects in the scene aren't reported, because they belong to other scenes.
+    If a value is unreachable only because another value is unreachable, one finding reports both values. Behaviours without
+    objects in the scene aren't reported, because they belong to other scenes.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -195,7 +198,7 @@ def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
-    """Yield each group of behaviours that need only each other; these groups cause the other findings."""
+    """Yield each group of behaviours that need only each other; the other findings are consequences of these groups."""
     seen = set[str]()
     for name in needs:
         reached = _reached(name, needs) | {name}
@@ -234,7 +237,10 @@ def _words(condition: Condition, behavior: Behavior) -> str:
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects whose values no behaviour of the next level gives, if that level has effects on the situation type."""
+    """Find effects on a level whose value no behaviour of the next level gives.
+
+    Effects on situation types that the next level never changes aren't reported.
+    """
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -259,7 +265,7 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
 
 
 def crowded_places(case: Case) -> Iterator[Fault]:
-    """Find individuals that share an initial value although every behaviour that gives the value requires a free value."""
+    """Find individuals that share an initial value, although every behaviour that gives the value requires a free value."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

@@ -179,14 +179,17 @@ def _plain(condition: Condition) -> str:
 
 @dataclass(frozen=True)
 class _Inner:
-    """A class condition in a negated condition on a term that is bound outside."""
+    """A class condition that is inside a negated condition and concerns a term that is bound outside."""
 
     term: str
     kind: str
 
 
 def repeated_names(case: Case) -> Iterator[Fault]:
-    """Find negated conditions with a class condition on an outer term; the author probably meant two different individuals."""
+    """Find negated conditions that contain a class condition on a term bound outside.
+
+    The author probably meant two different individuals.
+    """
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -235,7 +238,7 @@ def _below(kind: str, other: str, problem: Problem) -> bool:
 
 
 def impossible_situations(case: Case) -> Iterator[Fault]:
-    """Find physically impossible initial states, and goals that are physically impossible together."""
+    """Find initial states that are physically impossible, and goals that together are physically impossible."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names

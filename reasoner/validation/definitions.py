@@ -118,7 +118,7 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
 
 
 def defined(case: Case) -> Iterator[Fault]:
-    """Report whether each derived situation type is static, or the situation types on which it depends."""
+    """Report, for each derived situation type, the changing situation types on which it depends, or that it is static."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -205,7 +205,7 @@ NOT_ENFORCED = {
 
 
 def axioms_not_watched(case: Case) -> Iterator[Fault]:
-    """Find axioms that planning ignores because they restrict every state, or classify individuals without a definition."""
+    """Find axioms that planning ignores: restrictions of every state, and classifications of individuals without a definition."""
     if case.reading is None:
         return
     known = case.reading.schema.expressions

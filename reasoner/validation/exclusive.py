@@ -1,4 +1,4 @@
-"""Validation rule on exclusive values: no behaviour may give a second individual a value that only one can physically have.
+"""Validation rule on exclusive values: no behaviour may give a second individual a value that physically has only one holder.
 
 The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an
 object. A behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other
@@ -6,9 +6,9 @@ individual has the value. Each level is checked separately.
 
 - *free*: The preconditions require that no individual has the value.
 - *handed over*: The same behaviour takes the value from the individual that has the value.
-- *taken*: The value itself changes from a state in which no individual has the value. (Example: A cup at a place is in
-  no hand. Picking it up takes the cup from the place, and each behaviour that brings a cup to a place takes the cup
-  from a hand.)
+- *taken*: The value is an object, and the same behaviour ends a state of this object in which no individual has the value.
+  (Example: a cup at a place is in no hand. The behaviour that gives the cup to a hand also takes the cup from the place, and each
+  behaviour that brings a cup to a place takes the cup from a hand.)
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state of a value that excludes a holder: the `situation` of the value is a member of `kind`, or equals `value`."""
+    """A state of a value that excludes a holder of this value: the value's `situation` is a member of `kind`, or equals `value`."""
 
     situation: str
     kind: str
@@ -136,7 +136,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the individual with an effect's value loses the value by the same behaviour, or receives the value."""
+        """Return whether the holder of an effect's value loses the value by the same behaviour, or is itself the receiver."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)
@@ -189,7 +189,7 @@ class _Exclusive:
         )
 
     def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours, with their effect in words, after which an individual may have a value that is in the state."""
+        """Yield the behaviours, with their effect in words, that may give a holder to a value in the state `way`."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):

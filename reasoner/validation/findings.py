@@ -130,7 +130,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that mentions a node about which no file contains statements."""
+        """Return a file that mentions a node; the function is for nodes that are the subject in no file."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
@@ -161,12 +161,12 @@ def fill(template: str, words: Mapping[str, str]) -> str:
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings without duplicates; findings that may be causes come first, then findings are sorted by file and line."""
+    """Return the findings without duplicates. Findings that may be causes come first; all findings are sorted by file and line."""
     return sorted(set(findings), key=lambda finding: (finding.rule not in CAUSES, finding))
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:
-    """Return the subjects of a file's statements: subjects with a stated class (``typed``), and other subjects (``other``)."""
+    """Return the subjects in a file, in two groups: subjects with a stated class (``typed``), and other subjects (``other``)."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
     with readable(file) as (content, form):
         for quad in ox.parse(content, format=form, base_iri=file.as_uri()):

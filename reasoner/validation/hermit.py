@@ -3,11 +3,11 @@
 One run of the reasoner determines whether the ontology is consistent, which named classes are empty in every model, and which
 behaviours have a precondition that no individual can satisfy. For the last question, each term of a behaviour becomes a class,
 its *prototype*, defined by the conditions on the term; variables become nested class expressions. If a prototype is empty, the
-conditions contradict the ontology. Two conditions on the same nested variable are examined separately, so that some
-contradictions aren't found.
+conditions contradict the ontology. Two conditions on the same nested variable are examined separately; contradictions between
+them aren't found.
 
-HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Therefore, each member
-gets a different number as the value of one functional property instead. The conclusions are the same, and take seconds.
+HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead, each member
+gets a different number as the value of one functional property. HermiT then draws the same conclusions in seconds.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TYPE, FIRST, REST = (ox.NamedNode(RDF + name) for name in ("type", "first", "res
 MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
 CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
 MEMORY = "-Xmx2000M"
-QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # reduce the time for compilation in a short run
+QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # less time for compilation, since the run is short
 UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # the encoding for all versions of Java
 IMPORTS = OWL + "imports"
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"

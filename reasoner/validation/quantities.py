@@ -81,13 +81,13 @@ def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]
             yield one.left, one.right, "compares"
     for effect in behavior.amounts:
         by: Expression = effect.amount
-        if effect.operation == "scale":  # the factor has no unit
+        if effect.operation == "scale":  # a factor has no unit
             by = Calculation("*", Amount(effect.situation, effect.arguments), effect.amount)
         yield Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"
 
 
 def multiplied_amounts(case: Case) -> Iterator[Fault]:
-    """Find products and quotients of changing amounts, which the search for plans of a whole level doesn't support."""
+    """Find products and quotients of changing amounts. The search for plans of a whole level doesn't support them."""
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -112,7 +112,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals without a number that a behaviour reads; the behaviour isn't applicable to these individuals."""
+    """Find individuals without a number that a behaviour reads. The behaviour isn't applicable to these individuals."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -247,7 +247,7 @@ class _Ranges:
                 return expression, expression
 
     def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
-        """Return the reason why a behaviour is never applicable, and the ranges of the amounts concerned; otherwise None."""
+        """Return the reason why a behaviour is never applicable, and the ranges of the amounts concerned, or None."""
         narrowed: dict[Expression, Range] = {}
         for condition in behavior.preconditions:
             if not isinstance(condition, Comparison) or condition.negated:
@@ -331,7 +331,7 @@ def _possible(sign: str, left: Range, right: Range) -> bool:
 
 
 def _narrowed(sign: str, left: Range, right: Range) -> Range:
-    """Return the part of the left range in which the comparison with some number of the right range is true."""
+    """Return the numbers of the left range for which the comparison with some number of the right range is true, as a range."""
     low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
     high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
     return low, high

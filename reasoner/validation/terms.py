@@ -64,7 +64,7 @@ def relative_iris(case: Case) -> Iterator[Fault]:
 
 
 def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
-    """Yield each use of an undeclared term: the subject, the term, and the expected kind of term in words and as classes."""
+    """Yield each use of an undeclared term: the subject, the term, and the expected kind of term, in words and as classes."""
     for triple in case.triples:
         for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
             types = case.types.get(iri, set())

@@ -1,4 +1,4 @@
-"""Validation rules on times: windows in which a behaviour doesn't fit, and durations that aren't in seconds."""
+"""Validation rules on times: time windows that are too short for a behaviour, and durations that aren't in seconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SECONDS = ("", "s", "sec", "second", "seconds")
 
 
 def windows_too_short(case: Case) -> Iterator[Fault]:
-    """Find individuals whose windows are all shorter than a behaviour that names the individual."""
+    """Find individuals whose time windows are all shorter than a behaviour in which the individual takes part."""
     if case.reading is None or case.reading.problem.times is None:
         return
     problem, names = case.reading.problem, case.reading.names

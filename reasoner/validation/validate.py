@@ -60,9 +60,9 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""Rules that are skipped for a node that mentions an undeclared term, because their faults may be consequences of this term."""
+"""Rules that are skipped for nodes that mention an undeclared term, because the faults may be consequences of this term."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
-"""Maps a check to another check; a node with a finding of the other check is skipped."""
+"""A mapping of a check to a more precise check; the first check skips the nodes about which the second check has a finding."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
 """Checks whose findings are about initial facts or bounds, like the findings of ``impossible-situation``."""
@@ -81,7 +81,7 @@ QUICK = 100_000
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
-"""Namespaces of the properties in shapes; the many facts of scenes have properties in other namespaces."""
+"""Namespaces of the properties that the shapes check; the many facts of a scene have properties in other namespaces."""
 LISTS = (RDF + "first", RDF + "rest")
 
 
@@ -97,7 +97,8 @@ def validate(
     deep : bool
         Whether to run also HermiT, which needs Java.
     done : callable, optional
-        Is called with a description at the beginning of each stage: `STAGES` times per file, and once more if `deep`.
+        Function that is called with a description at the beginning of each stage: `STAGES` times per file, and once more if
+        `deep`.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def validate(
 
 
 def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
-    """Return the errors in a graph with inferred facts that can be found quickly, without shapes, bodies and HermiT.
+    """Return the errors that can be found quickly, without shapes, bodies and HermiT, in a graph with inferred facts.
 
     Return no errors for a graph with more than `QUICK` triples.
     """
