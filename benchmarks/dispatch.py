@@ -178,7 +178,7 @@ def _late(problem: Problem, timed: TimedPlan) -> bool:
 
 
 def _hindsight(planned: Dispatch, factors: list[Fraction]) -> tuple[bool, bool, Fraction, Fraction]:
-    """Return whether the planned order keeps all times with the actual durations, and the same of the best known schedule.
+    """Return whether the planned order keeps all times with the actual durations, and whether the best known schedule does.
 
     Also return the makespan of the best known schedule, and its lower bound.
     """

@@ -91,7 +91,7 @@ class Block:
         return done.stdout.split()
 
     def last(self, root: Path) -> str:
-        """Return the last commit that changed the measured code, which a rebase of later commits leaves unchanged."""
+        """Return the last commit that changed the measured code; a rebase of later commits doesn't change this commit."""
         command = ["git", "-C", str(root), "log", "-1", "--format=%h", "--", *self.measures]
         return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
 

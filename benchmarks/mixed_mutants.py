@@ -1,9 +1,9 @@
 """The share of small faults in recognition, proofs and checkers that random worlds detect.
 
-`benchmarks.mutants` draws the faults. A separate process with one fault judges the worlds until a result is wrong that is right
-without the fault. It judges only worlds that execute the faulty statement, first those that have detected most faults. The
-results are stored in a file, so that a later run can continue. If the generator or the judge of worlds has changed, the later run
-tries the survivors again.
+`benchmarks.mutants` draws the faults. A separate process with one fault judges worlds until a result is wrong; without the
+fault, the same result is right. The process judges only worlds that execute the faulty statement, first those that have
+detected most faults. The results are stored in a file, so that a later run can continue. If the generator or the judge of
+worlds has changed, the later run tries the survivors again.
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ def traced(
 
 
 def noticed(file: str, text: str, worlds: dict[int, Drawn], mode: str, before: Saying) -> int | None:
-    """Return the seed of the first world with a new complaint with a changed text of a module; 0 if the process fails."""
+    """Return the seed of the first world that causes a new complaint if a module has a changed text; 0 if the process fails."""
 
     def run(tell: Callable[[object], None]) -> None:
         faulty = Instead(file, text)

@@ -106,7 +106,7 @@ def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
 
 
 def _measured(place: str) -> bool:
-    """Return whether the problems of a folder belong to the benchmark, to which training problems belong only with CONFAB_ALL."""
+    """Return whether the problems of a folder belong to the benchmark; training problems belong to it only with CONFAB_ALL."""
     return place.startswith("testing") or ("CONFAB_ALL" in os.environ and place.startswith("training"))
 
 

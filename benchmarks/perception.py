@@ -115,7 +115,7 @@ def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Gen
 
 
 def _disturb(world: PhysicsWorld, truth: Truth, rng: np.random.Generator) -> None:
-    """Shift one in five empty objects away from all places, and lay one in five on their side, so that these are at no place."""
+    """Shift one in five empty objects away from all places, and lay one in five on their side, so that both are at no place."""
     uses = world.embodiment.perceivers
     for symbol in [s for s in truth if uses[s.situation].perceiver == "perceive_place"]:
         name, draw = symbol.arguments[0], rng.random()

@@ -74,7 +74,7 @@ class Trial:
 
 
 def wilson(good: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return Wilson's confidence interval of a share, `good` out of `of`, by default at 95 %.
+    """Return Wilson's confidence interval, by default at 95 %, of the share of `good` cases among `of` cases.
 
     >>> low, high = wilson(98, 100)
     >>> print(f"{low:.3f} {high:.3f}")
@@ -187,7 +187,8 @@ class _Pool:
         here, there = Pipe()
         code = "import sys; sys.path[:] = sys.argv[2:]; from confab.sim.rollouts import work; work(int(sys.argv[1]))"
         command = [sys.executable, "-c", code, str(there.fileno()), *sys.path]
-        process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)  # the process limits each rollout
+        # each rollout has a limit of its own in the process
+        process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)
         self.started.append(process)
         there.close()
         here.send(self.trial)

@@ -21,7 +21,7 @@ SHARE = 0.1
 """Minimum share of a body's points that a camera has to see for the body to count as seen."""
 
 BARED = 0.5
-"""Minimum share of points at the believed pose of a body that a camera must see empty for the body to count as gone."""
+"""A body counts as gone if a camera sees that at least this share of the points at its believed pose is empty."""
 
 BEHIND, ABOVE, ASIDE = 0.1, 0.8, 0.5
 """Distances in metres of a robot's default cameras from the middle of its shoulders: back, up and to either side."""

@@ -74,9 +74,9 @@ class RolloutJson(TypedDict):
 class Verdict:
     """The result of a step in the world.
 
-    `measured` maps names, which end with the unit, to measured numbers. After failed motion planning, `facts` has the
-    positions of the step's objects. The step is refuted while these facts hold. If a body blocks a link, `swings` names
-    the link, and `likewise` has the refutations of other steps, by any hand, that the body blocks.
+    `measured` maps names, which end with the unit, to measured numbers. After failed motion planning, `facts` has the positions
+    of the step's objects. The step is refuted while these facts hold. If a body blocks a link, `swings` names the link, and
+    `likewise` contains the refutations of the other steps that the body blocks, for any hand.
     """
 
     ok: bool

@@ -18,7 +18,7 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 RAISED = ("rise", "home")
-"""Motions after which a hand is raised."""
+"""With noisy perception, number of observations after which a difference from the expected state counts."""
 
 LEVEL = 0.01
 """Maximum difference in metres between the height of a place and the base of an object that stands at the place."""

@@ -1,4 +1,7 @@
-"""Property tests draw the same examples in every run; `--hypothesis-profile explore` draws new ones. In CI no test is skipped."""
+"""Property tests draw the same examples in every run; with `--hypothesis-profile explore`, they draw new examples.
+
+In CI, no test may be skipped.
+"""
 
 import os
 
@@ -12,7 +15,7 @@ settings.load_profile("same-every-time")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Let a run with CI=true fail if a test was skipped: something isn't installed that `make test` installs with it."""
+    """Let a run with CI=true fail if a test was skipped, because a package that `make test` installs is then missing."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or os.environ.get("CI") != "true":
         return

@@ -1,4 +1,4 @@
-"""The site: each page in its navigation once, commands and calls that exist, a tutorial that prints what it says, no warning."""
+"""The site: each page is in the navigation once, commands and calls exist, the tutorial prints its outputs, without warnings."""
 
 import ast
 import doctest
@@ -101,7 +101,7 @@ def test_what_shows_each_promise_is_there() -> None:
 
 
 def defined(file: Path) -> set[str]:
-    """Return the names that a module defines at its top, and those that its classes do, each behind its class."""
+    """Return the top-level names of a module, followed by the names in its classes with the class as prefix."""
     found = set()
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
         for one, prefix in (

@@ -1,4 +1,4 @@
-"""Figures in the documentation say what measured them and when; those older than the code that they measure are told."""
+"""Figures in the documentation state their command and date; figures older than the measured code are listed."""
 
 import subprocess
 import warnings

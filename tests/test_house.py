@@ -16,8 +16,10 @@ ROOMS = [
     "planner",
     "sim",
     "confab",
-]  # left to right; all but the last are links inside of `confab`
-SUBROOMS = {  # of the planner: what each may import beside itself; plan, validation, language, levels and transitions all may
+]  # from left to right; all but the last are links in the folder `confab`
+# the sub-rooms of the planner, each with the sub-rooms that it may import; all may import plan, validation, language, levels
+# and transitions
+SUBROOMS = {
     "paper": set[str](),
     "grounded": set[str](),
     "hierarchical": {"grounded", "paper"},
@@ -37,7 +39,7 @@ def package_of(module: str) -> str:
 
 
 def imported_packages(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Yield line and room or top-level name of every absolute import, also one inside a function."""
+    """Yield the line of every absolute import, also inside functions, with the imported room or top-level package."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -111,7 +113,7 @@ def module_name(path: Path) -> str:
 
 
 def imports(root: Path, folders: Sequence[str]) -> dict[str, set[str]]:
-    """Return for each module below some folders those that it imports, inside functions and for type checking included."""
+    """Return for each module the modules that it imports, including imports inside functions and for type checking."""
     paths = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
     modules = {module_name(path.relative_to(root)): path for path in paths}
     found: dict[str, set[str]] = {}
@@ -166,7 +168,7 @@ def test_a_seeded_cycle_is_found(tmp_path: Path, back: str) -> None:
 
 
 def astray(graph: Mapping[str, set[str]]) -> list[str]:
-    """Return the imports from one sub-room of the planner to another that it doesn't build on, or to what is above all."""
+    """Return the imports of modules that a sub-room of the planner must not import."""
     found = []
     for module, others in sorted(graph.items()):
         room = module.split(".")[2] if module.count(".") == 3 else ""
@@ -224,7 +226,7 @@ def test_benchmarks_and_shared_worlds_import_no_tests() -> None:
 
 
 def foreign_benchmarks(root: Path) -> list[str]:
-    """Return the imports of benchmarks by tests, except by the test of that benchmark, which has its name."""
+    """Return the imports of benchmarks by tests; the test with the name of a benchmark may import it."""
     found = []
     for path in sorted((root / "tests").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -1,4 +1,4 @@
-"""What the first screen shows is what happens."""
+"""The first screen of the README shows the actual output."""
 
 import doctest
 import re

@@ -1,4 +1,4 @@
-"""The site shows what the pages say: the same headings, code blocks, tables and lists, and every public name in the reference."""
+"""The site has the content of the pages: the same headings, code blocks, tables and lists; the reference has every public name."""
 
 import inspect
 import re
@@ -22,16 +22,16 @@ PAGES = sorted(DOCS.rglob("*.md"))
 VOID = {"area", "br", "col", "hr", "img", "input", "link", "meta", "source", "wbr"}
 CAN_BUILD = find_spec("mkdocs") is not None and find_spec("material") is not None
 Shown = tuple[str, str]
-"""A kind of block (heading, code, table, list) and its text, without markup and white space at the ends."""
+"""A kind of block (heading, code, table, list), and its text without markup and surrounding white space."""
 
 
 def words(text: str) -> str:
-    """Return a text with single spaces and without typographic quotes and entities, as both sides show it."""
+    """Return a text with single spaces, and without typographic quotes and entities, so that page and site can be compared."""
     return " ".join(text.replace("\xa0", " ").split())
 
 
 def written(text: str) -> Iterator[Shown]:
-    """Yield the blocks of a page as CommonMark with tables reads it, which is also what GitHub shows."""
+    """Yield the blocks of a page, parsed as CommonMark with tables, like on GitHub."""
     tokens = MarkdownIt("commonmark", {"html": True}).enable("table").parse(text)
     for i, token in enumerate(tokens):
         if token.type == "heading_open":
@@ -119,7 +119,7 @@ class Rendered(HTMLParser):
             self.blocks[-1][1].append(data)
 
     def shown(self) -> list[Shown]:
-        """Return the blocks as `written` gives them."""
+        """Return the blocks in the form of `written`."""
         return [
             (kind, text.strip() if kind == "code" else words(text).split(" ")[0] if kind == "item" else words(text))
             for kind, parts in self.blocks
@@ -134,7 +134,7 @@ def rendered(page: Path) -> Rendered:
 
 
 def build(sources: Path, site: Path) -> None:
-    """Build the site strictly: a warning is an error."""
+    """Build the site in strict mode, in which a warning is an error."""
     command = [sys.executable, "-m", "mkdocs", "build", "-q", "-f", str(sources / "mkdocs.yml"), "-d", str(site)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -142,7 +142,7 @@ def build(sources: Path, site: Path) -> None:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site as `make docs` builds it, without a warning."""
+    """The site that `make docs` builds, without a warning."""
     folder = tmp_path_factory.mktemp("site")
     build(ROOT, folder)
     return folder
@@ -156,7 +156,7 @@ def test_every_page_of_the_site_has_the_blocks_of_its_source(site: Path) -> None
     for page in PAGES:
         source = list(written(page.read_text(encoding="utf-8")))
         shown = rendered((site / page.relative_to(DOCS)).with_suffix(".html")).shown()
-        if page.stem == "reference":  # the docstrings add blocks of their own
+        if page.stem == "reference":  # the docstrings add further blocks
             shown = [block for block in shown if block in source]
         assert shown == source, page.name
 

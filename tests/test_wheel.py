@@ -1,4 +1,4 @@
-"""The wheel is whole: installed into an environment of its own, outside the repository, it does the main job."""
+"""The wheel is complete: installed outside the repository into a new environment, it plans and verifies."""
 
 import os
 import subprocess
@@ -47,7 +47,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
 
 
 def test_installed_outside_of_the_repository_it_does_the_main_job(wheel: Path, tmp_path: Path) -> None:
-    """The environment has the locked packages beside it, and the wheel's own files: nothing of the repository."""
+    """The environment contains the locked packages and the wheel's own files, and no file of the repository."""
     pytest.importorskip("pybullet")
     home = tmp_path / "environment"
     venv.create(home, symlinks=True, with_pip=False)
@@ -62,7 +62,7 @@ def test_installed_outside_of_the_repository_it_does_the_main_job(wheel: Path, t
         "ontology.py",
         "sim/__init__.py",
         "reasoner/__init__.py",
-    ):  # names that a user may have, too
+    ):  # names that a user's module may have, too
         (tmp_path / taken).parent.mkdir(exist_ok=True)
         (tmp_path / taken).write_text("raise AssertionError\n")
     code = "import sys, confab.ontology; print(confab.__file__, confab.ontology.ROOT)"

@@ -1,4 +1,4 @@
-"""Docstrings, comments, messages and pages name things: no pronoun stands for a missing noun, and no turn has to be guessed."""
+"""Docstrings, comments, messages and pages use the nouns of the field: no pronoun replaces a noun, and no phrase is a riddle."""
 
 import ast
 import re
@@ -14,7 +14,7 @@ RIDDLES = re.compile(
     r"|as \w+ as can be|for want of|take note of|worked out|puts? aside)\b",
     re.IGNORECASE,
 )
-"""Turns of speech in place of the field's nouns and verbs: calculated, not applicable, failed, result, move away."""
+"""Phrases in place of the field's nouns and verbs, such as calculated, not applicable, failed, result, move away."""
 OLD_NAMES = {
     *("Alike", "Concern", "Effort", "Mended", "Moment", "Patience", "Want", "Wants", "Width"),
     *("astray", "despair", "fast_plan", "mending", "wary", "Guide", "attain", "vain"),
@@ -32,7 +32,7 @@ IN_FILES = ('"facts of what hands reach"', '"somebody"', '"nobody"')
 
 
 def texts() -> dict[str, str]:
-    """Return all modules and pages in one line each, so that a line break splits no words."""
+    """Return the text of each module and page as one line, so that a line break splits no phrase."""
     code = [file for room in ("reasoner", "planner", "sim", "confab") for file in sorted((ROOT / room).rglob("*.py"))]
     files = (*code, *(ROOT / "docs").rglob("*.md"))
     found = {}

@@ -186,7 +186,7 @@ class _Draft:
         apart = [] if self.lamp else [EqualityCondition("?a", "?b", negated=True)]
         room = (
             [] if self.lamp and self.room == 1 else self.roomy("?b")
-        )  # from a spot to the same one turns it on as well
+        )  # a move from a spot to the same spot turns the lamp on as well
         move = behavior(
             "MOVE", 1, "?i:Item ?b:Spot",
             [has("AT", "?i", "?a"), *apart, *room, *self.may("?i", "?b"), *(shy if self.shy and self.treats else [])],

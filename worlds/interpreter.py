@@ -256,7 +256,7 @@ class Interpreter:
         return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
 
     def sources(self, name: str, other: str) -> list[tuple[int, Any]]:
-        """Return the slot of each symbol of a remembered type, with the function that tells whether what it remembers is true."""
+        """Return the slot of each symbol of a remembered type, with a function: whether the symbol that it remembers is true."""
         found = []
         for symbol, slot in self.slots.items():
             if symbol.situation == name:
@@ -267,7 +267,7 @@ class Interpreter:
     def closed(self, values: list[Any], level: float = math.inf) -> State:
         """Return a state with all derived values.
 
-        The remembered symbols that a level sees become true if what they remember is true.
+        The remembered symbols that a level sees become true if the symbols that they remember are true.
         """
         self.derive(values)
         for cells in (cells for first, cells in self.remembered if first <= level):

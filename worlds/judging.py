@@ -387,7 +387,8 @@ class Judge:
         problem = self.call(mode, back)
         if problem is None:
             return
-        if ":derived " not in exported.domain and self.sampled(READERS, "reader", "export"):  # it doesn't read axioms
+        # unified-planning reads no axioms
+        if ":derived " not in exported.domain and self.sampled(READERS, "reader", "export"):
             self.read_by_unified_planning(mode, exported.domain, exported.problem)
         actions = (
             prod(len(problem.members(p.kind)) for p in (*b.parameters, *b.variables))

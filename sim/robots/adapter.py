@@ -24,7 +24,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
 from confab.sim.robots.transport import Model, RobotError, Transport
 
 GRACE = 5.0
-"""Maximum time in seconds until a robot has to end a cancelled action."""
+"""Maximum time in seconds in which a robot must end a cancelled action."""
 
 SENT = 2.0
 """Maximum time in seconds to send a cancellation after an exception."""

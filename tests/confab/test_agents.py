@@ -1,4 +1,4 @@
-"""Twenty sessions of agents with `confab mcp`, through the official client: answers, refusals, limits, and no traceback."""
+"""Twenty sessions of an agent with `confab mcp`, through the official client: answers, refusals and limits, without a traceback."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SESSIONS: dict[str, Session] = {}
 
 
 def session(scripted: Session) -> Session:
-    """Add a session to those that are held."""
+    """Register a session to be run."""
     SESSIONS[scripted.__name__.replace("_", " ")] = scripted
     return scripted
 
 
 async def said(client: Any, tool: str, refused: bool = False, **arguments: object) -> str:
-    """Return what a tool answers, once it is sure that it is an answer, or a refusal, of at most 4,000 bytes."""
+    """Return the answer of a tool, or its refusal if `refused`. The text has at most 4,100 bytes and no traceback."""
     result = await client.call_tool(tool, arguments)
     text: str = result.content[0].text
     assert result.is_error is refused, text
@@ -175,7 +175,7 @@ async def two_calls_at_once_are_answered(client: Any) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a scene of one's own, a broken one, a link and a catalog that lead out of it."""
+    """A folder with a user's scene, a broken scene, and a link and a catalog that point outside of the folder."""
     root = tmp_path_factory.mktemp("agents")
     own, astray = root / "mine", root / "mine" / "astray"
     astray.mkdir(parents=True)
@@ -188,7 +188,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def hold(own: Path, scripts: dict[str, Session], errors: Path) -> list[dict[str, Any]]:
-    """Hold sessions one after the other with one server; return the schemas of its tools."""
+    """Run sessions one after another with one server; return the schemas of its tools."""
     command = StdioServerParameters(command=sys.executable, args=["-m", "confab", "mcp", str(own)])
 
     async def held() -> list[dict[str, Any]]:

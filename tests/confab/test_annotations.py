@@ -1,4 +1,4 @@
-"""No `Any` in the annotations of what a user gets: of all names of `confab`, and of the classes that these lead to."""
+"""The public annotations of `confab` contain no `Any`: all public names are checked, and all classes in their annotations."""
 
 import ast
 from collections.abc import Iterator
@@ -12,7 +12,10 @@ ROOT = Path(confab.__file__).parent
 
 @cache
 def module(name: str) -> dict[str, ast.AST]:
-    """Return what a module of Confab defines or imports, by name; an import as the node that imports."""
+    """Return the syntax nodes of the names that a module of Confab defines or imports.
+
+    An imported name has the node of its import.
+    """
     path = ROOT.joinpath(*name.split(".")[1:])
     path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     if not name.startswith("confab") or not path.is_file():
@@ -28,7 +31,7 @@ def module(name: str) -> dict[str, ast.AST]:
 
 
 def home(name: str, where: str) -> tuple[str, ast.AST] | None:
-    """Return the module that defines a name which a module uses, and the definition."""
+    """Return the module that defines a name which another module uses, and the definition."""
     node = module(where).get(name)
     if isinstance(node, ast.ImportFrom):
         return home(next(a.name for a in node.names if name in (a.asname, a.name)), node.module or "")
@@ -36,7 +39,7 @@ def home(name: str, where: str) -> tuple[str, ast.AST] | None:
 
 
 def annotated(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
-    """Yield what is public in a definition, each with its annotation, and the bases of a class."""
+    """Yield the public names in a definition, each with its annotation, and the bases of a class."""
     match node:
         case ast.FunctionDef(name=name, args=args, returns=returns):
             for each in (*args.posonlyargs, *args.args, *args.kwonlyargs, args.vararg, args.kwarg):
@@ -56,7 +59,7 @@ def annotated(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 
 
 def anys() -> tuple[list[str], set[str]]:
-    """Return where `Any` is in the public annotations, and the names that were looked at."""
+    """Return the public annotations that contain `Any`, and all names that were checked."""
     waiting = [(name, "confab") for name in confab.__all__]
     seen: set[tuple[str, str]] = set()
     found: list[str] = []

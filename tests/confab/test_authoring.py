@@ -1,4 +1,4 @@
-"""Beginning a domain, seeing what an edit changed, and taking memory along in a rename."""
+"""Starting a domain, the report of what an edit changed, and renaming terms together with the memory."""
 
 import os
 from pathlib import Path
@@ -78,7 +78,7 @@ def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -
 
 @pytest.fixture
 def memory(tmp_path: Path) -> Path:
-    """A memory of one lesson in the tearoom."""
+    """A memory that has learned one lesson in the tearoom."""
     new_domain("tearoom", tmp_path)
     scene = confab.load(tmp_path / "tearoom-scene.ttl")
     remembered = confab.Memory.of(scene)

@@ -1,4 +1,4 @@
-"""Hostile and broken input: a result or one line, never a traceback, and nothing that was good is harmed."""
+"""Hostile and broken input: the answer is a result or one line, never a traceback, and valid files are unharmed."""
 
 import json
 import os
@@ -33,7 +33,7 @@ Ask = Callable[..., Answer]
 
 @pytest.fixture
 def ask(capsys: pytest.CaptureFixture[str]) -> Ask:
-    """Call the command line in this process: exit code, stdout, stderr."""
+    """Call the command line in this process; return the exit code, stdout and stderr."""
 
     def answer(*arguments: str | Path) -> Answer:
         capsys.readouterr()
@@ -461,7 +461,7 @@ def test_dollars_in_labels_are_drawn(tmp_path: Path, tearoom: Path, ask: Ask) ->
     assert ask("picture", tearoom, "--behavior", "B1_WASH", "-o", tmp_path / "a.svg")[0] == YES
 
 
-# ------------------------------------------------------------------------------------------------- other doors
+# ---------------------------------------------------------------------------------------- other kinds of input
 
 
 STEP = '{"behavior": "B1_WASH", "arguments": ["plate1"]'
@@ -511,7 +511,7 @@ def test_an_address_that_is_none_is_refused_in_one_line(tmp_path: Path, ask: Ask
     assert (code, err.count("\n")) == (MISUSE, 1)
 
 
-# ------------------------------------------------------------------------------------------------- queries, apart
+# ---------------------------------------------------------------------------------- queries in a separate process
 
 
 NESTED = "SELECT * WHERE " + "{" * 3000 + "}" * 3000
@@ -541,7 +541,7 @@ def test_a_query_harms_nothing_but_itself(ask: Ask, query: str, more: list[str],
 
 
 def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
-    """Whatever the check of words lets through: without leave, the process can't open a connection."""
+    """A query that the check of keywords accepts still can't open a connection, unless the user allows it."""
     import http.server
 
     asked: list[str] = []
@@ -578,7 +578,7 @@ def test_the_word_service_may_be_spoken_of(text: str) -> None:
     assert SERVICE.search(TEXTS.sub(" ", f"SELECT * {{ ?a ?b {text} }}")) is None
 
 
-# ------------------------------------------------------------------------------------------------- the door
+# ------------------------------------------------------------------------------------------ checks of input
 
 
 def test_a_fault_of_ours_is_one_line_with_a_log(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -639,7 +639,7 @@ def test_json_stays_json(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
     json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
 
 
-# ------------------------------------------------------------------------------------------------- one deadline
+# -------------------------------------------------------------------------------------------- a single deadline
 
 
 @pytest.mark.parametrize(("mode", "objects"), [("guarded", 400), ("paper", 120)])
@@ -801,7 +801,8 @@ main()
     )
     assert done.returncode == INTERRUPTED, done.stderr
     assert done.stderr.splitlines()[-1] == "confab: interrupted; every file is unchanged or complete"
-    assert all(line.startswith("confab: ") for line in done.stderr.splitlines() if line)  # click ends the line of ^C
+    # click prints a line break after ^C
+    assert all(line.startswith("confab: ") for line in done.stderr.splitlines() if line)
     assert not list(tmp_path.rglob("*.*"))
 
 

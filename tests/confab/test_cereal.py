@@ -1,4 +1,4 @@
-"""The second scenario: cereal and milk, authored in Turtle alone, planned, and verified in physics."""
+"""The second scenario: cereal and milk, written in Turtle alone, planned, and verified in physics."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A certificate that was saved is verified again by the command line, without a search."""
+"""The command line verifies a saved certificate again, without a search."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line as a stranger meets it: results on stdout, one clear line for every misuse, exit codes that mean one thing."""
+"""The command line for a new user: results on stdout, one clear line for each misuse, and one meaning for each exit code."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The commands as one gets to know them: examples that run, one meaning of -o, words about progress, and silence where wanted."""
+"""The commands: examples that run, one meaning of -o, progress messages, and no messages with --quiet."""
 
 import io
 import os
@@ -47,7 +47,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CliRunner:
 
 
 def commands(group: Any = app, before: str = "") -> dict[str, click.Command]:
-    """Return the commands of a group, and of the groups in it, by all words of their names."""
+    """Return the commands of a group and of its subgroups, by the full name of the command."""
     found: dict[str, click.Command] = {}
     context = click.Context(group)
     for name in group.list_commands(context):

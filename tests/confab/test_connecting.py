@@ -1,4 +1,4 @@
-"""Robots that others control: the protocol, the conformance test, interfaces as data, and a robot behind HTTP."""
+"""Robots with a controller of their own: the protocol, the conformance test, interfaces as data, and a robot behind HTTP."""
 
 import asyncio
 import random
@@ -38,12 +38,12 @@ CATALOG = """<?xml version="1.0"?><catalog prefer="public" xmlns="urn:oasis:name
 
 @pytest.fixture(scope="module")
 def rover(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """Return the scene that the robot's own world model makes, with its interface."""
+    """Return the scene that the robot's world model describes, with its interface."""
     return confab.load(scene_file(tmp_path_factory.mktemp("rover"))).with_goal(*GOALS)
 
 
 def scene_file(folder: Path) -> Path:
-    """Write that scene."""
+    """Write the scene that the robot's world model describes."""
     (folder / "rover.ttl").write_text(interface())
     (folder / "catalog-v001.xml").write_text(CATALOG)
     alone = confab.load(str(folder / "rover.ttl"))
@@ -54,7 +54,7 @@ def scene_file(folder: Path) -> Path:
 
 @contextmanager
 def acting(scene: Scene, fault: Fault, seconds: float = 5.0) -> Iterator[tuple[InterfaceWorld, Robot]]:
-    """Yield the world of a served robot in which an action may take some seconds, and the robot."""
+    """Yield the world of a served robot, whose actions may take some seconds, and the robot."""
     robot = Robot(fault)
     with served(robot) as address:
         world, _ = connected(scene, scene.problem, f"rover:{address}")
@@ -158,7 +158,10 @@ def test_what_the_model_names_and_the_scene_does_not_know_is_left_out(rover: Sce
 
 
 def test_of_many_actions_with_random_faults_none_hangs_and_none_is_believed_unseen(rover: Scene) -> None:
-    """Each verdict is held against what the robot did: success only if it is true, and what is observed is always so."""
+    """Each verdict is compared with the robot's actions.
+
+    A success is reported only if it is true, and all observed facts are true.
+    """
     draw = random.Random(41)
     wrong = ["hang", "half", "lie", "garbage", "refuse"]
     behaviors = rover.problem.domain.at_level(2)
@@ -238,7 +241,7 @@ def test_a_scene_of_another_ontology_is_imported_by_a_query_and_planned_in(tmp_p
 
 @dataclass
 class Slow:
-    """An asynchronous robot that moves symbols, and takes its time."""
+    """An asynchronous robot that changes symbols, and takes time for each change."""
 
     problem: Problem
     pause: float = 0.0

@@ -1,4 +1,4 @@
-"""What a call costs, counted: what recognition reads and looks at, how often the store is asked, what the command imports."""
+"""The cost of a call in counts: the rows and triples that recognition reads, the queries to the store, and the imported modules."""
 
 import json
 import subprocess
@@ -26,14 +26,14 @@ from confab.reasoner.reading.schema import SCHEMA
 
 
 class Looked(SimpleMemory):
-    """The triples of a knowledge graph as rdflib's query engine sees them, each counted that it looks at."""
+    """The triples of a knowledge graph for rdflib's query engine, with a count of the triples that the engine reads."""
 
     def __init__(self, store: ox.Store) -> None:
         super().__init__()
         self.store, self.count = store, 0
 
     def triples(self, triple_pattern: Any, context: Any = None) -> Iterator[Any]:
-        """Yield what fits a pattern."""
+        """Yield the triples that match a pattern."""
         s, p, o = (None if term is None else to_oxigraph(term) for term in triple_pattern)
         for graph in SCENE:
             for quad in self.store.quads_for_pattern(s, p, o, ox.NamedNode(BASE + graph)):
@@ -42,7 +42,7 @@ class Looked(SimpleMemory):
 
 
 def to_oxigraph(term: Any) -> Any:
-    """Return a term of rdflib's as one of pyoxigraph's."""
+    """Return a term of rdflib as a term of pyoxigraph."""
     if isinstance(term, rdflib.Literal):
         return (
             ox.Literal(str(term), language=term.language)
@@ -53,7 +53,7 @@ def to_oxigraph(term: Any) -> Any:
 
 
 def to_rdflib(term: Any) -> Any:
-    """Return a term of pyoxigraph's as one of rdflib's."""
+    """Return a term of pyoxigraph as a term of rdflib."""
     if isinstance(term, ox.Literal):
         named = None if term.language else rdflib.URIRef(term.datatype.value)
         return rdflib.Literal(term.value, lang=term.language, datatype=named)
@@ -62,11 +62,11 @@ def to_rdflib(term: Any) -> Any:
 
 @dataclass
 class Counting:
-    """A store elsewhere, which counts what it is asked, what it answers and what it looks at for that.
+    """A remote store that counts the queries, the rows and bytes of its answers, and the triples that it reads for them.
 
-    It works a query out as it is written, from one bound pattern to the next, as plain engines do: what it looks at is what
-    the query needs of the world, not what one engine's optimiser makes of it. Only the query for the schema, which is the
-    same for every task, is left to Oxigraph, and its rows alone are counted.
+    It evaluates the patterns of a query in the written order, as plain engines do. So the count of triples depends on the query
+    alone, and not on an engine's optimiser. The query for the schema is the same for every task; Oxigraph evaluates it, and
+    only its rows are counted.
     """
 
     graph: KnowledgeGraph
@@ -89,11 +89,11 @@ class Counting:
         return ox.parse_query_results(data, format=ox.QueryResultsFormat.JSON)
 
     def confirm(self) -> None:
-        """Nothing changes here."""
+        """Do nothing, because this store never changes."""
 
 
 def counted(path: Path, goals: tuple[str, ...] = ()) -> Counter[str]:
-    """Return what recognition costs in a scene."""
+    """Return the counts of recognition in a scene."""
     graph = load(path)
     remote = Counting(graph)
     there = KnowledgeGraph(graph.scene, remote=remote)
@@ -102,7 +102,7 @@ def counted(path: Path, goals: tuple[str, ...] = ()) -> Counter[str]:
 
 
 def checked(path: Path) -> Counter[str]:
-    """Return what the check of a plan costs in a scene."""
+    """Return the counts of the check of a plan in a scene."""
     graph = load(path)
     part = recognise(graph)
     plan = solve(Request(part.problem)).plan
@@ -123,7 +123,7 @@ def test_the_check_of_a_plan_reads_nothing_of_what_is_irrelevant(tmp_path: Path)
 
 @pytest.mark.parametrize("goals", [(), ("cup1 LOCATION location3",)])
 def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: tuple[str, ...]) -> None:
-    """A task among 20,000 irrelevant objects costs the queries, rows, bytes and looks that it costs alone."""
+    """A task among 20,000 irrelevant objects needs the same numbers of queries, rows, bytes and triples as the task alone."""
     path = tmp_path / "scene.ttl"
     write_scene(path, "served")
     alone = counted(path, goals)
@@ -136,7 +136,7 @@ def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: 
 def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What commit 40b5436 brought: namesakes were looked for by a query that went through all individuals."""
+    """Commit 40b5436 had this fault: a query for individuals with the same name read all individuals."""
 
     def namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
         endings = {local_name(individual) for individual, _, _ in members}
@@ -154,7 +154,7 @@ def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
 
 
 def test_a_call_asks_the_store_few_questions() -> None:
-    """Two and one per file for loading; six for recognition, two for the check, one more that finds what a changed goal names."""
+    """Loading takes two queries and one per file; recognition takes six, the check takes two, and a changed goal takes one more."""
     scene = confab.load("beverage-serving")
     assert scene.knowledge.round_trips == 2 + len(scene.knowledge.files)
     assert scene.plan().queries == 6 + 2
@@ -162,7 +162,7 @@ def test_a_call_asks_the_store_few_questions() -> None:
 
 
 def test_a_no_reads_the_schema_once(tmp_path: Path) -> None:
-    """Three queries look at the individuals that were left out: what they are, what is said of them, and facts in nodes."""
+    """Three queries read the individuals that were left out: their types, their facts, and facts in separate nodes."""
     write_scene(tmp_path / "scene.ttl", "unsolvable", clutter=10)
     scene = confab.load(tmp_path / "scene.ttl")
     result = scene.plan()
@@ -195,15 +195,15 @@ UNWANTED = (
         "confab.reasoner.memory.experience_file",
     ),
 )
-"""What a plan in a shipped scene has no use for: heavy, or other commands' rooms."""
+"""Modules that a plan in a shipped scene doesn't need: large packages, and packages of other commands."""
 MOST_MODULES = 162
-"""42 are rich's, 102 ours, 12 click's; and a few."""
+"""The modules are 42 of rich, 102 of Confab, 12 of click, and a few others."""
 MOST_OWN = 147
-"""Of Python's own modules, which have others below them in each version."""
+"""The modules of Python's standard library; each version of Python imports different modules below them."""
 
 
 def imported(before: str = "") -> list[str]:
-    """Return the modules that a plan on the command line imports, after a line of Python."""
+    """Return the modules that the command `confab plan` imports after a line of Python."""
     script = (
         f"{before}\nimport sys; sys.argv = ['confab', 'plan', 'beverage-serving']\n"
         "from confab.cli import main\n"
@@ -215,7 +215,7 @@ def imported(before: str = "") -> list[str]:
 
 
 def own(modules: list[str]) -> int:
-    """Return how many of the modules are Python's own."""
+    """Return the number of modules that belong to Python's standard library."""
     return sum(name.split(".")[0] in sys.stdlib_module_names for name in modules)
 
 

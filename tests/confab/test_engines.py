@@ -1,4 +1,4 @@
-"""Levels handed to other planners: what comes back is a plan of ours, or is said to be none."""
+"""Levels that external engines solve: the answer is a valid plan of Confab, or is reported as no plan."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SCENE = "beverage-serving-moved"
 
 
 def stand_in(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
-    """Plan the PDDL that an engine would get, with what is at hand."""
+    """Plan the PDDL that an engine would receive, with Confab's own planner."""
     read = imported(parse(domain, problem))
     task = ground(read.problem)
     assert isinstance(task, Task)
@@ -151,7 +151,7 @@ def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_
     problem = "(define (problem x) (:domain d) (:init (= (total-cost) 0)) (:goal (p)) (:metric minimize (total-cost)))"
     try:
         assert answer(domain, problem, None, Deadline.after(10.0))[1].startswith("SOLVED")
-    except KnowledgeError as error:  # where no engine is installed
+    except KnowledgeError as error:  # if no engine is installed
         assert "no engine takes this problem" in str(error)
     with pytest.raises(KnowledgeError, match="unified-planning can't read this level"):
         answer("(define (domain d) (:requirements :numeric-fluents) (:predicates", problem, None, Deadline.after(10.0))

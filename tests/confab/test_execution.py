@@ -1,4 +1,4 @@
-"""Execution at the front desk: the command, what it prints, what it writes, and what it says to misuse."""
+"""Execution from the command line: output, files, and messages about misuse."""
 
 import json
 import subprocess
@@ -152,7 +152,10 @@ def test_an_episode_is_stored_in_the_terms_of_prov(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("pause", [0.0, 0.25])
 def test_the_change_of_plan_is_told_with_the_interference_whatever_time_the_world_takes(pause: float) -> None:
-    """PyBullet lets a quarter of a second pass until what was moved is at rest; it was then told with the next primitive."""
+    """In PyBullet, bodies take a quarter of a second to come to rest.
+
+    Formerly the change was then reported with the next primitive.
+    """
     scene = confab.load("beverage-serving")
 
     class Slow(SymbolicWorld):
@@ -205,7 +208,7 @@ def test_an_episode_goes_into_the_scenes_own_graph_of_episodes() -> None:
 
 
 def test_a_plan_made_in_a_part_of_a_scene_is_carried_out_in_the_whole_scene(tmp_path: Path) -> None:
-    """A later plan may need what the first one has no use for."""
+    """A later plan may need individuals that the first plan didn't need."""
     scene = confab.generate("served", tmp_path / "table.ttl", objects=4, clutter=5, seed=1)
     result = scene.plan()
     run = result.execute()

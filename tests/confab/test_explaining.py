@@ -1,4 +1,4 @@
-"""An explanation says the rule, the episodes behind it, and what spoke for it and against the alternative."""
+"""An explanation states the rule, the episodes that support it, and the evidence for and against the alternative."""
 
 from pathlib import Path
 

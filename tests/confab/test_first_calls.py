@@ -1,4 +1,4 @@
-"""What a newcomer calls first works, or its error names what does; written down before it was built."""
+"""The first calls of a new user work, or their error names the correct call; the list was written before the functions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def result(scene: confab.Scene) -> confab.Result:
 
 @pytest.fixture
 def domain(tmp_path: Path) -> tuple[Path, Path]:
-    """Two files of one's own that no catalog names: a domain, and a scene that imports it."""
+    """Two files of a user that no catalog names: a domain, and a scene that imports it."""
     confab.new_domain("errands", tmp_path)
     files = sorted(tmp_path.glob("*.ttl"))
     scene = next(file for file in files if "scene" in file.stem)
@@ -194,7 +194,7 @@ WRONG: dict[str, dict[str, str]] = {
     "plan": {"actions": "steps", "to_json": "to_records", "graph": "to_networkx", "leaves": "primitives"},
     "step": {"name": "behavior", "action": "behavior", "parameters": "arguments", "children": "steps"},
 }  # fmt: skip
-"""Sixty names as users of rdflib, owlready2, unified-planning, pyperplan and pandas would guess them, and what does it here."""
+"""Sixty names that users of rdflib, owlready2, unified-planning, pyperplan and pandas would guess, each with Confab's name."""
 
 
 def test_of_sixty_wrong_names_all_but_five_at_most_name_what_does_it(

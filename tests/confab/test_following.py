@@ -1,4 +1,4 @@
-"""What follows is explained by what it follows from, in the ontology's labels."""
+"""A derived fact is explained by the facts from which it follows, with the labels of the ontology."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a user types first works: names that the Tab key offers, facts as text, results where plans are wanted, edits that count."""
+"""The first commands of a user work: names with Tab completion, facts as text, results in place of plans, effective edits."""
 
 import inspect
 from pathlib import Path

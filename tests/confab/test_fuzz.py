@@ -1,4 +1,7 @@
-"""What broke once holds, and so does a share of new cases: each answer is a result or one line. All of them: `make fuzz`."""
+"""Inputs that once caused faults cause none now, and neither does a sample of new inputs: each answer is a result or one line.
+
+`make fuzz` runs all cases.
+"""
 
 import os
 import random

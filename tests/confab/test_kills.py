@@ -1,4 +1,7 @@
-"""A writer of a memory that is killed at any moment loses nothing acknowledged. More kills: `python -m benchmarks.kills`."""
+"""A process that writes a memory may be killed at any moment: no acknowledged episode is lost.
+
+`python -m benchmarks.kills` kills more often.
+"""
 
 import random
 from contextlib import nullcontext
@@ -28,12 +31,12 @@ def test_a_loss_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         return save(memory, *target)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Memory, "save", forgetful)
-    monkeypatch.setattr(random.Random, "uniform", lambda *_: 2.0)  # it ends before it is killed
+    monkeypatch.setattr(random.Random, "uniform", lambda *_: 2.0)  # the process ends before it is killed
     _, lost = kills.trial(2, "learn")
     assert lost > 0
 
 
 def test_a_loss_among_eight_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kills, "alone", lambda _: nullcontext())  # nobody waits for anybody
+    monkeypatch.setattr(kills, "alone", lambda _: nullcontext())  # no process waits for another
     _, lost = kills.crowd(3)
     assert lost > 0

@@ -1,4 +1,4 @@
-"""What was learned is said as people say it: of nobody, of everybody, what isn't so, and in the labels of shipped scenes."""
+"""Learned rules are described in plain English: with "no", "every" and negations, and with the labels of the shipped scenes."""
 
 from pathlib import Path
 

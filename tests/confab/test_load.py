@@ -1,4 +1,4 @@
-"""A server under load: honest requests beside slow, abandoned and malformed ones."""
+"""A server under load: normal requests together with slow, abandoned and malformed requests."""
 
 from statistics import median
 

@@ -1,4 +1,4 @@
-"""Memory at the front desk: who may lead, and what is learned from what was carried out."""
+"""Memory on the command line: which rules may lead, and what is learned from executed plans."""
 
 import subprocess
 import sys

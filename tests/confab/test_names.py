@@ -1,4 +1,4 @@
-"""Names that a newcomer tries: they work, or the error names what does."""
+"""Names that a new user tries: they work, or the error gives the correct name."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Refused = Callable[[list[str]], str]
 
 @pytest.fixture
 def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
-    """Return what the command line says on stderr of a line that it refuses as misuse."""
+    """Return the message on stderr with which the command line refuses a command as misuse."""
 
     def said(line: list[str]) -> str:
         with pytest.raises(SystemExit, match="2"):
@@ -52,7 +52,7 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
 
 @pytest.fixture(scope="module")
 def things(scene: confab.Scene, result: confab.Result) -> dict[str, object]:
-    """One object of each kind that has a table of wrong names and is made without physics."""
+    """One object of each kind that has a table of wrong names and can be created without physics."""
     problem, execution = scene.problem, scene.execute(result)
     symbol = next(iter(problem.goal))
     rollout = Rollout(0, True, (StepReport(result.plan.primitives[0], Verdict(True), 1.0),), (), 1.0, 1.0)
@@ -103,7 +103,7 @@ def test_right_names_are_what_the_hints_say(things: dict[str, object]) -> None:
             assert path is not None
             first, *rest = path[0].split(".")
             if "==" in right or " " in right or first in dir(builtins) or first in ("", "copy"):
-                continue  # a sentence, or an expression of Python without an object of Confab
+                continue  # a sentence, or a Python expression without an object of Confab
             root = confab if first[0].isupper() else there
             found = (
                 things[first]
@@ -159,7 +159,7 @@ GUESSED = {
     "confab": "load_domain:confab.load read_ttl:confab.load Problem:confab.load "
     "list_domains:confab.scenes families:confab.generate",
 }
-"""Names, and what each is understood as."""
+"""Guessed names, and the names that Confab suggests for them."""
 
 
 @pytest.mark.parametrize("kind", GUESSED)

@@ -1,4 +1,4 @@
-"""A behaviour that can be in no plan is an error of `plan` at once, in every mode, with its name, its level and the remedy."""
+"""A behaviour that can occur in no plan is an error of `plan` at once, in every mode, with its name, its level and the remedy."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def test_what_is_brought_back_is_planned(tmp_path: Path, options: dict[str, obje
 
 
 def test_a_goal_may_want_what_is_not_at_rest(tmp_path: Path) -> None:
-    """Then it is for planning to find out: of the goal no rest value is asked."""
+    """Only planning can tell whether such a goal is reachable; the goal itself need not have a rest value."""
     assert scene(tmp_path, DYED, WETTED).plan(["x WET true"]).outcome.status is Status.SOLVED
 
 
@@ -82,7 +82,7 @@ def test_a_behaviour_that_the_task_cannot_need_is_no_error(tmp_path: Path) -> No
 def test_a_task_is_planned_without_a_behaviour_that_can_be_in_no_plan(
     tmp_path: Path, options: dict[str, object]
 ) -> None:
-    """DYE could be refined by nothing where FADE is done; PAINT does what the goal wants."""
+    """No behaviour refines DYE where FADE was executed; PAINT has the effect that the goal requires."""
     stain = """
     w:STAIN a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:STAIN.x ; :postcondition w:STAIN.blue, w:STAIN.there .
     w:STAIN.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .

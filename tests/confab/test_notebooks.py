@@ -1,6 +1,7 @@
-"""The book of notebooks: executed with what they show inside, asserted, without helpers or tricks, each leading to the next.
+"""The notebooks: each is stored with its outputs, asserts its claims, uses no helper code, and links to the next.
 
-`make test` executes the quick ones (`testpaths` in pyproject.toml), `make notebooks` all, and writes what they show.
+`make test` executes the quick notebooks (`testpaths` in pyproject.toml); `make notebooks` executes all, and stores their
+outputs.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Planning from what was seen, and planning with a proved bound."""
+"""Planning from observed facts, and planning with a proved bound."""
 
 from dataclasses import fields
 from inspect import signature
@@ -87,7 +87,7 @@ def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_pat
 
 
 def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:
-    # Nothing leads from the plate to the sink but that a behaviour may take it to any free place.
+    # No fact connects the plate with the sink, except that a behaviour may bring the plate to any free place.
     new_domain("tearoom", tmp_path)
     tearoom = confab.load(tmp_path / "tearoom-scene.ttl")
     assert "sink" in recognise(tearoom.knowledge).problem.classes["Place"]

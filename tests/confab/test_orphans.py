@@ -1,4 +1,4 @@
-"""Nothing outlives the command that started it."""
+"""No process outlives the command that started it."""
 
 import os
 import signal
@@ -25,7 +25,7 @@ def test_a_long_query_ends_with_the_command_that_asks_it(
     until = time.monotonic() + 20
     while (
         len(marked(mark)) < 2 and time.monotonic() < until
-    ):  # the process that has the graph, and its fork at the query
+    ):  # the process with the graph, and its fork that evaluates the query
         time.sleep(0.02)
     assert len(marked(mark)) == 2
     os.kill(child, sign)

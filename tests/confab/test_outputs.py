@@ -1,4 +1,4 @@
-"""An output is never an input: what is not of the kind that is about to be written is never replaced."""
+"""No command replaces one of its inputs: an output replaces only a file of the kind that is about to be written."""
 
 from collections.abc import Iterator
 from importlib import import_module
@@ -30,7 +30,7 @@ def test_a_command_replaces_only_what_is_of_the_kind_that_it_writes(door: Door, 
 
 
 def outputs(name: str, command: Command) -> Iterator[set[str]]:
-    """Yield the names of each output of a command, as the command line states them."""
+    """Yield the names of each output of a command, as the command line displays them."""
     if isinstance(command, Group):
         for word, one in command.commands.items():
             yield from outputs(f"{name} {word}", one)

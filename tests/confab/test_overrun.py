@@ -1,4 +1,4 @@
-"""Every command and every call with a time limit is among those of which `benchmarks.overrun` measures how they keep it."""
+"""`benchmarks.overrun` measures the overrun of every command and every call with a time limit."""
 
 import inspect
 from importlib import import_module
@@ -8,7 +8,7 @@ from benchmarks.overrun import CALLS, COMMANDS
 from confab import cli
 
 SERVERS = {"serve"}
-"""Commands whose limit is that of a query (`benchmarks.load`)."""
+"""Commands whose time limit applies to a single query (`benchmarks.load`)."""
 
 
 def test_every_command_with_a_time_limit_is_measured() -> None:

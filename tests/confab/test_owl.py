@@ -1,4 +1,4 @@
-"""What is added through owlready2 is seen by SPARQL and planned with; objects and places of a foreign kitchen are read."""
+"""Facts added through owlready2 are queried by SPARQL and used in plans; objects and places of a foreign ontology are read."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The page: one JSON object, shown by one script, as a file, by a server and in a notebook; driven here by a browser."""
+"""The page: one script displays one JSON object, in a file, from a server and in a notebook; a browser tests all of them."""
 
 import json
 import re
@@ -57,7 +57,7 @@ def serving_plan(scene: confab.Scene) -> confab.Result:
 
 @pytest.fixture(scope="module")
 def failed(serving_plan: confab.Result) -> confab.Report:
-    """A run that lost the cup at its tenth primitive, as physics tells it."""
+    """A run in which the cup was lost at the tenth primitive, as physics reports it."""
     steps = serving_plan.plan.primitives[:10]
     reports = [StepReport(step, Verdict(True, measured={"joint_lag_rad": 0.01}), 1.0) for step in steps]
     lost = Verdict(False, "slip or drop", ("cup2",), {"joint_lag_rad": 0.0863}, "it was lost </script><b>on the way")
@@ -184,7 +184,7 @@ def test_a_scene_without_geometry_is_mapped_by_the_shapes_that_it_states() -> No
     assert data["metric"]
     assert [area["label"] for area in data["areas"]] == ["closet", "dining", "kitchen", "office", "trash"]
     spots = {place["label"]: place["at"] for place in data["places"]}
-    assert spots["desk desktop"] == (3.6, 2.3)  # y of the page runs down
+    assert spots["desk desktop"] == (3.6, 2.3)  # the y axis of the page points down
     assert len(spots) == 20
 
 
@@ -231,7 +231,7 @@ def test_nothing_to_do_makes_a_page(serving_plan: confab.Result) -> None:
     assert page_data(serving_plan.scene, nothing)["status"] == "nothing to do: all goals hold"
 
 
-# ------------------------------------------------------------------------------------------------------------ turning
+# ------------------------------------------------------------------------------------------------------------ updates
 
 
 def test_a_fact_that_is_turned_changes_the_plan(scene: confab.Scene) -> None:
@@ -426,7 +426,8 @@ def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
                 said.append(browser.wait(f"{SAID}.startsWith('20 steps') && {SAID}"))
 
         assert scene.execute(observer=look).reached
-    browser.wait("document.querySelector('.tile')?.textContent.includes('✓ reached')")  # though the server has ended
+    # even after the server has ended
+    browser.wait("document.querySelector('.tile')?.textContent.includes('✓ reached')")
     assert [words.split(":")[0] for words in said] == ["3 steps", "20 steps"]
     assert browser.faults == []
 

@@ -1,4 +1,4 @@
-"""The main job in physics: verified where it should be, and told where and why it isn't."""
+"""The main task in physics: correct plans are verified; of a wrong plan, the report names the step and the cause."""
 
 import json
 import sys
@@ -165,7 +165,7 @@ def test_where_there_is_no_screen_a_window_is_refused_in_one_line(
 def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
     scene: confab.Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a window, PyBullet's server refuses to draw; what is asked of it can be seen all the same."""
+    """Without a display, PyBullet's server refuses to draw; the requests to the server are recorded all the same."""
     from confab.sim.screen import Screen
     from confab.sim.world import PhysicsWorld
 

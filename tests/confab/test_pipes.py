@@ -1,4 +1,4 @@
-"""The command line in pipes: stdin and stdout, tables by tabs, runs that are kept, and what can't be done said first."""
+"""The command line in pipes: stdin and stdout, tables with tabs, saved runs, and refusals before any work begins."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ TOWERS = (ontology.ROOT / "scenes" / "towers-small.ttl").read_bytes()
 
 
 def piped(*arguments: str, given: bytes = b"", line: list[str] = RUN, at: Path | None = None) -> tuple[int, str, str]:
-    """Return exit code, stdout and stderr of a command that reads stdin."""
+    """Return exit code, stdout and stderr of a command that reads its input from stdin."""
     done = subprocess.run([*line, *arguments], input=given, capture_output=True, cwd=at, check=False)
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
@@ -138,7 +138,7 @@ def test_a_plan_whose_steps_undo_each_other_says_so_and_how_to_ask_for_less() ->
 
 
 def test_a_reader_that_ends_early_is_no_negative_answer() -> None:
-    """Exit code 141, as of a process that a closed pipe ends."""
+    """The exit code is 141, like that of a process whose output pipe was closed."""
     done = subprocess.Popen(
         [sys.executable, "-m", "confab", "query", "drums-large", "--affords", "all"], stdout=subprocess.PIPE
     )

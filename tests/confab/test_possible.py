@@ -1,4 +1,4 @@
-"""What can't be is refused at every door, in the same words; what can be, or isn't known, is taken."""
+"""Every entry point refuses an impossible fact with the same words, and accepts a possible or unknown fact."""
 
 from collections.abc import Callable
 from pathlib import Path

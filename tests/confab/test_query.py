@@ -1,4 +1,4 @@
-"""Asking a scene: in its file's own prefixes, in every form of SPARQL, whatever file of RDF it is; answers with types and IRIs."""
+"""Queries about a scene: with its prefixes, in every form of SPARQL, in every RDF format; answers have types and IRIs."""
 
 import json
 import logging
@@ -187,11 +187,14 @@ def test_what_follows_at_first_is_asked_for_like_what_is_stated() -> None:
     assert not packing.query("ASK { ?thing a d:StoredThing }")
     assert [name for (name,) in stored.query("SELECT ?x WHERE { ?x a d:StoredThing }")] == [
         "casket"
-    ]  # inside of a box and of a vault
+    ]  # inside a box and inside a vault
 
 
 def test_what_follows_is_no_fact_of_the_scene() -> None:
-    """It is calculated in each state of a plan: the result of a query about the first state has no influence."""
+    """Derived facts are computed in each state of a plan.
+
+    The result of a query about the initial state doesn't affect planning.
+    """
     packing = confab.load("packing-small")
     before = packing.plan()
     packing.query(INSIDE)

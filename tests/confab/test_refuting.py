@@ -1,4 +1,4 @@
-"""What planners of motions refute: done otherwise by the next plan, kept beside the scene, forgotten with what it is about."""
+"""Refutations by motion planning: the next plan avoids them, and the scene stores them until their objects are gone."""
 
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ IN_THE_WAY = Fact(Symbol("LOCATION", ("bottle",)), "before_door")
 
 @cache
 def first() -> tuple[Scene, Report]:
-    """The scene, and what physics says of the first plan: the door can't be opened."""
+    """The scene, and the verdict of physics on the first plan: the door can't be opened."""
     scene = confab.load(BLOCKED)
     return scene, scene.verify(scene.plan())
 
@@ -53,7 +53,8 @@ def test_a_swing_that_is_blocked_refutes_it_for_every_hand_and_both_ways_whereve
     things = {one.facts[0].symbol.arguments[0]: set[str]() for one in refuted}
     for one in refuted:
         things[one.facts[0].symbol.arguments[0]].add(one.facts[0].value)
-    assert things.pop("bottle") == {"before_door", "in_hand"}  # a hand that has lifted it holds it in the way, too
+    # a hand that has lifted the bottle holds it in the way, too
+    assert things.pop("bottle") == {"before_door", "in_hand"}
     assert things == {thing: {"before_door"} for thing in ("cup", "jar", "lid")}
     assert str(refuted[-1]) == "not F3_OPEN any door while bottle LOCATION before_door: no path: door, bottle"
 
@@ -85,7 +86,7 @@ def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: Mode) -> None:
     steps = done(knowing(scene, refuted_in(scene, report)), mode)
     before = steps[: steps.index(("F3_OPEN", "left_hand", "door"))]
     assert any(name == "B3_REACH_HAND_OBJECT" and thing[-1] == "bottle" for name, *thing in before)
-    assert done(scene)[0] == ("F3_OPEN", "left_hand", "door")  # the scene itself stays as it is
+    assert done(scene)[0] == ("F3_OPEN", "left_hand", "door")  # the scene itself stays unchanged
 
 
 def test_what_was_refuted_is_kept_beside_the_scene_for_the_next_call(tmp_path: Path) -> None:

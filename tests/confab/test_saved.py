@@ -1,4 +1,4 @@
-"""What was saved is read again: an episode and verdicts come back as they were, and what is none is refused in a sentence."""
+"""Saved episodes and verdicts are read again without a change; any other file is refused with one sentence."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,8 @@ def test_an_episode_comes_back_as_it_was_saved(scene: confab.Scene, tmp_path: Pa
     assert (again.summary(), again.reached) == (done.summary(), True)
     assert again.episode.observed == done.episode.observed
     assert again.report(tmp_path / "page.html").is_file()
-    assert scene.execute(interventions=PEOPLE).save(tmp_path / "episode.json").is_file()  # its kind is known
+    # the file is recognised as an episode
+    assert scene.execute(interventions=PEOPLE).save(tmp_path / "episode.json").is_file()
 
 
 def test_verdicts_come_back_as_they_were_saved(scene: confab.Scene, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The front desk in a notebook: a scene, its tables, its plan, its memory."""
+"""A scene in a notebook: its tables, its plan and its memory."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A scene served on loopback: real clients are answered as the SPARQL 1.1 protocol wants it, and nothing they send harms it."""
+"""A scene served on loopback: clients get answers according to the SPARQL 1.1 protocol, and no request harms the server."""
 
 import asyncio
 import http.client
@@ -244,7 +244,7 @@ def test_a_process_is_free_for_another_query_only_when_its_own_has_ended_though_
         service = Service(confab.load("beverage-serving"), QueryLimits())
         client = asyncio.create_task(service.run(slow))
         await asyncio.to_thread(begun.wait)
-        await asyncio.sleep(2 * LANES[0])  # the first time limit is over
+        await asyncio.sleep(2 * LANES[0])  # the first time limit has passed
         client.cancel()
         await asyncio.gather(client, return_exceptions=True)
         busy = service.lanes[0].qsize()
@@ -433,7 +433,7 @@ def test_a_query_ends_with_the_process_that_asked_it(tmp_path: Path) -> None:
 
 
 def workers(parent: int) -> list[int]:
-    """Return the processes below another one."""
+    """Return the child processes of a process."""
     below = [int(pid) for file in Path(f"/proc/{parent}/task").glob("*/children") for pid in file.read_text().split()]
     return below + [pid for child in below for pid in workers(child)]
 

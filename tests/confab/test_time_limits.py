@@ -1,4 +1,4 @@
-"""Every command that takes `--time-limit`, and every call inside of `confab.within`, ends by then."""
+"""Every command with `--time-limit`, and every call inside `confab.within`, ends at its time limit."""
 
 import json
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from confab.scene import Scene
 from confab.terminal import GAVE_UP
 
 SOON, SLACK = 0.1, 1.5
-"""The limit, and CPU seconds within which a call ends, imports included: without a limit each takes longer, or doesn't end."""
+"""The time limit, and the CPU seconds in which a call must end, imports included; without a limit, each call takes longer."""
 WITHOUT = {"scenes", "runs", "new", "fetch", "picture", "generate", "convert", "memory", "mcp"}
 """Commands that neither search nor simulate."""
 

@@ -1,4 +1,4 @@
-"""Behaviour trees: ticked by a small interpreter, they carry plans out, and go on after disturbances; their files are whole."""
+"""Behaviour trees: a small interpreter executes plans by ticking them, also after disturbances; their files are complete."""
 
 import ast
 import random
@@ -22,7 +22,7 @@ from confab.trees import Element, Tree, behavior_tree, export_trees
 
 
 class Ticking:
-    """What both engines do, in one function; a primitive is done at once, and the tree is ticked anew behind it."""
+    """The common semantics of both engines in one class; a primitive is executed at once, and then the tree is ticked again."""
 
     def __init__(self, problem: Problem, tree: Tree, world: SymbolicWorld) -> None:
         self.problem, self.tree, self.world = problem, tree, world
@@ -30,7 +30,7 @@ class Ticking:
         self.done: list[str] = []
 
     def tick(self) -> bool | None:
-        """Return whether the tree succeeds or fails; None while it runs."""
+        """Return whether the tree succeeds or fails; None while the tree is running."""
         self.situation = Situation(self.problem, self.world.observe())
         return self.element(next(iter(self.tree.subtrees.values())))
 
@@ -64,7 +64,7 @@ class Ticking:
 
 
 def run(problem: Problem, plan: Plan, world: SymbolicWorld, most: int = 300) -> tuple[bool, Ticking]:
-    """Tick until the tree succeeds, or fails five times, as its retry does."""
+    """Tick the tree until it succeeds, or fails five times like its retry node."""
     ticking, failures = Ticking(problem, behavior_tree(problem, plan), world), 0
     for _ in range(most):
         said = ticking.tick()
@@ -92,7 +92,7 @@ def test_a_tree_carries_its_plan_out_in_the_order_of_the_plan(name: str) -> None
 
 
 class Undone(SymbolicWorld):
-    """A world in which a goal is undone once: a thing is back at its first place, or furniture as at first."""
+    """A world in which one goal is undone once: an object is back at its first place, or furniture in its first state."""
 
     def __init__(self, problem: Problem, after: int, draw: random.Random) -> None:
         super().__init__(problem)
@@ -154,7 +154,7 @@ def test_the_files_are_whole_and_say_what_their_leaves_are(tmp_path: Path) -> No
     assert all(re.fullmatch(r"\w+", name) for name in names), "BehaviorTree.CPP refuses other names"
     assert {"B2_PICK", "B2_PICK_possible", "THING_AT"} <= ports.keys()
     ast.parse(python.read_text(encoding="utf-8"))
-    export_trees(problem, plan, tmp_path)  # replaces its own files
+    export_trees(problem, plan, tmp_path)  # an export replaces its own files
     xml.write_text(xml.read_text(encoding="utf-8").replace("plan", "my plan"), encoding="utf-8")
     with pytest.raises(OSError, match=r"tree\.xml"):
         export_trees(problem, plan, tmp_path)

@@ -1,4 +1,4 @@
-"""A plan that leaves is one of the whole scene, whatever was read of it for planning."""
+"""Every plan that a command returns is valid for the whole scene, although only a part of the scene was read for planning."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,7 +40,10 @@ def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: Mode) -> 
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
 def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: Mode) -> None:
-    """The goal wants one of the class not at rest; the others, which the effect touches as well, nothing brings back."""
+    """The goal requires that one member of the class isn't at rest.
+
+    The effect changes the other members, too, and no behaviour restores them.
+    """
     scene = confab.load(CASES / "rest-of-a-class.ttl")
     assert scene.plan(mode=mode).outcome.status is Status.UNSOLVABLE
     step = Step((0,), scene.problem.id_of("L2_0", ("b4", "b4")), 2, "L2_0", ("b4", "b4"))
@@ -51,7 +54,7 @@ def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: 
 
 
 class Forgetful:
-    """Task recognition with a fault: of the individuals that no goal or behaviour names it loses one, or none if `lost` is None."""
+    """Task recognition with a fault: it loses one of the individuals that no goal or behaviour names, or none if `lost` is None."""
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.lost: int | None = None
@@ -69,13 +72,13 @@ class Forgetful:
 
 @pytest.fixture(scope="module")
 def forgetful() -> Iterator[Forgetful]:
-    """Recognition that leaves an individual out."""
+    """Recognition that leaves out an individual."""
     with pytest.MonkeyPatch.context() as patch:
         yield Forgetful(patch)
 
 
 def walk(problem: Problem, chance: Random) -> Plan:
-    """Return up to three steps that can be done one after the other."""
+    """Return a plan of up to three steps that are applicable one after another."""
     state: State = problem.initial
     steps: list[Step] = []
     behaviors = [*problem.domain.behaviors.values()]
@@ -95,7 +98,7 @@ def walk(problem: Problem, chance: Random) -> Plan:
 @settings(max_examples=30)
 @given(text=worlds(), seed=st.integers(0, 1000))
 def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: Forgetful, text: str, seed: int) -> None:
-    """Whatever individual recognition loses, of steps that can be done without it those are refused that can't be done with it."""
+    """If recognition loses an individual, the scene refuses exactly those plans of the part that are invalid in the whole scene."""
     with TemporaryDirectory() as folder:
         graph = graph_of(text, Path(folder))
     whole = read(graph)

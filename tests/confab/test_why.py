@@ -1,4 +1,4 @@
-"""Why a step is there, and why another one isn't: in the scene's own words, in any kind of scene."""
+"""The reason for a step, and the reason against an alternative, in the scene's own words and for any kind of scene."""
 
 from pathlib import Path
 
@@ -94,7 +94,10 @@ def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Resu
 
 
 def test_what_a_level_above_asks_and_an_alternative_breaks_is_said_first(serving: confab.Result) -> None:
-    """A cup that is filled where it stands is then carried filled, which level 1 forbids and level 2 doesn't know."""
+    """A cup that is filled at its present place must then be carried while it is full.
+
+    Level 1 forbids this, and level 2 doesn't see it.
+    """
     told = serving.why_not("B1_POUR bottle1 cup1", 0)
     (broken,) = told.breaks
     assert "the plan that was found violates a condition of a level above" in told.answer
@@ -195,7 +198,7 @@ def test_an_alternative_that_leaves_the_bounds_of_an_amount_is_not_called_applic
     for folder, name in (("domains", "canteen"), ("scenes", "canteen-small")):
         text = (ontology.ROOT / folder / f"{name}.ttl").read_text("utf-8")
         text = text.replace("https://w3id.org/confab/canteen", "https://example.org/canteen")
-        text = text.replace(":L2_DRIVE.at, :L2_DRIVE.charged", ":L2_DRIVE.at")  # only the bounds of the battery count
+        text = text.replace(":L2_DRIVE.at, :L2_DRIVE.charged", ":L2_DRIVE.at")  # only the bounds of the battery matter
         (tmp_path / f"{name}.ttl").write_text(text, "utf-8")
     alone = confab.load(str(tmp_path / "canteen-small.ttl")).plan(leave_levels=False)  # each step has its own drives
     told = str(alone.why_not("L2_DRIVE trolley table2", place))

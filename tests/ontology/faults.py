@@ -1,6 +1,6 @@
-"""The faults that validation has to catch, each seeded into the domain that `confab new` writes.
+"""The faults that validation must detect; each is inserted into the domain that `confab new` writes.
 
-`python -m tests.ontology.faults` writes the table of docs/validation.md anew.
+`python -m tests.ontology.faults` writes the table of docs/validation.md again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BEGIN, END = "<!-- faults -->\n", "<!-- end of faults -->\n"
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault in words, the rule that has to find it, the file it is seeded in, and how: text replaced, or added at the end."""
+    """A fault: its description, the rule that must detect it, its file, and the text that is replaced or added."""
 
     title: str
     rule: str
@@ -47,7 +47,7 @@ FAULTS = tuple(faults())
 
 
 def skeleton(folder: Path, name: str = NAME) -> Path:
-    """Write the skeleton domain, or the one with bodies, into a folder; return the scene's file."""
+    """Write the skeleton domain, or the skeleton with bodies, into a folder; return the scene's file."""
     for template in sorted((ontology.ROOT / "skeleton" / ("bodies" if name == WITH_BODIES else "")).glob("*.ttl")):
         text = template.read_text(encoding="utf-8").replace("_DOMAIN_", name)
         (folder / template.name.replace("_DOMAIN_", name)).write_text(text, encoding="utf-8")
@@ -55,7 +55,7 @@ def skeleton(folder: Path, name: str = NAME) -> Path:
 
 
 def seed(fault: Fault, folder: Path) -> Path:
-    """Write the skeleton with one fault in it; return the scene's file."""
+    """Write the skeleton with one fault; return the scene's file."""
     scene = skeleton(folder, fault.file.removesuffix(".ttl").partition("-")[0])
     file = folder / fault.file
     text = file.read_text(encoding="utf-8")
@@ -69,7 +69,7 @@ def seed(fault: Fault, folder: Path) -> Path:
 
 
 def found(fault: Fault, folder: Path) -> list[Finding]:
-    """Return what validation finds of one seeded fault."""
+    """Return the findings of validation for one inserted fault."""
     return validate([seed(fault, folder)], deep=fault.deep)
 
 
@@ -103,7 +103,7 @@ def _cell(text: str, folder: Path) -> str:
 
 
 def main() -> None:
-    """Write the table into the documentation."""
+    """Write the table into the documentation page."""
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Faults in amounts, seeded into the shipped canteen: validation names the node, and what to do."""
+"""Faults in amounts, inserted into the shipped canteen: validation names the node and the remedy."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What physics gives to one individual at a time: behaviours that give it to a second one are found, those that can't aren't."""
+"""Values that physics allows for one individual at a time: behaviours that could give them to a second one are reported."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def found(graph: KnowledgeGraph) -> list[tuple[str, str]]:
 
 
 def changed(deleted: str, inserted: str = "") -> KnowledgeGraph:
-    """Return the paper's scene with some triples taken out and others put in."""
+    """Return the paper's scene after some triples are deleted and others are inserted."""
     graph = load("beverage-serving")
     graph.store.update(
         f"{PREFIXES} DELETE {{ GRAPH ?g {{ {deleted} }} }} INSERT {{ GRAPH ?g {{ {inserted} }} }} "

@@ -1,4 +1,4 @@
-"""Fetching from the web: only where asked, on loopback here, and nothing that plays tricks is kept."""
+"""Downloads from the web: only on request, here on loopback, and malicious files aren't stored."""
 
 import threading
 from collections.abc import Iterator
@@ -58,7 +58,7 @@ def web() -> Iterator[str]:
             self.wfile.write(body.encode())
 
         def log_message(self, *_: object) -> None:
-            """Keep quiet."""
+            """Write no log."""
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     base = f"http://127.0.0.1:{server.server_port}"

@@ -1,4 +1,4 @@
-"""A scene is the same in every form of RDF that a library reads; of another form it is said how to save it."""
+"""A scene is the same in every RDF format that a library reads; for any other format, the message says how to convert the file."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The two pages of the authoring guide, followed to the letter in an empty folder."""
+"""The two pages of the authoring guide, followed literally in an empty folder."""
 
 import re
 import shlex

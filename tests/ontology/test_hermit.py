@@ -1,4 +1,4 @@
-"""HermiT, asked directly: what it concludes, and that it says the same of many individuals, only in seconds."""
+"""HermiT, called directly: its conclusions, and the same conclusions for many individuals within seconds."""
 
 from collections.abc import Callable
 from os import times

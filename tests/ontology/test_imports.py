@@ -1,4 +1,4 @@
-"""Catalog, file names and ontology IRIs agree; loading is offline; tricks in RDF/XML are refused."""
+"""Catalog, file names and ontology IRIs agree; loading works offline; malicious RDF/XML is refused."""
 
 import socket
 from pathlib import Path
@@ -12,7 +12,7 @@ from tests.ontology.faults import skeleton
 from worlds.owlapi import ontology_iri
 
 TEMPLATES = ("families", "shapes", "skeleton")
-"""Folders of files that aren't ontologies to load: patterns of scenes, SHACL, and what `confab new` fills in."""
+"""Folders of files that aren't ontologies to load: patterns of scenes, SHACL shapes, and the template of `confab new`."""
 
 
 def ontology_files() -> list[Path]:

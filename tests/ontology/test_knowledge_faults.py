@@ -1,4 +1,4 @@
-"""Faults in what follows and in amounts, seeded into the theatre of the examples: one line each, with its node, line and mend."""
+"""Faults in definitions and amounts, inserted into the theatre: each is reported in one line with node, line and remedy."""
 
 from pathlib import Path
 
@@ -99,7 +99,7 @@ FUNCTIONAL = """, owl:FunctionalProperty . :carries rdfs:subPropertyOf :near . :
 
 
 def theatre_with(folder: Path, old: str, new: str, more: str) -> list[Finding]:
-    """Return the errors of the theatre with a text replaced and more added."""
+    """Return the errors of the theatre after a text is replaced and another text is added."""
     for one in THEATRE.glob("*.ttl"):
         text = one.read_text(encoding="utf-8")
         added = more if one.stem == "theatre" else ""
@@ -109,7 +109,10 @@ def theatre_with(folder: Path, old: str, new: str, more: str) -> list[Finding]:
 
 @pytest.mark.parametrize("subject", ["?cart", "?room"])
 def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_path: Path, subject: str) -> None:
-    """Nor is the object, which may lack the situation type: who gave it to its class would lose the definition for good."""
+    """The object isn't at fault either, although it may lack the situation type.
+
+    Declaring the type for its class would disable the definition.
+    """
     more = NEAR.format(kind=", owl:TransitiveProperty") + ":carries rdfs:subPropertyOf :near ."
     insert = "INSERT { ?cart :carries ?prop"
     (said,) = theatre_with(tmp_path, insert, f"{insert} . {subject} :near ?prop", more)

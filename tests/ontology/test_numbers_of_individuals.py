@@ -1,4 +1,4 @@
-"""A relation with a number names the same number of individuals in every calculation, condition and fact."""
+"""A relation with a number column refers to the same individuals in every calculation, condition and fact."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
-"""Competency questions: each was asked in words first, and its answer is known.
+"""Competency questions: each question was first asked in words, and its answer is known.
 
-A question's file says the question, the scene, its expected rows, and a property without whose triples the answer is another one.
-`python -m tests.ontology.test_questions` prints the rows of each question as such lines.
+The file of a question contains the question, the scene, the expected rows, and a property without whose triples the answer
+differs. `python -m tests.ontology.test_questions` prints the rows of each question in the form in which the files contain them.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Every shipped file and a learned memory come back from the real OWL API as they were, inside OWL 2 DL."""
+"""Every shipped file and a learned memory are unchanged after a round trip through the OWL API, and conform to OWL 2 DL."""
 
 import json
 import re
@@ -27,7 +27,7 @@ pytestmark = [
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 WORKED_OUT = {"defined.ttl": domain(), "priced.ttl": DELIVERY}
-"""Texts with definitions of every kind, and SWRL; and with a price that is worked out."""
+"""Texts with definitions of every kind and SWRL rules, and a text with a calculated price."""
 
 
 def canonical(file: Path) -> ox.Dataset:
@@ -38,7 +38,7 @@ def canonical(file: Path) -> ox.Dataset:
 
 
 def through_the_owl_api(files: list[Path], target: Path) -> dict[str, list[str]]:
-    """Save what the OWL API makes of some files into a folder; return each file's violations of OWL 2 DL."""
+    """Load files with the OWL API and save them into a folder; return each file's violations of OWL 2 DL."""
     target.mkdir()
     command = [sys.executable, "-m", "worlds.owlapi", str(target), *map(str, files)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
@@ -48,7 +48,7 @@ def through_the_owl_api(files: list[Path], target: Path) -> dict[str, list[str]]
 
 
 def everything(folder: Path) -> list[Path]:
-    """Return every file of triples that is shipped, or that a command writes, but shapes (SHACL) and patterns with gaps."""
+    """Return every shipped file and every written file with triples, except SHACL shapes and patterns with placeholders."""
     scene = confab.load("beverage-serving")
     memory = confab.Memory.of(scene)
     memory.learn(scene, scene.plan(mode="paper").plan)
@@ -65,7 +65,7 @@ def everything(folder: Path) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Path, dict[str, list[str]]]:
-    """Return all files, the folder to which the OWL API saved them, and their violations; one JVM does it all."""
+    """Return all files, the folder into which the OWL API saved them, and their violations; one JVM processes all files."""
     folder = tmp_path_factory.mktemp("sent")
     files = everything(folder)
     for name, text in WORKED_OUT.items():
@@ -89,7 +89,7 @@ def test_every_file_comes_back_equal_and_inside_owl_2_dl(sent: tuple[list[Path],
 def test_what_is_defined_or_worked_out_is_inside_owl_2_dl_and_loses_nothing(
     sent: tuple[list[Path], Path, dict[str, list[str]]], name: str
 ) -> None:
-    """The OWL API declares what the text leaves undeclared; each triple that was written comes back."""
+    """The OWL API adds missing declarations; every written triple is present after the round trip."""
     _, back, violations = sent
     file = back.parent / name
     assert violations[str(file)] == []

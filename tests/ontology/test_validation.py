@@ -1,4 +1,4 @@
-"""What is shipped is free of faults, and every rule of validation catches a seeded one."""
+"""The shipped files have no faults, and every rule of validation detects an inserted fault."""
 
 import json
 import re
@@ -221,7 +221,7 @@ def test_a_warning_leaves_the_exit_code_at_0_unless_it_shall_not(tmp_path: Path)
 
 
 def test_what_is_concluded_from_a_wrong_pair_does_not_hide_it(tmp_path: Path) -> None:
-    """OWL 2 RL runs for the symmetric relation, and concludes from its domain that an item is a place."""
+    """OWL 2 RL runs because the relation is symmetric, and concludes from its domain that an item is a place."""
     scene = skeleton(tmp_path)
     near = """
     :near a owl:ObjectProperty, owl:SymmetricProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; rdfs:range :Place .

@@ -1,4 +1,4 @@
-"""The vocabulary says of itself what tools look for, and its page says what the files say."""
+"""The vocabulary has the metadata that tools look for, and its page agrees with the files."""
 
 import subprocess
 import sys

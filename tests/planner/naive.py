@@ -1,4 +1,4 @@
-"""A second, slow and plain reading of `confab.reasoner.symbols`: every binding is tried, states are dictionaries."""
+"""A second, slow and plain interpreter of `confab.reasoner.symbols`: it tries every binding, and states are dictionaries."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from confab.reasoner.symbols import (
 )
 
 REACH = {"left_hand": (1, 2, 3, 5, 6, 7), "right_hand": (3, 4, 6, 7, 8)}
-"""What the hands of the shipped scene reach (PAPER.md section 4), whatever geometry says at the moment."""
+"""The places that the hands of the shipped scene reach (PAPER.md section 4), independently of the computed geometry."""
 
 Terms = Mapping[str, str]
 Facts = dict[Symbol, str]
 
 
 def complete(problem: Problem) -> Facts:
-    """Return the initial state with every boolean symbol in it."""
+    """Return the initial state with a value for every boolean symbol."""
     state = {
         Symbol(s.name, arguments): FALSE
         for s in problem.domain.situations.values()
@@ -46,7 +46,7 @@ def complete(problem: Problem) -> Facts:
 
 
 def with_derived(problem: Problem, state: Facts) -> Facts:
-    """Return a state with all that follows from it, group by group of what needs each other, from nothing upwards."""
+    """Return a state with all derived facts; each group of mutually dependent definitions starts from the empty set."""
     found = {symbol: FALSE if symbol.situation in problem.domain.rules else value for symbol, value in state.items()}
     for group in strata(problem.domain.rules):
         before = None
@@ -63,14 +63,14 @@ def with_derived(problem: Problem, state: Facts) -> Facts:
 
 
 def tabletop() -> Problem:
-    """Return the shipped scene with the reach of the paper's plan."""
+    """Return the shipped scene with the reach facts of the paper's plan."""
     problem = read(load("beverage-serving")).problem
     pairs = frozenset((hand, f"location{i}") for hand, places in REACH.items() for i in places)
     return replace(problem, relations={**problem.relations, "canReach": pairs})
 
 
 def mentioned(conditions: Sequence[Condition]) -> set[str]:
-    """Return the variables of conditions, those of a witness left out."""
+    """Return the variables of conditions, without the variables inside a witness."""
     found: set[str] = set()
     for c in conditions:
         match c:
@@ -102,7 +102,7 @@ def named(expression: Expression) -> set[str]:
 
 
 def worth(problem: Problem, state: Facts, expression: Expression, terms: Terms) -> Fraction | None:
-    """Return what an expression comes to; None if it, or a part of it, comes to nothing."""
+    """Return the value of an expression, or None if the expression or a part of it has no value."""
     match expression:
         case Amount(situation, arguments):
             said = state.get(Symbol(situation, tuple(terms.get(a, a) for a in arguments)))
@@ -120,7 +120,7 @@ def worth(problem: Problem, state: Facts, expression: Expression, terms: Terms) 
 
 
 def outside(conditions: Sequence[Condition]) -> set[str]:
-    """Return the variables that a conjunction itself has to bind: those inside `AnyOf` and `Witness` are their own."""
+    """Return the variables that a conjunction must bind; variables inside `AnyOf` and `Witness` are local."""
     return mentioned([c for c in conditions if not isinstance(c, AnyOf | Witness)])
 
 
@@ -168,7 +168,7 @@ def holds(problem: Problem, state: Facts, condition: Condition, terms: Terms, ki
 
 
 def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tuple[tuple[str, ...], Facts]]:
-    """Yield arguments and next state for every way in which a behaviour is applicable."""
+    """Yield the arguments and the next state for every binding with which a behaviour is applicable."""
     kinds = {t.name: t.kind for t in (*behavior.parameters, *behavior.variables)}
     parameters = [p.name for p in behavior.parameters]
     names = {*parameters, *outside(behavior.preconditions)}
@@ -188,7 +188,7 @@ def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tupl
 
 
 def amounts(problem: Problem, behavior: Behavior, state: Facts, terms: Terms, kinds: Terms, after: Facts) -> bool:
-    """Change the amounts in `after`; whether all are what they can be."""
+    """Change the amounts in `after`; return whether all new amounts are valid."""
     changed: dict[Symbol, Fraction | None] = {}
     for operations in (("assign",), ("scale",), ("increase", "decrease")):
         for effect in behavior.amounts:

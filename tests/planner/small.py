@@ -1,4 +1,4 @@
-"""Small worlds as values, each with one thing in it that plans of several levels have to get right (docs/levels.md)."""
+"""Small problems; each has one feature that planners of several levels must handle correctly (docs/levels.md)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from worlds.writing import becomes, behavior, has, lacks, world
 
 @dataclass(frozen=True)
 class Case:
-    """A problem, how many steps per level its plan has, and what holds after it, and what doesn't, beside the goal."""
+    """A problem, the number of steps per level of its plan, and facts besides the goal that hold or don't hold afterwards."""
 
     problem: Problem
     length: Mapping[int, int]
@@ -30,7 +30,7 @@ class Case:
 
 
 def drive() -> Case:
-    """One truck, one place: driving from there to there makes its being there false and true."""
+    """One truck and one place: driving from the place to the same place makes one fact both false and true."""
     there = SituationType("THERE", ("Truck", "Place"), "Truth", boolean=True)
     seen = SituationType("SEEN", ("Place",), "Truth", boolean=True)
     go = behavior(
@@ -46,7 +46,7 @@ def drive() -> Case:
 
 
 def van() -> Case:
-    """A van that level 1 doesn't know of, without rest value: it stays where it was last driven."""
+    """A van that level 1 doesn't see and that has no rest value: it stays at the place to which it was driven last."""
     here, no_other = has("VAN_AT", "van", "?a"), EqualityCondition("?a", "?b", True)
     shut, open_ = has("DOOR", "van", "shut"), has("DOOR", "van", "open")
     standing = has("ENGINE", "van", "off")
@@ -100,7 +100,7 @@ def van() -> Case:
 
 
 def fire_door() -> Case:
-    """A book behind a door that has to be shut again; the robot stays where it put the book."""
+    """A book behind a door that must be shut again; the robot stays at the place of the book."""
     shut, open_, there = has("DOOR", "door", "shut"), has("DOOR", "door", "open"), has("ROBOT_AT", "robot", "doorway")
     free = has("HOLDS", "robot", "nothing")
     at_handle = has("ARM", "robot", "handle")
@@ -149,7 +149,7 @@ def fire_door() -> Case:
 
 
 def drawers() -> Case:
-    """Two things to get, one behind two lids, the other behind three: each alone is refined, and so are both."""
+    """Two items to fetch, one behind two lids, the other behind three: each step has a refinement alone, and so have both."""
     covered = Witness("?c", "Box", (RelationCondition("behind", ("?x", "?c")), has("LID", "?c", "shut")), negated=True)
     free, tucked = has("HOLDS", "robot", "nothing"), has("ARM", "robot", "tucked")
     held, gone = becomes("HOLDS", "robot", "?x"), becomes("AT", "?x", "in_hand")
@@ -195,7 +195,7 @@ def drawers() -> Case:
 
 
 def tool() -> Case:
-    """A screwdriver without rest value: it is fetched once and stays in the hand between two parts."""
+    """A screwdriver without rest value: it is fetched once, and stays in the hand between two parts."""
     in_hand, ready = has("TOOL", "hand", "driver"), has("AT", "?p", "placed")
     problem = world(
         [SituationType("AT", ("Part",), "AT"), SituationType("TOOL", ("Hand",), "TOOL", level=2)],
@@ -215,7 +215,7 @@ def tool() -> Case:
 
 
 def rotor() -> Case:
-    """A tube that goes under a lid."""
+    """A tube that is put under a lid."""
     free, tucked, open_ = has("GRIP", "arm", "empty"), has("ARM", "arm", "tucked"), has("LID", "spinner", "open")
     reachable = AnyOf(((EqualityCondition("?s", "rack"),), (open_,)))
     problem = world(
@@ -254,7 +254,7 @@ def rotor() -> Case:
 
 
 def there_and_back() -> Case:
-    """A robot that is at home in the end because it drops there what it fetched, not because it was sent back."""
+    """A robot that is at home in the end because it drops the fetched ball there, and not because it was sent back."""
     free, home = has("HOLDS", "robot", "nothing"), has("ROBOT_AT", "robot", "home")
     problem = world(
         [

@@ -1,4 +1,4 @@
-"""The executive in a symbolic world: what people do in the meantime, and what it does about it."""
+"""The executive in a symbolic world: interventions by people, and the reactions of the executive."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -47,7 +47,7 @@ def planned() -> Plan:
 
 @cache
 def situations() -> tuple[State, ...]:
-    """The situation before each primitive of the plan."""
+    """The state before each primitive of the plan."""
     found: list[State] = [serving().initial]
     for step in planned().primitives:
         after = successor(serving(), serving().domain.behaviors[step.behavior], step.arguments, found[-1])
@@ -150,7 +150,7 @@ def test_a_primitive_whose_precondition_is_lost_is_not_begun() -> None:
             return super().execute(step)
 
     world = Watched(serving())
-    path = planned().primitives[8].path  # the hand holds cup2, raised
+    path = planned().primitives[8].path  # the hand holds cup2 and is raised
     episode = act(serving(), world, planned(), [moved("cup2", "location6", after=path)])
     assert episode.status is End.REACHED
 
@@ -238,7 +238,7 @@ def test_what_has_no_path_as_things_stand_is_done_when_they_stand_otherwise() ->
     assert episode.status is End.REACHED
     tried = [failure.step.arguments for failure in episode.failures]
     assert tried
-    assert len(tried) == len(set(tried))  # no hand tries it twice
+    assert len(tried) == len(set(tried))  # no hand tries the same primitive twice
     assert {one.facts for one in episode.refuted} == {(there,)}
 
 
@@ -279,7 +279,7 @@ def test_the_number_of_primitives_is_bounded() -> None:
     class Stubborn(SymbolicWorld):
         def execute(self, step: Step) -> Report:
             said = super().execute(step)
-            if step.behavior == "B3_LIFT":  # somebody puts the cup back, again and again
+            if step.behavior == "B3_LIFT":  # a person puts the cup back again and again
                 self.state[Symbol("LOCATION", ("cup1",))] = "location2"
                 self.state[Symbol("HOLDS", ("left_hand",))] = "nothing"
             return said
@@ -290,7 +290,7 @@ def test_the_number_of_primitives_is_bounded() -> None:
 
 
 def blocked(step: Step, state: State) -> Report | None:
-    """An obstacle that nobody perceives: the left hand can't get to the bottle at location3."""
+    """An unperceived obstacle: the left hand can't reach the bottle at location3."""
     there = state[Symbol("LOCATION", ("bottle2",))] == "location3"
     hit = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments == ("left_hand", "bottle2") and there
     return Report(False, "no path", ("bottle2",)) if hit else None
@@ -410,7 +410,7 @@ def test_a_primitive_that_failed_but_did_what_it_should_is_done() -> None:
 
 
 def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
-    tries = iter(range(4))  # each hand fails twice, then somebody has taken the obstacle away
+    tries = iter(range(4))  # each hand fails twice, then a person removes the obstacle
     episode = failing(
         lambda step, state: (
             "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT" and next(tries, None) is not None
@@ -421,7 +421,7 @@ def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
 
 
 def test_only_what_failures_stand_against_is_given_up() -> None:
-    """No hand ever gets hold of cup2: everything else is done first, and the reason names the failure."""
+    """No hand can ever grasp cup2: all other goals are achieved first, and the reason names the failure."""
     episode = failing(lambda step, state: "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT")
     assert episode.status is End.GAVE_UP
     assert episode.observed[Symbol("BEVERAGE", ("cup1",))] == "beverage1"
@@ -436,9 +436,7 @@ def test_only_what_failures_stand_against_is_given_up() -> None:
 
 
 def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
-    push = Intervention(
-        InterventionKind.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28
-    )  # cup2 is where it shall be
+    push = Intervention(InterventionKind.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28)  # cup2 is at its goal
     episode = acted(push)
     assert episode.status is End.REACHED
     assert [found.individual for found, _ in episode.discovered] == ["spot1"]
@@ -467,7 +465,7 @@ def test_what_lies_is_given_up_alone(knocked: str) -> None:
 
 
 class Broken(SymbolicWorld):
-    """A robot whose driver is broken, each time otherwise."""
+    """A robot whose driver fails in a different way at each call."""
 
     def __init__(self, how: str) -> None:
         super().__init__(serving())

@@ -1,4 +1,4 @@
-"""Amounts: plans lead to what a step needs of them, and "unsolvable" says by how much they fall short."""
+"""Amounts: plans reach the amount that a step requires, and the reason for "unsolvable" states the missing amount."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -32,7 +32,7 @@ TEA = Amount("TEA", ("?j",))
 
 
 def pouring(there: str, cups: int, portion: Fraction, refill: str | None = "1") -> Problem:
-    """A jug and some cups; below, the jug has to be taken into the hand to pour from it or fill it, and put down again."""
+    """A jug and some cups; on level 2, a hand must take the jug before pouring or filling, and put it down afterwards."""
     quantity = Quantity("servings", least=Fraction(0), most=Fraction(4))
     situations = [
         SituationType("TEA", ("Jug",), "TEA", quantity=quantity),
@@ -77,7 +77,7 @@ def test_what_a_step_needs_of_an_amount_is_brought_about(mode: str) -> None:
 def test_thirds_are_thirds_and_tenths_are_tenths() -> None:
     for portion in (Fraction(1, 3), Fraction(1, 10)):
         problem = pouring(written(portion * 3), 3, portion, refill=None)
-        assert solve(Request(problem)).status is Status.SOLVED  # the last portion is there to the last drop
+        assert solve(Request(problem)).status is Status.SOLVED  # the last portion takes exactly the remaining amount
         assert plan_level(problem, 2).status is Status.SOLVED
 
 
@@ -131,7 +131,7 @@ def test_what_gives_an_amount_back_by_undoing_what_took_it_gives_no_more() -> No
 def test_what_each_step_leaves_counts_as_missing_too() -> None:
     problem = confab.load("three-cups").problem
     assert solve(Request(problem)).status is Status.SOLVED
-    less = {**problem.initial, Symbol("SERVINGS", ("bottle1",)): "3"}  # of which a pour wants two
+    less = {**problem.initial, Symbol("SERVINGS", ("bottle1",)): "3"}  # a pour requires two of these
     outcome = solve(Request(replace(problem, initial=less)))
     assert outcome.reason is not None
     assert (
@@ -153,7 +153,7 @@ def test_an_operator_is_counted_as_often_as_it_takes() -> None:
     problem = replace(problem, goal={Symbol("TEA", ("jug",)): ">=3"})
     outcome = plan_level(problem, 2)
     assert outcome.plan is not None
-    assert len(outcome.plan.primitives) == 302  # taken, filled three hundred times, put down
+    assert len(outcome.plan.primitives) == 302  # taken, filled three hundred times, and put down
     assert outcome.search[2].expanded < 1000
 
 

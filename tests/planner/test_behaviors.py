@@ -1,4 +1,4 @@
-"""Conditions are tested in an order that binds before it uses, however they are written down."""
+"""Conditions are tested in an order in which each variable is bound before its use, whatever the written order."""
 
 from itertools import permutations
 

@@ -1,4 +1,4 @@
-"""What only an upper level asks is asked of shortened plans, too."""
+"""Shortened plans also satisfy conditions that only an upper level states."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from worlds.families import family, tabletop
 
 
 def filled_and_moved(problem: Problem, found: Plan) -> list[str]:
-    """Return the primitives that put down a filled cup elsewhere than where it was filled, replaying them one by one."""
+    """Return the primitives that put down a filled cup at another place than the place where it was filled."""
     state, at, moved = dict(problem.initial), dict[str, str](), list[str]()
     for step in found.primitives:
         after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
@@ -41,7 +41,7 @@ def test_shortening_moves_no_filled_cup(name: str, seed: int) -> None:
 
 
 def test_without_the_rule_shortening_would_move_one() -> None:
-    """Shows that the test above can fail: without the condition on filled cups such plans are shorter, and found."""
+    """This test shows that the test above can fail: without the condition on filled cups, such plans are shorter and are found."""
     problem = family("served", 4, 101)
     move = problem.domain.behaviors["B1_MOVE"]
     loose = replace(move, preconditions=tuple(c for c in move.preconditions if "BEVERAGE" not in repr(c)))

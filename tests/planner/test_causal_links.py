@@ -1,4 +1,4 @@
-"""What a step is said to be needed for breaks, by the checker, when what it gave is taken away just before."""
+"""If the fact that a step is needed for is reverted just before it is needed, the checker rejects the plan."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ UNDO = "UNDO"
 
 
 def undone(problem: Problem, plan: Plan, need: Need) -> list[Fault]:
-    """Return what the checker says of a plan in which what is needed is put back, by a step of its own, before it is needed."""
+    """Return the faults of a plan in which an additional step reverts a needed fact before the fact is needed."""
     depth = max(step.level for step in plan.walk())
     effects = tuple(ValueEffect(c.fact.symbol.situation, c.fact.symbol.arguments, c.before) for c in need.gives)
     undo = Behavior(UNDO, depth, (), effects=effects)
@@ -43,7 +43,7 @@ def undone(problem: Problem, plan: Plan, need: Need) -> list[Fault]:
 
 
 def check(problem: Problem) -> int:
-    """Hold all links of a problem's plan against the checker; return how many there are."""
+    """Compare all causal links of a problem's plan with the checker; return the number of links."""
     plan = default(problem).plan
     if plan is None:
         return 0

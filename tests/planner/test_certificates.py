@@ -1,4 +1,4 @@
-"""Every "unsolvable" carries a certificate, which an independent checker accepts; what is corrupted or forged it refuses."""
+"""Every "unsolvable" has a certificate that an independent checker accepts; corrupted and forged certificates are rejected."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def test_few_states_that_a_search_has_examined_are_the_first_proof_that_is_tried
     found = certify(stuck.problem, 600_000, few_states=True)
     assert found is not None
     assert refusal(stuck.problem, found) is None
-    assert certify(stuck.problem, 600_000) is None  # by other proofs the work doesn't suffice
+    assert certify(stuck.problem, 600_000) is None  # the work doesn't suffice for other proofs
 
 
 @pytest.mark.parametrize(

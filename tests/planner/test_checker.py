@@ -1,4 +1,4 @@
-"""What the checker reads conditions and states as, kind by kind: it is asked by hand, on worlds small enough to see the answer."""
+"""The plan checker's evaluation of each kind of condition and effect, in worlds so small that the answer is obvious."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -27,7 +27,7 @@ from worlds.writing import becomes, behavior, has, lacks, world
 
 
 def shelves(*conditions: Condition, variables: str = "", terms: str = "?c:Cup") -> Problem:
-    """Three cups on two shelves, one of them full; whether a behaviour of these conditions can be done is the question."""
+    """Return a problem with three cups on two shelves, one of the cups full, and with a behaviour that has the given conditions."""
     return world(
         [
             SituationType("AT", ("Cup",), "Place"),
@@ -43,7 +43,7 @@ def shelves(*conditions: Condition, variables: str = "", terms: str = "?c:Cup") 
 
 
 def done(problem: Problem) -> str:
-    """Return the cups that the behaviour can be done with, by their numbers."""
+    """Return the numbers of the cups for which the behaviour is applicable."""
     do = problem.domain.behaviors["DO"]
     rest = tuple(problem.classes[p.kind][0] for p in do.parameters[1:])
     return "".join(
@@ -66,7 +66,7 @@ P, Q = "?p:Place", "?p:Place ?q:Place"
         ([has("NEAR", "?c", "low", TRUE)], "", "1"),
         ([has("NEAR", "?c", "?p", TRUE)], P, "1"),
         ([has("NEAR", "?c", "?p", FALSE), has("AT", "?c", "?p")], P, "123"),
-        ([has("NEAR", "?c", "cup1", FALSE)], "", ""),  # of what isn't there nothing is so
+        ([has("NEAR", "?c", "cup1", FALSE)], "", ""),  # nothing is true of a nonexistent symbol
         ([lacks("NEAR", "?c", "cup1", FALSE)], "", "123"),
         ([ClassCondition("?c", "Bowl")], "", "3"),
         ([ClassCondition("?c", "Bowl", True)], "", "12"),
@@ -88,14 +88,14 @@ P, Q = "?p:Place", "?p:Place ?q:Place"
         ([has("AT", "?c", "?p"), RelationCondition("self", ("?p", "?p"))], P, "23"),
         ([RelationCondition("self", ("?p", "?p")), has("AT", "?c", "?p")], P, "23"),
         ([RelationCondition("none", ("?c",))], "", ""),
-        ([has("AT", "?c", "?p")], "?p:Bowl", ""),  # who is determined has to be of the right class
+        ([has("AT", "?c", "?p")], "?p:Bowl", ""),  # the determined individual must belong to the class
         ([has("AT", "?d", "?p"), has("FULL", "?d", TRUE), has("AT", "?c", "?p")], "?d:Cup ?p:Place", "23"),
         ([has("AT", "?d", "high"), EqualityCondition("?d", "?c", True)], "?d:Cup", "23"),
         ([lacks("AT", "?c", "?p"), lacks("AT", "cup1", "?p")], P, "123"),
         ([Witness("?x", "Cup", (has("AT", "?x", "?p"), has("FULL", "?x", TRUE))), has("AT", "?c", "?p")], P, "23"),
         ([Witness("?x", "Cup", (has("AT", "?x", "?p"), has("FULL", "?x", TRUE)), True), has("AT", "?c", "?p")], P, "1"),
         ([Witness("?x", "Bowl", (has("AT", "?x", "?p"), has("AT", "?c", "?p")))], P, "23"),
-        ([Witness("?c", "Bowl", ())], "", "123"),  # another ?c
+        ([Witness("?c", "Bowl", ())], "", "123"),  # this ?c is a different variable
         ([AnyOf(((has("FULL", "?c", TRUE),), (has("AT", "?c", "high"),)))], "", "12"),
         ([AnyOf(((has("FULL", "?c", TRUE),), (has("AT", "?c", "high"),)), True)], "", "3"),
         (
@@ -112,7 +112,7 @@ P, Q = "?p:Place", "?p:Place ?q:Place"
         ([RelationCondition("likes", ("?d", "?p")), has("AT", "?c", "?p")], "?d:Cup ?p:Place", "23"),
         ([RelationCondition("likes", ("?d", "?p"))], "?d:Cup ?p:Place", "123"),
         ([RelationCondition("likes", ("?d", "?p"))], "?d:Place ?p:Cup", ""),
-        # What is chosen inside of a condition is forgotten outside of it.
+        # A choice inside a condition has no effect outside the condition.
         ([AnyOf(((has("AT", "?c", "?p"),),)), has("AT", "cup1", "?p")], P, "1"),
     ],
 )
@@ -142,7 +142,7 @@ def test_a_conditional_effect_is_made_where_its_condition_held_before() -> None:
         state = successor(problem, fall, (cup,), problem.initial)
         assert state is not None
         assert (state[Symbol("AT", (cup,))], state[Symbol("FULL", (cup,))]) == (place, full)
-        assert Symbol("NEAR", (cup, "cup1")) not in state  # there is no such symbol
+        assert Symbol("NEAR", (cup, "cup1")) not in state  # the symbol doesn't exist
 
 
 def test_what_becomes_true_and_false_at_once_is_true() -> None:
@@ -241,7 +241,7 @@ def test_amounts_change_beside_values_and_a_price_is_worked_out() -> None:
     state = successor(problem, pour, ("cup2",), problem.initial)
     assert state is not None
     assert (state[Symbol("FILL", ("cup2",))], state[Symbol("FULL", ("cup2",))]) == ("1", FALSE)
-    assert successor(problem, pour, ("cup3",), problem.initial) is None  # that would be less than nothing
+    assert successor(problem, pour, ("cup3",), problem.initial) is None  # the amount would become negative
     rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
     assert rules.price(pour, ("cup2",), facts) == 3
     assert rules.price(pour, ("cup1",), facts) is None

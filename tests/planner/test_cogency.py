@@ -1,4 +1,4 @@
-"""Eqs. (1), (2), (4) and (5) of the paper, on numbers that can be worked out by hand."""
+"""Eqs. (1), (2), (4) and (5) of the paper, with numbers that can be calculated by hand."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Conditions on every state: ``c:never`` and ``c:always`` on a situation type."""
+"""Constraints on every state: ``c:never`` and ``c:always`` of a situation type."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ OVENS = (Path(__file__).parent / "cases" / "ovens.ttl").read_text("utf-8")
 
 
 def changed(tmp_path: Path, old: str, new: str) -> str:
-    """Write the small scene with a text replaced in the domain and in the scene; return its path."""
+    """Write the small scene with a replaced text in the domain and in the scene; return its path."""
     assert old in DOMAIN + SCENE
     (tmp_path / "drums.ttl").write_text(DOMAIN.replace(old, new), "utf-8")
     (tmp_path / "scene.ttl").write_text(SCENE.replace(old, new), "utf-8")
@@ -45,7 +45,7 @@ def changed(tmp_path: Path, old: str, new: str) -> str:
 
 
 def unconstrained(problem: Problem) -> Problem:
-    """Return the problem in which behaviours don't maintain the constraints, and the checker still knows them."""
+    """Return the problem in which the behaviours don't maintain the constraints, but the checker still knows them."""
     free = {
         name: replace(one, preconditions=tuple(c for c in one.preconditions if getattr(c, "constraint", None) is None))
         for name, one in problem.domain.behaviors.items()
@@ -115,7 +115,7 @@ def test_a_constraint_that_makes_no_sense_is_refused_with_the_remedy(
 
 
 def test_a_violation_that_others_cause_is_removed() -> None:
-    """A state that is observed may violate a constraint; the plan from there adds no exception."""
+    """An observed state may violate a constraint; the plan from this state adds no exception."""
     done = confab.load("drums-small").execute(interventions=["after=2 base IN bay3"])
     assert done.reached
     assert len(done.episode.replans) == 1
@@ -156,7 +156,7 @@ def test_constraints_on_empty_classes_and_unions_of_classes_keep_their_meaning(s
 
 
 def test_a_schedule_keeps_a_constraint_at_every_time_and_without_it_overlaps(tmp_path: Path) -> None:
-    """An oven is on from the start to the end of a step, and never are two ovens on."""
+    """An oven is on from the start to the end of a step, and two ovens are never on at the same time."""
     times = []
     for name, text in (("ovens", OVENS), ("free", OVENS.replace("c:never true ; ", ""))):
         (tmp_path / name).mkdir()

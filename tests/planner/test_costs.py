@@ -1,4 +1,4 @@
-"""What behaviours cost is worked out from relations and amounts: cheapest plans are cheapest, whoever adds up."""
+"""Costs of behaviours are calculated from relations and amounts: every evaluator agrees, and cheapest plans are cheapest."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -38,7 +38,7 @@ def test_a_plan_said_to_be_cheapest_is(seed: int, make: Callable[[Random], tuple
 
 
 def tour(stops: int) -> Problem:
-    """Return a round of stops: a walk to the next one costs 4, a ride 0.5, and the ticket for all rides 5, at one stop."""
+    """Return a tour of stops: a walk to the next stop costs 4, a ride 0.5, and a ticket for all rides, sold at one stop, 5."""
     names = tuple(f"stop{i}" for i in range(stops))
     here, there, joined = (
         has("AT", "me", "?from"),
@@ -64,7 +64,7 @@ def tour(stops: int) -> Problem:
 
 
 def lift(ways: list[tuple[int, int]], floors: int) -> Problem:
-    """Return a lift that people enter and leave, which level 1 sees, and that goes from floor to floor, which it doesn't see."""
+    """Return a lift between floors; level 1 sees that people enter and leave, but doesn't see the motion of the lift."""
     people, names = tuple(f"person{i}" for i in range(len(ways))), tuple(f"floor{i}" for i in range(floors))
     inside, entered, left = has("IN", "?p", "lift"), becomes("IN", "?p", "lift"), becomes("IN", "?p", "?f")
     waits, there = has("IN", "?p", "?f"), has("LIFT_AT", "lift", "?f")
@@ -157,7 +157,7 @@ def test_a_cost_beside_a_price_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_price_of_what_changes_survives_pddl_and_the_file_made_of_it(tmp_path: Path) -> None:
-    """Functions are typed: else each place would have to have a load."""
+    """Functions have typed arguments: otherwise each place would need a load."""
     path = tmp_path / "van.ttl"
     path.write_text(DELIVERY)
     exported = to_pddl(read(load(path)).problem)

@@ -1,4 +1,4 @@
-"""Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
+"""An order of goals can lead to a dead end that no step undoes; the plan still has only steps of level 1."""
 
 from confab.planner.hierarchical.call import Call, compiled, fresh_call
 from confab.planner.hierarchical.planner import plan
@@ -10,9 +10,9 @@ from worlds.writing import becomes, behavior, has, lacks, world
 
 
 def slide(items: int, packed: bool = False) -> Problem:
-    """Return a world in which one rides down a slide with an item, for good, or ties the item to a rope and stays.
+    """Return a world in which a robot rides down a slide with an item and can't return, or ties the item to a rope and stays.
 
-    Items may have to be packed before.
+    If `packed`, the items must be packed before.
     """
     names = tuple(f"item{number}" for number in range(items))
     up, tied = has("ROBOT_AT", "robot", "top"), has("ROPE", "rope", "?i")
@@ -60,7 +60,7 @@ def test_where_goals_in_series_lead_astray_level_1_is_begun_again_and_kept() -> 
 
 
 def test_goals_that_must_come_in_an_order_that_one_alone_does_not_show_are_reached_on_level_1() -> None:
-    """A cell can be marked only while none is plain; plain ones can be stirred, and are never plain again."""
+    """A cell can be marked only if no cell is plain; a plain cell can be stirred, and never becomes plain again."""
     none_plain = Witness("?o", "Cell", (lacks("FILL", "?o", "empty"), lacks("FILL", "?o", "stirred")), negated=True)
     empty, open_ = has("FILL", "?c", "empty"), has("LID", "lid", "open")
     below = [
@@ -95,7 +95,7 @@ def test_goals_that_must_come_in_an_order_that_one_alone_does_not_show_are_reach
 
 
 def test_fewer_steps_bring_about_what_level_1_does_not_see_too() -> None:
-    """Each room takes a towel, one washing makes all towels fresh, and the maid is to be at home in the end."""
+    """Each room needs a towel, one wash cleans all towels, and the maid must be at home in the end."""
     rooms, towels, places = ("a", "b", "c"), ("t1", "t2", "t3"), ("home", "hall")
     clean = [has("CLEAN", "?r", FALSE), has("USED", "?t", FALSE)]
     cleaned = [becomes("CLEAN", "?r", TRUE), becomes("USED", "?t", TRUE)]
@@ -129,7 +129,7 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     call = Call(problem, compiled(problem), None, 10_000)
     first, second = (call.refiner.do(1, "SEND", (item,)) for item in ("item0", "item1"))
     assert first is not None
-    assert second is None  # one rode down
+    assert second is None  # the robot rode down
     call.using.methods.clear()
     other = fresh_call(call, problem)
     assert other.refiner.do(1, "SEND", ("item0",)) == first

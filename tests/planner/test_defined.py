@@ -1,4 +1,4 @@
-"""Situation types that are defined: every evaluator works the same out, step by step, and a plan is found where there is one."""
+"""Defined situation types: all evaluators derive the same facts after each step, and a plan is found if there is one."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -58,7 +58,7 @@ def stated(state: State) -> dict[Symbol, str]:
 
 
 def walk(problem: Problem, rng: Random, steps: int) -> Iterator[State]:
-    """Yield states, one after the other, with all that follows from them."""
+    """Yield successive states, each with all derived facts."""
     state: State = naive.complete(problem)
     yield state
     for _ in range(steps):
@@ -88,7 +88,7 @@ def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
             if symbol.situation in DEFINED:
                 assert table.now[symbol.situation].get(key_of(symbol.arguments)) == value
                 assert checked.value(symbol.situation, symbol.arguments) == value
-        # The bits that follow are kept up to date step by step: as if worked out anew.
+        # After each step, the updated derived bits equal the bits that are computed from scratch.
         for operator in range(len(task)):
             after = task.applied(state, operator)
             if after is not None:
@@ -126,7 +126,7 @@ def test_a_goal_that_is_defined_holds_for_the_grounded_level_where_it_does(seed:
 
 
 def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
-    """Return the states that can be reached, nearest first, and whether these are all."""
+    """Return the reachable states, nearest first, and whether these are all."""
     order: list[State] = [naive.complete(problem)]
     seen = {frozenset(order[0].items())}
     for state in order:
@@ -141,7 +141,7 @@ def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
 
 
 def test_what_is_defined_is_worked_out_where_only_a_change_of_an_amount_asks_for_it() -> None:
-    """A cart is rolled out of the shade before it stays too wet there; nothing but the amount asks for the shade."""
+    """A cart leaves the shade before the bed becomes too dry; only a change of an amount depends on the shade."""
     cart = Parameter("?c", "Cart")
     shaded = tuple(Rule("SHADED", (cart,), (), (has("AT", "?c", where),)) for where in ("shade", "porch"))
     takes = AmountEffect("WET", ("bed",), "decrease", Fraction(1), (has("SHADED", "cart", "true"),))
@@ -273,7 +273,7 @@ def test_what_is_defined_by_a_lower_level_exists_from_there_on(tmp_path: Path, d
 
 
 def following(rng: Random) -> dict[int, Bit]:
-    """Return twelve bits that follow from each other and from six that are stated, before them."""
+    """Return twelve derived bits that depend on each other and on six stated bits before them."""
     return {
         bit: Bit(1 << bit, tuple(sum({1 << other for other in rng.sample(range(18), rng.randint(1, 3))} - {1 << bit})
                                  for _ in range(rng.randint(0, 4))))
@@ -288,7 +288,7 @@ def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int
     changes, above = (
         rng.sample(range(1 << first), 1 << first),
         5 << 20,
-    )  # the number of the amounts stands above all bits
+    )  # the number of the tuple of amounts is above all bits
     found = []
     for few in (0, 10**6):
         with pytest.MonkeyPatch.context() as patch:

@@ -1,4 +1,4 @@
-"""What a plan does for nothing is left out where it is much: a chest that every step unlocks and locks again."""
+"""Superfluous steps of a plan are removed if they are many: a chest that every step unlocks and locks again."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from worlds.writing import becomes, behavior, has, lacks, world
 
 
 def chest(items: int) -> Problem:
-    """Return a world in which things are fetched from a chest that is locked at rest."""
+    """Return a world in which items are fetched from a chest whose rest value is locked."""
     names = tuple(f"item{number}" for number in range(items))
     return world(
         [SituationType("AT", ("Item",), "Place"), SituationType("LID", ("Chest",), "LID", level=2, rest="locked")],

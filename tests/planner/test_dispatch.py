@@ -1,4 +1,4 @@
-"""Execution of timed plans whose durations deviate from the expected ones."""
+"""Execution of timed plans whose durations deviate from the expected durations."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -70,7 +70,7 @@ def test_a_late_step_shifts_only_the_steps_that_depend_on_it() -> None:
 
 
 def fuse(match: int, mend: int) -> TimedPlan | None:
-    """Return the plan of a world in which a match burns while a fuse is mended."""
+    """Return the plan of a world in which a match must burn while a fuse is mended."""
     return concurrent.plan(problem_of(burning(match, mend)), Limits())[1].plan
 
 

@@ -1,4 +1,4 @@
-"""Conditions about earlier states: ``c:remembers``, ``c:atMostOnce`` and ``c:onlyAfter``, and those of PDDL."""
+"""Conditions on earlier states: ``c:remembers``, ``c:atMostOnce`` and ``c:onlyAfter``, and the constraints of PDDL."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def written(folder: Path, name: str, domain: str, scene: str) -> str:
 
 
 def tour(folder: Path, old: str, new: str) -> str:
-    """Write the small tour with a text replaced in the domain and in the scene; return the path of the scene."""
+    """Write the small tour with a replaced text in the domain and in the scene; return the path of the scene."""
     assert old in DOMAIN + SCENE
     return written(folder, "tour", DOMAIN.replace(old, new), SCENE.replace(old, new))
 
@@ -61,7 +61,7 @@ def pddl(folder: Path, domain: str, problem: str) -> str:
 
 
 def without_added_parts(problem: Problem) -> Problem:
-    """Return the problem with the effects and preconditions that the author wrote; the checker still knows the definitions."""
+    """Return the problem with only the effects and preconditions that the author wrote; the checker still knows the definitions."""
     remembers = problem.domain.remembers
     written = {
         name: replace(
@@ -105,7 +105,7 @@ def test_the_checker_knows_the_definitions_and_not_the_effects_that_are_added(
 
 
 def test_what_happens_within_a_step_of_an_upper_level_is_remembered(tmp_path: Path) -> None:
-    """The acid would be on the forklift twice, which only level 2 sees. No behaviour carries the acid back to make room."""
+    """The acid would be on the forklift twice, and only level 2 sees this. No behaviour carries the acid back to make room."""
     scenes = ontology.ROOT / "scenes"
     domain = (ontology.ROOT / "domains" / "drums.ttl").read_text("utf-8")
     domain = domain.replace(":hasSituationType :IN ;", ":hasSituationType :IN, :CARRIED ;")
@@ -154,7 +154,7 @@ def test_the_constraints_of_pddl_hold_and_become_goals(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("both", [False, True])
 def test_before_means_an_earlier_state_as_in_pddl(both: bool, tmp_path: Path) -> None:
-    """An action that makes both conditions true at once violates ``sometime-before``."""
+    """An action that makes both conditions true at the same time violates ``sometime-before``."""
     domain = f"""(define (domain d) (:predicates (a) (b)) (:constraints (sometime-before (b) (a)))
       (:action both :parameters () :precondition () :effect (and (a) (b)))
       {"" if both else "(:action first :parameters () :precondition () :effect (a))"})"""

@@ -1,4 +1,4 @@
-"""The fast planner solves what can be solved, proves what can't, and never says the wrong one."""
+"""The default planner solves solvable problems, proves unsolvable problems, and never confuses the two."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def paper_table() -> Problem:
 
 
 def steps_of(problem: Problem, level: int, most: int = 10**6) -> float | None:
-    """Return the fewest steps of a level, infinite if there is no plan, None if that takes too much."""
+    """Return the least number of steps of a level, infinity if there is no plan, or None if the search is too large."""
     task = grounded(problem, level)
     if not isinstance(task, Task):
         return math.inf
@@ -82,11 +82,11 @@ def test_other_numbers_of_hands_are_served(hands: int) -> None:
 
 @pytest.mark.parametrize("name", ["served", "swap", "rotate"])
 def test_whoever_of_many_a_condition_looks_for_is_in_the_small_world(name: str) -> None:
-    """Some hand of eight must reach both places: without these hands in it no small world had a plan, only the whole one."""
+    """One of eight hands must reach both places: a scope without such a hand has no plan, so the whole level would be searched."""
     outcome = plan(family(name, 20, hands=8))
     assert outcome.plan is not None
     assert outcome.fallbacks == 0
-    assert outcome.search[1].evaluated < 500  # in the whole world thousands
+    assert outcome.search[1].evaluated < 500  # in the whole world, thousands are evaluated
 
 
 def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
@@ -94,7 +94,7 @@ def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
     assert large.plan is not None
     assert large.plan.length[3] > 9000
     assert large.search[1].expanded < 13 * small.search[1].expanded
-    assert large.search[2].expanded + large.search[3].expanded < 60  # refinements are searched once, then replayed
+    assert large.search[2].expanded + large.search[3].expanded < 60  # refinements are searched once, and then replayed
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -103,7 +103,7 @@ def test_random_tables_agree_with_exhaustive_search(part: int) -> None:
         problem = random_table(seed)
         fewest = steps_of(problem, 3, 5_000)
         if fewest is None:
-            continue  # the benchmark goes further
+            continue  # the benchmark tests larger scenes
         outcome = plan(problem)
         assert (outcome.status is Status.SOLVED) == (fewest < math.inf), seed
         assert outcome.status is not Status.GAVE_UP, seed
@@ -170,7 +170,7 @@ def test_the_time_limit_is_obeyed(seconds: float) -> None:
     problem = family("packed", 30, seed=3)
     using = compiled(problem)
     over = []
-    for _ in range(3):  # the machine may be busy with other things
+    for _ in range(3):  # the machine may be busy with other processes
         begin = perf_counter()
         outcome = plan(problem, limits=Limits(seconds=seconds), using=using)
         over.append(perf_counter() - begin - seconds)
@@ -211,7 +211,7 @@ def test_put_down_and_picked_up_again_is_dropped() -> None:
     problem = table(4, 2, 2, 0, [1, 2], {"cup1": 2, "cup2": 1}, {}, [{1, 2, 3, 4}, {1, 2, 3, 4}])
     improved = plan(problem).plan
     assert improved is not None
-    assert len(improved.primitives) == 12  # both in hand at once; 18 with a place to put one aside
+    assert len(improved.primitives) == 12  # both objects are held at once; 18 if one is put aside
     assert validate(problem, improved) == []
 
 
@@ -290,7 +290,7 @@ def test_the_time_limit_holds_where_the_lowest_level_alone_is_planned() -> None:
         outcome = search(flat, limits=Limits(expansions=10**9, seconds=1.0))
         over.append(perf_counter() - begin - 1.0)
         assert outcome.status is Status.GAVE_UP
-    assert max(over) < 1.0  # a tenth on a machine with nothing else to do
+    assert max(over) < 1.0  # a tenth on an idle machine
 
 
 @pytest.mark.parametrize("n", [4, 10])

@@ -1,4 +1,4 @@
-"""The flat core: limits, proofs and reasons, plans without needless steps, and the compiled heuristic."""
+"""The search of grounded tasks: limits, proofs and reasons, plans without superfluous steps, and the compiled heuristic."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_goal_that_nothing_brings_about_is_said_to_be_so(tabletop: Problem) ->
 
 
 def test_exhaustion_is_a_proof() -> None:
-    problem = corridor(4)  # back and forth is impossible: the way is one-way
+    problem = corridor(4)  # a plan back and forth is impossible, because the path is one-way
     places = problem.classes["Place"]
     goal = {Symbol("LIT", (places[3],)): TRUE, Symbol("AT", ("x",)): places[0]}
     outcome = plan_level(replace(problem, goal=goal))
@@ -101,7 +101,7 @@ def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
 
 @pytest.mark.parametrize("seconds", [0, 5, 20])
 def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    evaluated = 0  # what the clock shows: each evaluation takes a second, however busy the machine is
+    evaluated = 0  # the simulated clock: each evaluation takes a second, however busy the machine is
 
     def slow(task: Task) -> Evaluate:
         fast = heuristic(task)
@@ -114,7 +114,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
         return evaluate
 
     monkeypatch.setattr("confab.planner.grounded.best_first.heuristic", slow)
-    monkeypatch.setattr("confab.planner.grounded.lookahead.ENABLING", 0)  # else a few evaluations do
+    monkeypatch.setattr("confab.planner.grounded.lookahead.ENABLING", 0)  # otherwise a few evaluations suffice
     for module in (
         "plan",
         "grounded.best_first",
@@ -128,7 +128,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
     evaluated = 0
     late = plan_level(problem, limits=Limits(seconds=seconds))
     assert late.status is Status.GAVE_UP and late.reason == Reason("the time limit came first")
-    assert seconds < evaluated <= seconds + 5  # a turn is seen to its end
+    assert seconds < evaluated <= seconds + 5  # a turn is always completed
 
 
 def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
@@ -159,13 +159,14 @@ def test_one_loop_finds_plans_and_exhausts_all_states_in_any_order(order: str) -
     for operator in plan:
         state = task.applied(state, operator) or 0
     assert state == found.best
-    assert order != "cost" or len(plan) == 9  # twice there and once back, for three parcels
+    assert order != "cost" or len(plan) == 9  # two trips there and one back, for three parcels
     me = sum(1 << bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == "ME")
-    nowhere = replace(task, goal=task.goal | me)  # here and there at once: relaxed, that can be
+    nowhere = replace(task, goal=task.goal | me)  # at both places at once: possible in the relaxed task
     none = ORDERS[order](nowhere)
     list(explore(nowhere, none))
     assert none.best is None
-    assert len(none.reached) == 2 * (2**3 + 3 * 2 * 2**2 + 3 * 2 * 2)  # rooms times: no parcel in an arm, one, two
+    # rooms times: no parcel in an arm, one parcel, two parcels
+    assert len(none.reached) == 2 * (2**3 + 3 * 2 * 2**2 + 3 * 2 * 2)
 
 
 def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> None:
@@ -187,11 +188,11 @@ def test_what_every_plan_passes_is_a_landmark() -> None:
     task = ground(carrier(1))
     assert isinstance(task, Task)
     names = {str(fact) for bit, fact in enumerate(task.facts) if landmarks(task) >> bit & 1}
-    assert names == {"x0 AT here", "x0 AT there", "here ME true", "there ME true"}  # either arm will do
+    assert names == {"x0 AT here", "x0 AT there", "here ME true", "there ME true"}  # either arm is allowed
 
 
 def carrier(parcels: int) -> Problem:
-    """Two places, a carrier with two arms, and parcels to be brought from one place to the other."""
+    """Two places, a carrier with two arms, and parcels that must be brought from one place to the other."""
     names = " ".join(f"x{i}" for i in range(parcels))
     domain = """(define (domain carry) (:requirements :typing) (:types room parcel arm)
      (:predicates (me ?r - room) (at ?x - parcel ?r - room) (free ?a - arm) (carry ?x - parcel ?a - arm))
@@ -211,14 +212,14 @@ def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
     assert isinstance(task, Task)
     number = {task.describe(operator)[:2]: operator for operator in range(len(task))}
     go, back = number["MOVE", ("here", "there")], number["MOVE", ("there", "here")]
-    first = [  # one at a time
+    first = [  # one parcel at a time
         step
         for i in range(6)
         for step in (number["PICK", (f"x{i}", "here", "left")], go, number["DROP", (f"x{i}", "there", "left")], back)
     ]
     plan = shorter(task, first, work=10**7)
     assert plan == shorter(task, first, work=10**7)
-    assert len(plan) == 17 < len(shortened(task, first))  # three times two parcels, and twice back
+    assert len(plan) == 17 < len(shortened(task, first))  # three trips with two parcels, and two trips back
     state: int | None = task.initial
     for operator in plan:
         assert state is not None
@@ -228,7 +229,7 @@ def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
 
 
 def test_a_long_way_to_what_one_step_does_is_saved() -> None:
-    """To the end of a road and back for each door, where the doors open without."""
+    """The given plan walks to the end of a road and back for each door, although the doors open without this."""
     domain = """(define (domain mine) (:predicates (at ?x) (road ?x ?y) (store ?x) (bomb) (open ?x) (door ?x ?y))
       (:action go :parameters (?x ?y) :precondition (and (at ?x) (road ?x ?y)) :effect (and (not (at ?x)) (at ?y)))
       (:action take :parameters (?x) :precondition (and (at ?x) (store ?x)) :effect (bomb))
@@ -266,7 +267,7 @@ def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> N
     ]
     assert (
         len(shorter(task, first, work=400_000)) == 6 * 20 - 1
-    )  # two at a time; picking another parcel meanwhile is no use
+    )  # two at a time; picking another parcel in between is useless
 
 
 def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
@@ -286,7 +287,7 @@ def test_a_lookahead_drives_back_for_what_is_left() -> None:
     state, path = ahead(task)(task.initial, evaluation.plan)
     assert state & task.goal == task.goal
     assert task.carried_out(task.initial, path) == (state, path)
-    assert len(path) <= 4 * 12 + 1  # one at a time, there and back
+    assert len(path) <= 4 * 12 + 1  # one parcel at a time, there and back
 
 
 def test_a_lookahead_replaces_what_is_stuck() -> None:
@@ -303,7 +304,7 @@ def test_a_lookahead_replaces_what_is_stuck() -> None:
     assert evaluation is not None and evaluation[0] == 6
     state, path = ahead(task)(
         task.initial, evaluation[1]
-    )  # from a to b, c and d: only one of them can be done as it stands
+    )  # from a to b, c and d: only one of these moves is applicable in the given form
     assert state & task.goal == task.goal and len(path) == 6
     reached: int | None = task.initial
     for operator in path:
@@ -377,7 +378,7 @@ def test_why_one_of_many_conditional_effects_is_never_made_is_said_of_that_one()
 
 
 def reached_by(task: Task, turns: int) -> set[tuple[str, ...]]:
-    """Return the states, as facts, that so many steps lead to at most."""
+    """Return the states, as facts, that are reachable in at most `turns` steps."""
     seen, new = {task.initial}, {task.initial}
     for _ in range(turns):
         new = {

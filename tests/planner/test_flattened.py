@@ -1,4 +1,4 @@
-"""Plans that leave a level, and plans of one level, are made shorter on that level and put under the levels above again."""
+"""Plans that leave a level, and plans of one level, are shortened on this level and regrouped under the levels above."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from worlds.cups import scene
 from worlds.hierarchies import hierarchy
 
 LEFT = (700316, 700359, 700680, 701211, 701609)
-"""Worlds whose plans leave level 1."""
+"""Seeds of worlds whose plans leave level 1."""
 LIMITS = Limits(expansions=20_000)
 
 
 def lowest(problem: Problem) -> Problem:
-    """Return a problem with the behaviours of the lowest level alone."""
+    """Return a problem with only the behaviours of the lowest level."""
     level = problem.domain.levels[-1]
     behaviors = {name: replace(b, level=1) for name, b in problem.domain.behaviors.items() if b.level == level}
     situations = {name: replace(s, level=1) for name, s in problem.domain.situations.items()}
@@ -85,7 +85,7 @@ def test_what_the_last_resort_finds_keeps_the_levels_where_it_can(monkeypatch: p
 
 
 def test_a_plan_of_few_steps_is_shortened_by_little_work_on_a_level_of_thousands_of_operators(tmp_path: Path) -> None:
-    """What follows from rules counts as work of a search for a shorter plan, which took a minute for a plan of ten steps."""
+    """Derived bits count as work of the search for a shorter plan; formerly, this search took a minute for a plan of ten steps."""
     path = tmp_path / "cups.ttl"
     path.write_text(scene(66, defined=True), encoding="utf-8")
     problem = confab.load(path).problem

@@ -1,4 +1,4 @@
-"""Grounding says the same as a naive reading of the behaviours, over random small domains."""
+"""Grounding agrees with a naive evaluation of the behaviours in small random domains."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from confab.reasoner.symbols import (
 from tests.planner.naive import Facts, complete, results, wanted
 
 SITUATIONS = {
-    "AT": SituationType("AT", ("Thing",), "Place"),  # functional
+    "AT": SituationType("AT", ("Thing",), "Place"),  # a functional situation type
     "LIT": SituationType("LIT", ("Place",), "Truth", boolean=True),
     "NEAR": SituationType("NEAR", ("Thing", "Place"), "Truth", boolean=True),
 }
@@ -192,7 +192,7 @@ def test_the_same_budget_gives_the_same_plan() -> None:
 
 
 def corridor(length: int) -> Problem:
-    """A thing walks along a corridor whose lamps it has to light on its way."""
+    """An individual walks along a corridor and must light the lamps on its path."""
     places = tuple(f"p{i:03}" for i in range(length))
     situations = {
         "AT": SituationType("AT", ("Thing",), "Place"),
@@ -259,7 +259,7 @@ def test_what_a_condition_asks_of_one_place_is_worked_out_once_for_each_place() 
         patch.setattr(Formulas, "condition", counted)
         task = ground(problem)
     assert isinstance(task, Task) and len(task) > size**2
-    assert asked < 8 * size**2  # and not a thing for each pair of places
+    assert asked < 8 * size**2  # and not one operator of an individual for each pair of places
 
 
 def test_who_only_has_to_be_somewhere_is_forgotten_as_soon_as_nothing_asks_for_them() -> None:
@@ -276,13 +276,13 @@ def test_who_only_has_to_be_somewhere_is_forgotten_as_soon_as_nothing_asks_for_t
         {},
         {Symbol("LIT", ("p3",)): TRUE},
     )
-    task = grounded(problem)  # joined at once, 30 to the power of 6 rows
+    task = grounded(problem)  # a single join would have 30 to the power of 6 rows
     assert isinstance(task, Task)
     assert len(task) == len(places)
 
 
 def parking(things: int, places: int) -> Problem:
-    """Things are put where nobody stands; from where doesn't matter."""
+    """Things are put at free places; their old places don't matter."""
     nobody = Witness("?y", "Thing", (ValueCondition("AT", ("?y",), "?v"),), True)
     put = Behavior(
         "PUT",
@@ -350,4 +350,5 @@ def test_what_many_operators_ask_is_said_once_and_means_the_same(monkeypatch: py
 def test_that_nobody_stands_in_a_place_is_said_once_of_each_place() -> None:
     task = ground(parking(40, 60))
     assert isinstance(task, Task) and len(task) == 2400
-    assert len(task.needs.items) + len(task.adds.items) < 10 * len(task)  # 40 things and 60 places in each operator
+    # otherwise each operator would mention 40 things and 60 places
+    assert len(task.needs.items) + len(task.adds.items) < 10 * len(task)

@@ -1,4 +1,4 @@
-"""What a plan of several levels means (docs/levels.md): the planners and the checker agree on it, case by case."""
+"""The meaning of a plan with several levels (docs/levels.md): planners and checker agree in each case."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -30,11 +30,11 @@ from worlds.hierarchies import hierarchy, states
 from worlds.writing import becomes, behavior, has, world
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper, "default": default}
-"""The planners that every case is given to."""
+"""The planners that solve every case."""
 
 
 def after(problem: Problem, plan: Plan) -> Mapping[Symbol, str]:
-    """Return the state in which the primitives of a plan end."""
+    """Return the state after the primitives of a plan."""
     state: Mapping[Symbol, str] | None = problem.initial
     for step in plan.primitives:
         assert state is not None
@@ -51,7 +51,7 @@ def test_each_case_has_its_plan(case: Callable[[], Case], mode: str) -> None:
     assert outcome.status is Status.SOLVED
     assert outcome.plan is not None
     assert validate(wanted.problem, outcome.plan) == []
-    if not any(step.joined for step in outcome.plan.walk()):  # steps that are refined together have fewer primitives
+    if not any(step.joined for step in outcome.plan.walk()):  # a joint refinement of several steps has fewer primitives
         assert outcome.plan.length == wanted.length
     assert len(outcome.plan.primitives) <= max(wanted.length.items())[1]
     assert outcome.fallbacks == 0
@@ -61,7 +61,7 @@ def test_each_case_has_its_plan(case: Callable[[], Case], mode: str) -> None:
 
 
 def served(filled: str, to: str) -> Problem:
-    """Return the paper's table with a drink in cup1 and the wish to have that cup elsewhere."""
+    """Return the paper's table with a drink in cup1 and the goal that this cup is at another place."""
     problem = tabletop()
     initial = {**problem.initial, Symbol("BEVERAGE", ("cup1",)): filled}
     return replace(problem, initial=initial, goal={Symbol("LOCATION", ("cup1",)): to})
@@ -125,7 +125,7 @@ def test_random_worlds_keep_their_levels_and_the_truth(mode: str, part: int) -> 
 
 
 def naively(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
-    """Return the successors of a state as the naive interpreter reads behaviours."""
+    """Return the function from a state to its successors, computed by the naive interpreter."""
     behaviors = problem.domain.at_level(problem.domain.levels[-1])
     return lambda state: ((b.cost, after) for b in behaviors for _, after in naive.results(problem, b, dict(state)))
 
@@ -193,14 +193,14 @@ def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
     assert isinstance(task, Task)
     segments = Call(problem, compiled(problem), None, 1).space
     most = looked_at(task, segments, 0)
-    assert looked_at(task, segments, most) == most  # what was done isn't done again for fewer than twice as many
+    assert looked_at(task, segments, most) == most  # the examination isn't repeated for fewer than twice as many states
     segments.worked = 20_000 * LEAST
     with pytest.raises(UnsolvableError, match="none of all"):
         looked_at(task, segments, most)
 
 
 def test_a_shorter_order_brings_about_what_the_first_level_does_not_see_too() -> None:
-    problem = hierarchy(4_000_382)  # where the robot shall be in the end, level 1 doesn't know
+    problem = hierarchy(4_000_382)  # level 1 doesn't see the goal position of the robot
     outcome = default(problem)
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
@@ -222,7 +222,7 @@ def test_a_refinement_that_was_found_in_a_state_is_not_searched_there_again() ->
 
 
 def pen(goal: Mapping[str, str], *, key: bool = True) -> Problem:
-    """Two levels: an animal is driven through a gate, which level 2 opens if there is a key to it."""
+    """Two levels: an animal is driven through a gate, and level 2 opens the gate if there is a key."""
     ajar = SituationType("AJAR", ("Gate",), "Truth", 2, FALSE, FALSE, True)
     opening = [has("AJAR", "?g", FALSE)] + ([] if key else [has("IN", "lion", "nowhere")])
     return world(
@@ -256,7 +256,7 @@ def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> N
     assert paper(hierarchy(3000016), proof=proof).status is Status.UNSOLVABLE
     assert asked == [0, 3 * DOUBT]
     assert isinstance(_proof(pen({"IN lion": "yard"}, key=False), 100, None), UnsolvableError)
-    assert _proof(pen({"IN lion": "yard"}, key=False), 100, 0.0) is None  # the deadline came first
+    assert _proof(pen({"IN lion": "yard"}, key=False), 100, 0.0) is None  # the deadline passed first
 
 
 def test_where_no_state_will_do_it_is_said_how_many_there_are() -> None:

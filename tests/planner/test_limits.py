@@ -1,4 +1,4 @@
-"""Every search and every episode ends: with the right answer where there is one, and within its time."""
+"""Every search and every episode ends within its time limit, with the right answer if there is one."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -77,7 +77,7 @@ def test_a_join_that_would_outlast_the_deadline_is_not_begun() -> None:
 
 
 def test_a_chain_of_needs_may_be_longer_than_the_stack_is_deep() -> None:
-    """Each lamp needs the one before; the first needs a switch, which there isn't."""
+    """Each lamp needs the lamp before it; the first lamp needs a switch that doesn't exist."""
     lamps = [f"lamp{i}" for i in range(1500)]
     light = behavior(
         "LIGHT", 1, "?a:Lamp ?b:Lamp",

@@ -1,4 +1,4 @@
-"""The generator of small worlds of everything at once, and the plain interpreter that judges what is planned in them."""
+"""The generator of small random worlds with all constructs, and the plain interpreter that judges plans in them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_the_interpreter_agrees_with_the_naive_reading() -> None:
 
 
 def test_a_scene_says_what_was_meant(tmp_path: Path) -> None:
-    """What is read from the file can be done and reached as in the world that was drawn."""
+    """The problem that is read from the file has the same applicable behaviours and reachable states as the drawn world."""
     for seed in SEEDS:
         world = mixed(seed)
         file = tmp_path / "w.ttl"
@@ -76,13 +76,13 @@ def test_a_step_that_is_left_out_is_noticed() -> None:
 
 @pytest.fixture
 def patiently(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give each call a minute by the clock; its CPU time stays limited."""
+    """Give each call a minute of wall-clock time; its CPU time stays limited."""
     monkeypatch.setattr(judging, "SECONDS", 60.0)
 
 
 @pytest.mark.parametrize("first", [5_050, 5_100, 5_150, 5_200])
 def test_nothing_is_wrong_in_small_worlds_of_everything(first: int, tmp_path: Path) -> None:
-    """Every mode, the checker, exports and execution agree with all that can happen."""
+    """Every mode, the checker, exports and execution agree with an exhaustive search."""
     wrong = []
     for seed in range(first, first + 50):
         world, meant = drawn(seed)
@@ -94,7 +94,7 @@ def test_nothing_is_wrong_in_small_worlds_of_everything(first: int, tmp_path: Pa
 @pytest.mark.usefixtures("patiently")
 @pytest.mark.parametrize("seed", [95_006_284, 95_012_744, 95_017_985])
 def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_path: Path) -> None:
-    """What can't be grounded for it is found, proved or given up by other means, in every mode."""
+    """A task that can't be grounded because of a division is solved, proved unsolvable or given up by other methods."""
     its = Judge(mixed(seed, 0.0), tmp_path, every=True).judged()
     assert not its.complaints
     assert {its.status[mode] for mode in ("guarded", "optimal", "paper")} <= {"solved", "unsolvable"}
@@ -109,14 +109,17 @@ def test_few_states_are_certified_where_telling_fewer_values_apart_has_no_end(se
 
 
 def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Path) -> None:
-    """A fact of two objects with the default value leads from neither to the other: the class is looked through."""
+    """A fact of two objects with the default value isn't stated.
+
+    So neither object leads to the other, and all members of the class are tried.
+    """
     its = Judge(mixed(200_012_855, 0.0), tmp_path, every=True).judged()
     assert not its.complaints
     assert its.least == 1.0 and its.length == 1
 
 
 def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path) -> None:
-    """What has itself as its value is looked for in its class: neither the object nor the value leads to the other."""
+    """If an object is its own value, neither the object nor the value leads to the other, so the class is searched."""
     assert not Judge(mixed(201_042_338, 0.0), tmp_path, every=True).judged().complaints
 
 
@@ -127,7 +130,7 @@ def test_no_level_is_left_to_bring_the_beginning_to_rest_where_levels_are_strict
 
 @pytest.mark.usefixtures("patiently")
 def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
-    """An effect on all of a class takes values away that a condition of the count seeks: no mode refuses the world."""
+    """An effect on all members of a class removes values that a condition of the count requires; every mode accepts this world."""
     its = Judge(mixed(301_000_072, 0.0), tmp_path, every=True).judged()
     assert not its.complaints
     assert "refused" not in {its.status[mode] for mode in ("guarded", "optimal", "paper")}
@@ -164,12 +167,15 @@ def test_bounds_of_totals_are_exported_for_all_effects_of_an_action_together(see
 
 @pytest.mark.parametrize("seed", [340_002_931])
 def test_a_total_counts_individuals_that_the_task_does_not_need(seed: int, tmp_path: Path) -> None:
-    """A variable of a total without a condition has all individuals of its class, so the slice has them."""
+    """A variable of a total without a condition ranges over all individuals of its class.
+
+    So the part that is read contains them all.
+    """
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
 def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_level(tmp_path: Path) -> None:
-    """The default leaves the level; modes that keep all levels give up and name the step."""
+    """The default mode leaves the level; modes that keep all levels give up and name the step."""
     its = Judge(mixed(340_007_688), tmp_path, every=True).judged()
     assert not its.complaints
     assert its.status["guarded"] == "solved"
@@ -178,7 +184,7 @@ def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_le
 
 @pytest.mark.parametrize("limit", [0.3, 1.0])
 def test_a_search_that_ends_too_early_is_no_error_of_the_domain(limit: float, tmp_path: Path) -> None:
-    """Only a task without any plan makes a behaviour an error; a call that ran out of time gives up."""
+    """A behaviour is an error only if the task has no plan at all; a call that runs out of time gives up."""
     (tmp_path / "world.ttl").write_text(scene(mixed(360_014_986)))
     try:
         outcome = load(str(tmp_path / "world.ttl")).plan(leave_levels=False, time_limit=limit).outcome
@@ -190,7 +196,7 @@ def test_a_search_that_ends_too_early_is_no_error_of_the_domain(limit: float, tm
 def test_failing_conditions_without_common_variables_are_found_one_by_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A step with a hundred effects of eighteen conditions each; combinations of conditions would take 77,000 tests."""
+    """A step has a hundred effects with eighteen conditions each; combinations of conditions would need 77,000 tests."""
     calls, satisfied = [0], BehaviorReader.satisfied
 
     def counted(*arguments: Any) -> Any:
@@ -205,7 +211,7 @@ def test_failing_conditions_without_common_variables_are_found_one_by_one(
 
 @pytest.mark.usefixtures("patiently")
 def test_a_total_of_totals_is_kept_by_the_change_of_each(tmp_path: Path) -> None:
-    """A sum of sums that many effects change at once is not refused: its changes are added up one by one."""
+    """A sum of sums that many effects change at the same time is accepted: the changes are added up one by one."""
     its = Judge(mixed(371_000_305), tmp_path, every=True).judged()
     assert not its.complaints
     assert its.status["paper"] == "solved"

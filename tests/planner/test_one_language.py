@@ -1,4 +1,4 @@
-"""One language of conditions and effects: every evaluator says the same of what is applicable and of what comes after."""
+"""One language of conditions and effects: all evaluators agree on applicability and on the resulting states."""
 
 import ast
 import re
@@ -33,7 +33,7 @@ from worlds.language import DEFINED, language
 
 ROOT = Path(__file__).resolve().parents[2]
 After = Mapping[tuple[str, tuple[str, ...]], frozenset[Fact]]
-"""What holds after each behaviour that is applicable; what is false isn't listed, nor what is defined."""
+"""The facts after each applicable behaviour, without false facts and without derived facts."""
 
 
 def facts(state: Mapping[Symbol, str]) -> frozenset[Fact]:
@@ -92,7 +92,7 @@ def by_task(problem: Problem) -> After:
 
 
 def by_sparql(graph: KnowledgeGraph, reading: Reading) -> set[tuple[str, tuple[str, ...]]]:
-    """Return what is applicable, by queries on the graph."""
+    """Return the applicable behaviours, computed by queries on the graph."""
     write_situation(graph, reading)
     return {
         (behavior.name, tuple(reading.names.short(text(term)) for term in tuple(row)[: len(behavior.parameters)]))
@@ -107,15 +107,15 @@ EVALUATORS: dict[str, Callable[[Problem], After]] = {
     "operators": by_operators,
     "task": by_task,
 }
-"""All that read behaviours, but for the naive reading, which they are held against."""
+"""All evaluators of behaviours except the naive interpreter, which is the reference."""
 
 
 def otherwise(problem: Problem) -> set[str]:
-    """Return the evaluators that say something else than the plain reading."""
+    """Return the evaluators whose result differs from that of the naive interpreter."""
     now, truth = facts(problem.initial), by_naive(problem)
     changing = {done: after for done, after in truth.items() if after != now}
     found = {name: evaluator(problem) for name, evaluator in EVALUATORS.items()}
-    # The task drops what never changes anything.
+    # The grounded task contains no operators without effect.
     found["task"] = {done: after for done, after in found["task"].items() if after != now}
     return {name for name, after in found.items() if after != (changing if name == "task" else truth)}
 
@@ -128,7 +128,7 @@ def test_every_evaluator_agrees_on_what_is_applicable_and_what_comes_of_it(seed:
 
 @pytest.fixture
 def true_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let what becomes true do so before what becomes false, as in commit f43f953."""
+    """Execute effects that make facts true before effects that make facts false, as in commit f43f953."""
 
     def post_init(behavior: symbols.Behavior) -> None:
         effects = sorted(behavior.effects, key=lambda effect: effect.value == FALSE)
@@ -150,7 +150,7 @@ def test_effects_in_the_wrong_order_are_noticed() -> None:
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
 def test_a_plan_that_rests_on_them_never_leaves(mode: str) -> None:
     driven = small.drive().problem
-    assert solve(Request(driven, mode)).plan is None  # though there is one
+    assert solve(Request(driven, mode)).plan is None  # although there is a plan
     away = replace(driven, goal={Symbol("THERE", ("truck", "yard")): FALSE})
     with pytest.raises(RejectedPlanError, match="isn't reached"):
         solve(Request(away, mode))
@@ -176,11 +176,11 @@ CASES = {
     "planner/checked_conditions.py": "test",
     "tests/planner/naive.py": "holds",
 }
-"""The function in which each evaluator has a case for every kind of condition."""
+"""The function of each evaluator that has a case for every kind of condition."""
 
 
 def forgotten(source: str, function: str, kinds: set[str]) -> set[str]:
-    """Return the kinds of conditions for which a function has no case of its own."""
+    """Return the kinds of conditions for which a function has no case."""
     found = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef) and node.name == function:
@@ -225,7 +225,7 @@ def test_random_behaviours_are_of_every_kind() -> None:
 
 
 def without_bounds(problem: Problem) -> Problem:
-    """Return the problem with amounts that can be any."""
+    """Return the problem without bounds of amounts."""
     situations = {
         name: replace(s, quantity=Quantity()) if s.quantity else s for name, s in problem.domain.situations.items()
     }
@@ -233,7 +233,7 @@ def without_bounds(problem: Problem) -> Problem:
 
 
 def nested(conditions: Sequence[Condition], depth: int = 0) -> Iterator[tuple[int, Condition]]:
-    """Yield all conditions with how deep they are."""
+    """Yield all conditions, each with its nesting depth."""
     for condition in conditions:
         yield depth, condition
         for group in groups(condition):

@@ -1,4 +1,4 @@
-"""The optimal mode's bounds are true, and its plans as short as it says."""
+"""The bounds of the optimal mode are correct, and its plans are as short as it states."""
 
 from __future__ import annotations
 

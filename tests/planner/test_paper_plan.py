@@ -1,4 +1,4 @@
-"""The plan of Figs. 7 and 8 of the paper, ID by ID (the one misprint of the figure excepted: 6, not 2, for REACH … CUP1)."""
+"""The plan of Figs. 7 and 8 of the paper, ID by ID, except for one misprint of the figure: 6, not 2, for REACH … CUP1."""
 
 from itertools import permutations
 
@@ -78,7 +78,7 @@ def test_one_demonstration_teaches_its_order(order: tuple[int, ...], deep: bool)
 
 
 def test_without_memory_the_order_of_the_figure_does_not_come_out_by_itself() -> None:
-    # Otherwise the test above would show nothing about confabulation.
+    # Otherwise the test above would not test confabulation.
     assert tuple(step.id for step in solved(problem("beverage-serving")).steps) != (22, 34, 28, 39)
 
 

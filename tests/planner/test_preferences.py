@@ -132,7 +132,7 @@ def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_p
 
 
 def least(problem: Problem, weights: dict[Symbol, Fraction]) -> Fraction | None:
-    """Return the least cost of a plan with the weights of the goals that it leaves unmet, over all choices of soft goals."""
+    """Return the least sum of a plan's cost and the weights of the goals that it leaves unmet, over all choices of soft goals."""
     meant, found = Interpreter(problem), list[Fraction]()
     for many in range(len(weights) + 1):
         for unmet in combinations(weights, many):
@@ -171,7 +171,7 @@ def test_a_brief_call_with_a_time_limit_leaves_the_first_plan_as_it_is() -> None
 
 
 def test_the_chosen_soft_goals_get_the_full_work_and_the_comparison_of_choices_little() -> None:
-    """The total cost is the same as if every choice got the full work."""
+    """The total cost is the same as if the planner spent the full work on every choice."""
     scene = confab.load("wishes-small")
     result = scene.plan()
     _, every = preferred(scene.problem, default)

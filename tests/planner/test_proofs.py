@@ -1,4 +1,4 @@
-"""A proof that there is no plan is right, and says in the ontology's terms what is missing."""
+"""A proof that there is no plan is correct, and its reason names the missing facts in the terms of the ontology."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -54,7 +54,7 @@ def kitchen(
     behaviors: Iterable[Behavior] = (PUT, WASH, DRY),
     initial: Mapping[str, str] | None = None,
 ) -> Problem:
-    """Two hands of which each reaches some places, for one cup each; what is in the sink can be washed, and dried then."""
+    """Two hands, each of which reaches some places and holds one cup; a cup in the sink can be washed, and then dried."""
     truths = [SituationType(name, ("Cup",), "Truth", boolean=True) for name in ("CLEAN", "DRY")]
     return world(
         [SituationType("AT", ("Cup",), "Place"), *truths],
@@ -67,7 +67,10 @@ def kitchen(
 
 
 def why(problem: Problem) -> str:
-    """Return what is said of why there is no plan; nothing if there is one. What is said rests on a certificate that is right."""
+    """Return the reason why there is no plan, or an empty text if there is a plan.
+
+    The reason is read from a valid certificate.
+    """
     certificate = certify(problem)
     assert (certificate is None) is bool(solvable(problem))
     if certificate is None:
@@ -76,7 +79,7 @@ def why(problem: Problem) -> str:
     return told(problem, certificate).text
 
 
-# ----------------------------------------------------------------------------------------------------------- at once
+# ---------------------------------------------------------------------------------------------- relaxed reachability
 
 
 def test_the_missing_relation_at_the_end_of_the_chain_is_named() -> None:
@@ -226,7 +229,7 @@ def test_the_cause_at_the_end_of_a_chain_comes_first() -> None:
 
 
 def test_who_moves_something_else_is_not_the_reason() -> None:
-    """Maids go, trolleys are pushed: that no trolley comes to the attic isn't because of how maids go."""
+    """Maids walk, and trolleys are pushed: the behaviour by which maids walk isn't the reason why no trolley reaches the attic."""
     at = SituationType("AT", ("Mobile",), "Place")
     from_here = RelationCondition("path", ("?from", "?to"))
     go = behavior("GO", 1, "?m:Maid ?to:Place ?from:Place", [has("AT", "?m", "?from"), from_here],
@@ -251,7 +254,7 @@ def test_who_moves_something_else_is_not_the_reason() -> None:
 
 
 def reason(conditions: Iterable[object], terms: str = "?c:Cup ?p:Place ?h:Hand") -> str:
-    """Return what is said of why a cup can't come to the sink by a behaviour with these conditions."""
+    """Return the reason why a cup can't be brought to the sink by a behaviour with the given conditions."""
     make = behavior("MAKE", 1, terms, conditions, [becomes("AT", "?c", "?p")])  # type: ignore[arg-type]
     said = why(kitchen({"AT cup2": "sink"}, [("left", "shelf")], [make]))
     return said.partition("can't be reached: ")[2].removeprefix("MAKE requires ").partition(", and there")[0]
@@ -336,7 +339,7 @@ def test_of_several_reasons_one_that_never_changes_is_told() -> None:
 
 
 def lamps(many: int, last: str = "") -> str:
-    """Return what is said of a row of lamps, each of which needs the one before it, and the first of them nobody's."""
+    """Return the reason for a row of lamps: each lamp requires the lamp before it, and the first requires an unreachable fact."""
     rows = [f"L{i}" for i in range(many)]
     lit = [SituationType(name, ("Cup",), "Truth", boolean=True) for name in rows]
     light = [
@@ -367,9 +370,7 @@ def test_a_level_is_refused_for_more_changes_than_are_allowed() -> None:
     assert said.text == f"level 1 can't be grounded: {many} changes, more than the 0 allowed"
     assert refusal(reached, many) is None
     assert refusal(reached, many - 1) is not None
-    assert (
-        many == 68
-    )  # PUT 16 times and WASH and DRY twice each; an effect on a place touches as many values as there are
+    assert many == 68  # PUT has 16 instances, WASH and DRY two each; an effect on a place makes a change for each value
 
 
 def test_a_level_that_is_too_large_says_so_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -420,11 +421,11 @@ def test_no_proof_is_wrong_in_random_worlds_and_many_are_found(part: int) -> Non
 
 
 FOUND = [16, 14]
-"""How many of forty random worlds have no plan."""
+"""Numbers of unsolvable worlds among forty random worlds."""
 
 
 def so_many(many: int, of: str, kind: str = "Cup") -> Witness:
-    """Return a condition that asks for so many cups of which something holds, each another one."""
+    """Return the condition that `many` different cups have a property."""
     condition: Witness | None = None
     names = [f"?c{number}" for number in range(many)]
     for number in reversed(range(many)):

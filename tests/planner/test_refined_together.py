@@ -1,4 +1,4 @@
-"""Several steps of a level are refined together: the checker, the planner, and the other modules that handle plans."""
+"""Several steps of a level that are refined together: the checker, the planner, and the other modules that handle plans."""
 
 from dataclasses import replace
 from functools import cache
@@ -22,7 +22,7 @@ def library() -> confab.Scene:
 
 @cache
 def tour() -> Plan:
-    """Return the plan of one tour of the cart: three steps of level 1 are refined together."""
+    """Return the plan of one tour of the cart, in which three steps of level 1 are refined together."""
     return library().plan().plan
 
 
@@ -80,7 +80,7 @@ def test_each_step_must_be_applicable_after_the_steps_before_it() -> None:
     (fault,) = [text for text in faults(twice) if "preconditions" in text]
     assert "atlas shelf_a: its preconditions don't hold" in fault
     detour = replace(bring("atlas", "shelf_b"), steps=node().steps, joined=(bring("atlas", "shelf_a"), *rest_of_tour()))
-    assert faults(detour) == []  # the order and the number of the steps don't matter, only what they do together
+    assert faults(detour) == []  # the order and the number of the steps don't matter, only their joint effect
 
 
 def rest_of_tour() -> tuple[Step, ...]:

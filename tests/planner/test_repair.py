@@ -1,4 +1,4 @@
-"""Repair keeps what is still valid, and is a plan; where it is worse than replanning it gives way."""
+"""A repair keeps the valid steps and is a plan; if it costs more than a new plan, the new plan is taken."""
 
 import random
 from collections.abc import Sequence
@@ -194,9 +194,7 @@ def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.Mon
     assert repaired.kind == "replan"
     assert repaired.steps is not None
     begun = replace(serving(), initial=carried_out(serving(), serving().initial, planned().steps[0].steps[:1]))
-    repair_or_replan(
-        begun, (), begun, planner, using(), limits=Limits(seconds=60.0)
-    )  # something is brought to rest first
+    repair_or_replan(begun, (), begun, planner, using(), limits=Limits(seconds=60.0))  # a hand is brought to rest first
     repair_or_replan(now, planned().steps, serving(), planner, using())
     first, second, unlimited = left
     assert first is not None
@@ -207,7 +205,7 @@ def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.Mon
 
 
 def in_the_hand(done: int, goal: State | None = None) -> tuple[Problem, tuple[Step, ...]]:
-    """Return the situation after some primitives of the paper's plan, with another goal perhaps, and what is left to do."""
+    """Return the situation after some primitives of the paper's plan, possibly with another goal, and the remaining steps."""
     now = replace(serving(), initial=carried_out(serving(), serving().initial, planned().primitives[:done]))
     return replace(now, goal=goal or now.goal), tuple(rest_after(planned(), done))
 
@@ -223,7 +221,10 @@ def test_what_a_hand_holds_goes_where_it_is_wanted_also_where_nothing_is_left_of
 
 
 def test_a_step_that_has_begun_is_finished_although_its_domain_knows_no_rest() -> None:
-    """A thing that is carried stands at no spot, so bringing it isn't applicable any more; nothing is put down on the way."""
+    """A carried object is at no spot, so bringing it isn't applicable any more.
+
+    Yet the step is finished, and nothing is put down.
+    """
     rooms = read(load("rooms-battery")).problem
     first = plan(rooms).plan
     assert first is not None
@@ -268,7 +269,7 @@ def test_what_was_undone_is_done_again_first_and_what_was_planned_stays() -> Non
 
 
 def after_somebody(problem: Problem, draw: random.Random) -> Problem:
-    """Return a situation in which somebody has moved something, or wants something elsewhere, besides, or no more."""
+    """Return a situation in which a person has moved an object, or has changed, added or dropped a goal."""
     stands = {s: v for s, v in problem.initial.items() if s.situation == "LOCATION" and v != "in_hand"}
     free = sorted({*problem.classes["Location"]} - {*stands.values(), *problem.goal.values(), "in_hand"})
     one = draw.choice(sorted(stands))
@@ -302,8 +303,10 @@ def after_somebody(problem: Problem, draw: random.Random) -> Problem:
 def test_whatever_happens_whenever_little_is_done_otherwise(
     name: str, n: int, many: int, kept: int, cost: float, changed: int, asked: int
 ) -> None:
-    """Of so many interruptions somewhere in a plan as many are repaired, at no more cost, with no more steps dropped or added, and
-    no more are also planned anew to compare."""
+    """Of `many` interruptions, at least `kept` are repaired.
+
+    The total cost, the dropped and added steps, and the number of new plans for comparison are bounded.
+    """
     trial = Trial.of(family(name, n))
     problem, uses = trial.problem, compiled(trial.problem)
     repaired, spent, different, anew = 0, 0.0, 0, list[Problem]()

@@ -1,4 +1,4 @@
-"""Experience becomes rules: they lead in larger worlds and never spoil; what was never seen is treated as its like."""
+"""Experience becomes rules: rules lead in larger worlds and never do harm; unknown objects are treated like similar objects."""
 
 import gc
 import random
@@ -69,7 +69,7 @@ WALK = """(define (domain walk) (:requirements :strips :typing) (:types place co
 
 
 def walk(folder: Path, places: int, seats: int) -> Problem:
-    """Return seats at the end of a way on which nobody goes back, and coins along it."""
+    """Return a corridor of places that can't be walked back, with coins along it and seats at its end."""
     (folder / "domain.pddl").write_text(WALK)
     to = " ".join(f"(to p{i} p{i + 1})" for i in range(places - 1))
     lies = " ".join(f"(lies c{i} p{1 + i * 5 % (places - 2)})" for i in range(seats))
@@ -87,7 +87,7 @@ def expanded(outcome: Outcome, level: int = 1) -> int:
 
 
 def inverted(memory: Memory) -> Memory:
-    """Return a memory whose rules promise what they take away, and that prefers what was passed over."""
+    """Return a memory whose rules promise the opposite of their effects, and prefer the alternatives that were passed over."""
     experience = Experience("inverted", {"inverted": 1})
     wrong = [backwards(rule) for rule in rules_in(memory.experience)]
     experience.learn(Lesson(said=list(wrong), counted=[(rule, ITSELF, Tally(passed_over=5)) for rule in wrong]))
@@ -95,7 +95,7 @@ def inverted(memory: Memory) -> Memory:
 
 
 def foreign() -> Memory:
-    """Return a memory of behaviours that this domain doesn't have."""
+    """Return a memory of behaviours that the domain doesn't have."""
     experience = Experience("foreign")
     rules = rules_in(taught().experience)
     experience.learn(Lesson(said=[replace(rule, does=(f"OTHER_{rule.does[0]}", rule.does[1])) for rule in rules]))
@@ -106,7 +106,7 @@ def test_five_rules_are_learned_of_a_ferry_and_lead_to_every_goal_of_a_hundred_c
     experience = Experience("robot")
     for cars, places in ((1, 3), (2, 4), (3, 3)):
         teach(experience, ferry(tmp_path, cars, places))
-    # To be at a place, and not to be there; to be empty, too.
+    # These rules have the goals to be at a place, not to be at a place, and to be empty.
     assert sorted(rule.does[0] for rule in rules_in(experience)) == ["BOARD", "LEAVE", "LEAVE", "SAIL", "SAIL"]
     large = ferry(tmp_path, 100, 30)
     outcome = plan(large, Memory(experience), improve=0)
@@ -123,7 +123,7 @@ def test_what_several_goals_need_is_gathered_first_where_nobody_can_go_back(tmp_
     found = plan(large, Memory(experience))
     assert found.plan is not None and not validate(large, found.plan)
     assert len(found.plan.steps) == 13 + 10 + 10  # each place, coin and seat once
-    assert expanded(found) <= 2 * len(found.plan.steps)  # one promise is broken, then all are kept
+    assert expanded(found) <= 2 * len(found.plan.steps)  # one promise is broken, then all promises are kept
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -149,7 +149,7 @@ def test_in_strict_mode_expansions_never_exceed_the_memoryless_ones_by_more_than
 
 
 def spoiled(memory: Memory, seed: int) -> Memory:
-    """Return a memory whose rules were changed at random, of which nothing is known."""
+    """Return a memory whose rules were changed at random and have no record."""
     dice, experience = random.Random(seed), Experience("spoiled")
     rules = rules_in(memory.experience)
     for rule in rules:
@@ -192,7 +192,7 @@ def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> No
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
     call = Call(within, compiled(within), None, 1000)
     followed = Memory(poor).policy(call, "guarded").instances.rules
-    assert {level for level, _ in followed} == {2, 3}  # the record is of goals of a task, not of refinements
+    assert {level for level, _ in followed} == {2, 3}  # the record counts goals of a task, not of refinements
     assert Memory(poor).policy(call, "leading").instances.rules == memory.policy(call, "guarded").instances.rules != {}
 
 
@@ -248,7 +248,7 @@ def by_the_other_hand(step: Step) -> Step:
 def test_a_preference_that_flips_is_relearned_within_ten_episodes_after_forty() -> None:
     within, experience = problem("served", 2, 7), Experience("robot")
     one = teach(experience, within)
-    assert one is not None and hands(one) == {"hand1"}  # all could be done by either
+    assert one is not None and hands(one) == {"hand1"}  # either hand could do all steps
     other = Plan(tuple(map(by_the_other_hand, one.steps)))
     for _ in range(40):
         live(experience, within, other)
@@ -291,7 +291,7 @@ def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
 
 
 def jugs(cups: int, stuck: int) -> Problem:
-    """Return cups to be filled from jugs of which level 1 doesn't know that all but the last can't be opened."""
+    """Return cups to be filled from jugs; all jugs but the last can't be opened, which level 1 doesn't see."""
     names = tuple(f"jug{i}" for i in range(stuck + 1))
     empty, filled = has("CUP", "?c", "empty"), [becomes("CUP", "?c", "full"), becomes("FROM", "?c", "?j")]
     return world(
@@ -326,7 +326,8 @@ def test_regression_asks_over_roles_for_what_a_step_to_the_goal_needs() -> None:
     assert found is not None
     rules = list(PlanTrace(within, [(s.behavior, s.arguments) for s in found.steps]).rules_of())
     assert {rule.goals for rule in rules} <= {GoalKind("LOCATION", (kind,)) for kind in within.classes}
-    assert all(any(isinstance(c, Witness) and c.negated for c in rule.asks) for rule in rules)  # nobody is at the place
+    # no object is at the place
+    assert all(any(isinstance(c, Witness) and c.negated for c in rule.asks) for rule in rules)
     constants = {name for members in within.classes.values() for name in members}
     assert not constants & {term for rule in rules for term in (*rule.goal.arguments, rule.goal.value, *rule.does[1])}
 
@@ -360,7 +361,8 @@ def test_a_lesson_teaches_refinements_where_steps_of_its_own_plan_are_refined_to
     small, experience = confab.load("drawers-small").problem, Experience("robot")
     made = teach(experience, small)
     assert made is not None and any(step.joined for step in made.steps)
-    assert "L2_SHUT" in {rule.does[0] for rule in rules_in(experience)}  # only what is opened in between is shut
+    # only an object that was opened in the meantime is shut
+    assert "L2_SHUT" in {rule.does[0] for rule in rules_in(experience)}
 
 
 def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
@@ -449,14 +451,14 @@ def test_what_was_reached_before_is_not_doubted_soon(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(agenda, "proved", proved)
     assert plan(large, Memory(experience)).plan is not None
     with pytest.raises(AssertionError, match="looked for a proof"):
-        fast.plan(large, improve=0)  # its goals in series
+        fast.plan(large, improve=0)  # its goals are achieved in series
 
 
 def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_has_done_ten_times_as_much() -> None:
     within = problem("swap", 12, 1)
     call = Call(within, compiled(within), None, 10_000)
     moving = [rule for rule in taught().rules if rule.does[0] == "B1_MOVE"]
-    wrong = [  # they move somebody else there
+    wrong = [  # these rules move another object there
         replace(rule, goal=replace(rule.goal, arguments=("?wanted",)), kinds=(("?wanted", "Movable"), *rule.kinds))
         for rule in moving
     ]
@@ -484,7 +486,7 @@ def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_to
     before = call.table.state()
     policy.allowance.wasted_effort = policy.allowance.left() - 1
     assert policy.ready()
-    assert policy.follow(level, targets, keep) is None  # stopped after the first question
+    assert policy.follow(level, targets, keep) is None  # stopped after the first query
     assert call.table.state() == before
     assert not policy.ready()
     assert not policy.rank(cell)
@@ -526,7 +528,7 @@ DAIRY = """(define (domain dairy) (:requirements :strips :typing :derived-predic
 
 
 def dairy(folder: Path, orders: int, each: int, moulds: int = 1, domain: str = DAIRY) -> Problem:
-    """Return orders that are ready when none of their cheeses is without salt."""
+    """Return orders that are ready when all of their cheeses are salted."""
     (folder / "domain.pddl").write_text(domain)
     part = " ".join(f"(part c{o}_{i} o{o})" for o in range(orders) for i in range(each))
     cheeses = " ".join(f"c{o}_{i}" for o in range(orders) for i in range(each))
@@ -565,7 +567,7 @@ def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: P
     teach(experience, small)
     policy = RulePolicy(Call(small, compiled(small), None, 1000), rules_in(experience))
     (goal,) = policy.open().items()
-    # To press a cheese needs it in a mould, which is needed for salting it, too, and was found one rule nearer.
+    # Pressing a cheese requires the cheese in a mould; salting requires the mould, too, and was nearer by one rule.
     assert policy.instances.distance(policy.first, goal) == 6
 
 
@@ -583,7 +585,7 @@ LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing 
 
 
 def lorries(folder: Path, lorries: int, crates: int, places: int, each: int = 0) -> Problem:
-    """Return crates to carry along roads of so many places each by lorries that have room for two."""
+    """Return crates that lorries with room for two carry along roads of `each` places."""
     (folder / "domain.pddl").write_text(LORRY)
     each = each or places
     road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(places - 1) if (i + 1) % each)
@@ -608,7 +610,7 @@ def test_who_no_longer_fits_once_the_rest_is_brought_about_is_changed_for_who_do
     assert validate(large, outcome.plan) == []
     assert expanded(outcome) == len(
         outcome.plan.steps
-    )  # what is free of a lorry when it is there isn't what was free before
+    )  # the free room of a lorry on arrival differs from its free room before
 
 
 def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_see_where_the_van_is() -> None:
@@ -619,7 +621,8 @@ def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_s
     mixed = Plan((first, *(inner for step in rest for inner in step.steps)))
     assert validate(within, mixed) == []
     experience = Experience("robot")
-    live(experience, within, mixed)  # the second parcel is loaded where the refinement of the first step left the van
+    # the second parcel is loaded at the place where the refinement of the first step left the van
+    live(experience, within, mixed)
     assert min(within.domain.behaviors[rule.does[0]].level for rule in rules_in(experience)) == 2
 
 
@@ -634,7 +637,7 @@ def test_a_way_is_not_changed_for_one_that_lacks_less_but_is_out_of_reach(tmp_pa
     large = dairy(tmp_path, 2, 4, 8, stays)
     outcome = plan(large, Memory(experience), improve=0)
     assert outcome.plan is not None
-    assert expanded(outcome) == len(outcome.plan.steps)  # what was salted lacks but one thing: that it isn't
+    assert expanded(outcome) == len(outcome.plan.steps)  # one condition is unmet for salted cheese: that it is unsalted
 
 
 def test_each_of_all_of_whom_a_step_asks_something_has_steps_of_its_own(tmp_path: Path) -> None:
@@ -655,5 +658,5 @@ def test_who_is_somewhere_else_does_not_stand_for_all_of_his_kind(tmp_path: Path
         teach(experience, lorries(tmp_path, 1, crates, places))
     islands = lorries(tmp_path, 12, 48, 48, 4)
     policy = RulePolicy(Call(islands, compiled(islands), None, 1000), rules_in(experience))
-    # On each island there is one lorry, and no other gets there.
+    # Each island has one lorry, and no other lorry can get there.
     assert all(policy.instances.distance(policy.first, goal) < inf for goal in policy.open().items())

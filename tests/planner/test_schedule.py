@@ -1,4 +1,4 @@
-"""The partial order that a plan needs, and both hands at once."""
+"""The necessary partial order of a plan, and execution with both hands at once."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""A* on toy worlds: states are one-tuples of a digit string, so neither ontology nor physics is needed."""
+"""A* in toy worlds: states are tuples of one digit string, so the tests need neither ontology nor physics."""
 
 from collections.abc import Callable, Iterable
 from itertools import count
@@ -17,7 +17,7 @@ from worlds.families import tabletop
 def graph(
     edges: dict[str, dict[str, float]],
 ) -> tuple[Callable[[Values], Iterable[Applied]], Callable[[Values, Applied], float]]:
-    """Return successors and cost of a graph given as node → {node: cost}."""
+    """Return the successors and the costs of a graph that is given as node → {node: cost}."""
     names = {
         (a, b): GroundBehavior(i, f"{a}{b}", ()) for i, (a, b) in enumerate((a, b) for a in edges for b in edges[a])
     }

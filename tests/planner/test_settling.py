@@ -1,4 +1,4 @@
-"""Planning from the middle of something: a hand that holds a bottle, which is at no place that the first level knows."""
+"""Planning from an intermediate situation: a hand holds a bottle, so the bottle is at no place that the first level sees."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from worlds.hierarchies import hierarchy
 
 
 def course(problem: Problem) -> list[State]:
-    """Return the states that a plan leads through."""
+    """Return the states along a plan."""
     found = plan(problem).plan
     assert found is not None
     states: list[State] = [dict(problem.initial)]
@@ -40,7 +40,7 @@ def test_steps_of_a_lower_level_that_bring_something_to_rest_are_told() -> None:
     outcome = plan(replace(problem, initial=held))
     assert outcome.plan is not None
     below = [step.level > 1 for step in outcome.plan.steps]
-    assert sum(below) == below[below.index(True) :].index(False) > 0  # they follow each other
+    assert sum(below) == below[below.index(True) :].index(False) > 0  # these steps are consecutive
     assert [text[:45] for text in outcome.given_up] == ["steps of a lower level bring symbols to rest "]
 
 

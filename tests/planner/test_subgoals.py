@@ -1,4 +1,4 @@
-"""What is read off a state once holds as long as the state does, and what is asked of one individual holds of its likes."""
+"""Results derived from a state stay valid with the state; results for one individual hold for symmetric individuals."""
 
 import random
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_00
 
 
 def ask_anew(wants: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let nothing be kept of what was asked before."""
+    """Let the cache keep no results."""
 
     def would_hold(achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
         return wants.holds(achiever, condition, {**env, term: value})
@@ -69,7 +69,7 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
 
 
 def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A turntable has four of many spots: nobody asks of any four spots whether they are its."""
+    """A turntable has four of many spots: the search doesn't test all combinations of four spots."""
     spots = tuple(f"spot{i}" for i in range(40))
     tables = tuple(f"table{i}" for i in range(10))
     rings = frozenset((table, *spots[4 * i : 4 * i + 4]) for i, table in enumerate(tables))
@@ -96,7 +96,10 @@ def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeyp
 
 
 def museum(rooms: int) -> Problem:
-    """A picture hangs at one end of a row of rooms and shall hang at the other; a crate stands between; all doors are shut."""
+    """A picture hangs at one end of a row of rooms, and its goal is the other end.
+
+    A crate is in between, and all doors are shut.
+    """
     row = tuple(f"room{i}" for i in range(rooms))
     doors = tuple(f"door{i}" for i in range(rooms - 1))
     leads = [(door, room) for i, door in enumerate(doors) for room in row[i : i + 2]]

@@ -1,4 +1,4 @@
-"""Plans in time: schedules of hands, what random timed worlds say of them, and required concurrency."""
+"""Timed plans: schedules of hands, comparison with random timed worlds, and required concurrency."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -133,7 +133,7 @@ def test_a_window_and_a_deadline_are_kept_or_said_to_be_missed() -> None:
 
 
 def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
-    """Return how a random world is planned: as a sequence, or with steps that overlap by need."""
+    """Return the plan of a random world: in sequence, or with steps that must overlap."""
     if not only_during(problem):
         outcome = solve(Request(problem, limits=Limits(seconds=5.0)))
         if outcome.status is not Status.UNSOLVABLE:
@@ -142,7 +142,7 @@ def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
 
 
 def wrong(world: TimedWorld) -> str | None:
-    """Return what is wrong with the plan of a world: it isn't one, or it is shorter than any can be."""
+    """Return the fault of the plan of a world: it is invalid, or shorter than the optimum."""
     outcome, timed = planned(problem_of(world))
     assert outcome.status is not Status.UNSOLVABLE or only_during(problem_of(world)) == frozenset()
     if timed is None or timed.plan is None:
@@ -232,7 +232,7 @@ SHELVES = '''
 :b4 a :Book, owl:NamedIndividual ; :at :s1 .
 [] a owl:AllDifferent ; owl:distinctMembers ( :arm1 :arm2 :table :s1 :s2 :b1 :b2 :b3 :b4 ) .
 '''
-"""Two arms put books on shelves: how many are on a shelf follows from where the books are."""
+"""Two arms put books on shelves; the number of books on a shelf is derived from the places of the books."""
 
 
 def test_a_count_follows_the_facts_in_time_too(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The plan checker finds each kind of fault; it is the judge of every planner here, so it must be seen saying no."""
+"""The plan checker detects each kind of fault; every planner relies on the checker, so the tests must show that it rejects."""
 
 from dataclasses import replace
 
@@ -67,7 +67,7 @@ def solved(case: Case) -> tuple[Step, ...]:
 
 
 def refined(step: Step, *names: str) -> Step:
-    """Return a step with only those of its sub-steps."""
+    """Return a step with only the given sub-steps."""
     return replace(step, steps=tuple(below for below in step.steps if below.behavior in names))
 
 
@@ -101,7 +101,7 @@ def test_the_next_step_begins_where_the_refinement_of_the_one_before_ended() -> 
     other = next(i for i, step in enumerate(steps) if step.arguments == ("parcel2", "north"))
     again = (*steps[:other], alone[0], *steps[other + 1 :])
     assert faults(case.problem, steps) == ""
-    assert "preconditions don't hold" in faults(case.problem, again)  # the van isn't in the depot any more
+    assert "preconditions don't hold" in faults(case.problem, again)  # the van has left the depot
 
 
 def test_a_step_without_refinement_among_refined_ones_is_found() -> None:

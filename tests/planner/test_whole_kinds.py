@@ -1,7 +1,6 @@
-"""A class in the place of an individual stands for all of its individuals: in conditions, effects and goals.
+"""A class in place of an individual stands for all members of the class: in conditions, effects and goals.
 
-The theatre was written from docs/authoring.md alone; its plans are carried out here by a simulator that shares nothing with the
-planner.
+The theatre was written from docs/authoring.md alone; a simulator that shares no code with the planner executes its plans.
 """
 
 from collections.abc import Callable
@@ -35,7 +34,7 @@ def theatre(tmp_path: Path) -> Theatre:
 
 
 class Stage:
-    """The theatre as somebody would write it down without the planner."""
+    """The theatre, written without any code of the planner."""
 
     def __init__(self) -> None:
         self.at = {"crown": "store", "skull": "store", "sword": "store", "chair": "store", "cloud": "attic"}

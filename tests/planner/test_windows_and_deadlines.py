@@ -1,4 +1,4 @@
-"""Windows of individuals and deadlines of goals: plans that keep them, and what is said if none is found."""
+"""Time windows of individuals and deadlines of goals: plans keep them, and the reason is given if no plan is found."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ROBOTS = '''
 :GO.robot a owl:NamedIndividual . :WASH.robot a owl:NamedIndividual .
 :CHARGE.robot a owl:NamedIndividual . :CHARGE.charger a owl:NamedIndividual .
 '''
-"""Robots go to rooms and wash them; washing takes a charge, which chargers give."""
+"""Robots drive to rooms and wash them; washing uses up a charge, which chargers restore."""
 EVER = "DELETE { ?robot :CHARGED true }"
 
 
@@ -55,7 +55,7 @@ def planned(
     chargers: Mapping[str, str] | None = None,
     minimise: Minimise | None = None,
 ) -> Result:
-    """Plan a world: robots with their rooms, rooms to be washed with deadlines, windows, chargers with their rooms.
+    """Plan for robots with their rooms, rooms to be washed with deadlines, windows, and chargers with their rooms.
 
     Without chargers, robots stay charged.
     """
@@ -88,7 +88,7 @@ def planned(
 
 
 def said(result: Result) -> str:
-    """Return why there is no plan."""
+    """Return the reason why there is no plan."""
     assert result.outcome.status is Status.GAVE_UP
     assert result.outcome.reason is not None
     return result.outcome.reason.text
@@ -149,7 +149,7 @@ def test_robots_in_different_rooms_share_the_work_if_the_makespan_is_minimised(t
     goals = dict.fromkeys(("a", "b", "c", "d"))
     result = planned(tmp_path, {"r1": "hall", "r2": "cellar"}, goals, minimise="makespan")
     assert result.timed is not None
-    assert result.timed.makespan == 24  # each robot goes to two rooms and washes them
+    assert result.timed.makespan == 24  # each robot drives to two rooms and washes them
 
 
 def test_the_same_task_gets_the_same_schedule(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Every shipped world is planned without giving a level up, left at rest, and in no more steps than a right answer takes."""
+"""Every shipped world is planned without leaving a level, ends at rest, and takes no more steps than the known plan."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ from confab.planner.validation import successor, validate
 from confab.reasoner.symbols import Problem
 
 AT_MOST: Mapping[str, Mapping[int, int]] = {
-    # Small scenes: what level 1 needs, and what its steps need below in the least lucky order that level 1 allows.
+    # Small scenes: the steps that level 1 needs, and their primitives in the worst order that level 1 allows.
     "assembly-small": {1: 7, 2: 14, 3: 48},
     "canal-small": {1: 3, 2: 23, 3: 45},
     "canteen-small": {1: 4, 2: 16},
@@ -26,9 +26,10 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "laboratory-small": {1: 5, 2: 17, 3: 36},
     "library-small": {1: 3, 2: 17},
     "towers-small": {1: 4, 2: 6, 3: 30},
-    # Large scenes, each step refined as shortly as can be. Assembly: a change of tools at every joint (73 and 259 if each tool is
-    # fetched as seldom as the order of parts lets it). Canal: the water is wrong for every boat (297 and 555 if boats go up and
-    # down by turns). Couriers: each parcel alone. The others: one order of the errands, and a fifth more.
+    # Large scenes: each step has its shortest refinement. Assembly: a tool change at every joint (73 and 259 if each tool is
+    # fetched as seldom as the order of parts allows). Canal: the water level is wrong for every boat (297 and 555 if boats go
+    # up and down alternately). Couriers: each parcel is carried alone. Other scenes: one order of the errands, and a fifth
+    # more.
     "assembly-large": {1: 41, 2: 101, 3: 343},
     "canal-large": {1: 42, 2: 336, 3: 672},
     "canteen-large": {1: 22, 2: 88},  # tea is fetched six times
@@ -36,19 +37,19 @@ AT_MOST: Mapping[str, Mapping[int, int]] = {
     "gallery-large": {1: 19},
     "carts-large": {1: 17, 2: 34},
     "packing-large": {1: 18},
-    "drums-large": {1: 12, 2: 57},  # each move with two drives, a lift and a lowering, and a fifth more
+    "drums-large": {1: 12, 2: 57},  # each move takes two drives, a lift and a lowering; a fifth is added
     "tour-large": {1: 24},
     "drawers-large": {1: 9, 2: 130},
     "house-large": {1: 10, 2: 144, 3: 288},
     "laboratory-large": {1: 20, 2: 82, 3: 173},
-    "library-large": {1: 12, 2: 72},  # each book with two drives, and the brake released and set
+    "library-large": {1: 12, 2: 72},  # each book takes two drives, a release and a setting of the brake
     "towers-large": {1: 6, 2: 26, 3: 130},
 }
 SMALL = [scene for scene in AT_MOST if scene.endswith("-small")]
 
 
 def cases() -> list[object]:
-    """Return scene and mode of every case: the paper's mode is the truth on small scenes."""
+    """Return scene and mode of every case; on small scenes, the paper's mode is the reference."""
     pairs = [(scene, "paper") for scene in SMALL] + [(scene, "guarded") for scene in AT_MOST]
     return [
         pytest.param(
@@ -69,17 +70,17 @@ def test_a_world_is_planned_without_giving_a_level_up_and_left_at_rest(scene: st
     assert result.outcome.fallbacks == 0
     if bare := bare_steps(
         result.problem, result.plan
-    ):  # a stretch may stand in the place of steps above if it is shorter
+    ):  # lower-level steps may replace upper-level steps if the plan becomes shorter
         assert len(result.plan.primitives) < max(AT_MOST[scene].items())[1], bare
     counted = result.plan.length
-    if any(step.joined for step in result.plan.walk()):  # more steps of level 1 may have a shorter refinement together
+    if any(step.joined for step in result.plan.walk()):  # more steps of level 1 may have a shorter joint refinement
         counted = {max(counted): counted[max(counted)]}
     longer = {level: count for level, count in counted.items() if count > AT_MOST[scene][level]}
     assert longer == {}, f"wanted at most {AT_MOST[scene]}"
 
 
 def not_at_rest(problem: Problem, plan: Plan) -> list[str]:
-    """Return what has another value than its rest value after the primitives; everything rests at first."""
+    """Return the symbols that aren't at rest after the primitives; initially all symbols are at rest."""
     state = dict(problem.initial)
     for step in plan.primitives:
         after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
@@ -90,7 +91,7 @@ def not_at_rest(problem: Problem, plan: Plan) -> list[str]:
 
 
 def bare_steps(problem: Problem, plan: Plan) -> list[str]:
-    """Return steps that stand without a step of the level above, or without steps of the level below."""
+    """Return steps without a step of the level above, or without steps of the level below."""
     levels = problem.domain.levels
     return [
         str(step)

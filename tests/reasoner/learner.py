@@ -1,4 +1,4 @@
-"""Learns and saves without end, and says after each save how many episodes are safe: a process to be killed."""
+"""A process that learns and saves without end, prints the number of saved episodes after each save, and is killed by a test."""
 
 import sys
 from pathlib import Path

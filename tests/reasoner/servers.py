@@ -1,4 +1,4 @@
-"""Real SPARQL servers on loopback, started for a test and stopped by their process id."""
+"""Real SPARQL servers on loopback, started for a test and stopped by their process ID."""
 
 import socket
 import subprocess
@@ -30,7 +30,7 @@ def free_port() -> int:
 
 @contextmanager
 def running(command: list[str], port: int) -> Iterator[None]:
-    """Run a server until the end of the block; wait until it listens."""
+    """Run a server until the end of the block; first wait until the server accepts connections."""
     server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         for _ in range(300):
@@ -47,7 +47,7 @@ def running(command: list[str], port: int) -> Iterator[None]:
 
 @contextmanager
 def oxigraph(graphs: Mapping[str, list[Path]], union: bool = False) -> Iterator[str]:
-    """Run the Oxigraph server with files in named graphs (the default graph is called ""), and yield its query address."""
+    """Run the Oxigraph server with files in named graphs (the default graph is ""), and yield the address for queries."""
     port = free_port()
     base = f"http://127.0.0.1:{port}"
     command = [str(Path(sys.executable).with_name("oxigraph")), "serve", "--bind", f"127.0.0.1:{port}"]

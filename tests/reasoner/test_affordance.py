@@ -1,4 +1,4 @@
-"""What an object affords depends on the situation, and the graph says so by SPARQL."""
+"""The affordances of an object depend on the situation, and a SPARQL query on the graph returns them."""
 
 from functools import cache
 from pathlib import Path
@@ -23,7 +23,7 @@ def scene(name: str | Path) -> tuple[KnowledgeGraph, Reading]:
 
 
 def afforded(name: str | Path, **changes: str) -> set[tuple[str, ...]]:
-    """Return (object, behaviour, arguments …) in the initial situation with some changes, written ``object__SITUATION=value``."""
+    """Return (object, behaviour, arguments …) in the initial situation with changes, written as ``object__SITUATION=value``."""
     graph, reading = scene(name)
     state = dict(reading.problem.initial)
     for key, value in changes.items():
@@ -69,7 +69,7 @@ def test_an_affordance_is_object_situation_behaviour_and_effect() -> None:
 
 
 def states(reading: Reading, level: int) -> list[State]:
-    """Return some states that behaviours of a level lead to."""
+    """Return some states that behaviours of a level reach."""
     model = Model(reading.problem)
     grounds = ground(reading.problem, level)
     values = [model.values(reading.problem.initial)]
@@ -119,7 +119,7 @@ def test_what_is_defined_counts_for_what_something_affords() -> None:
     reading = read(graph)
     found = {(one.object, one.behavior) for one in affordances(graph, reading)}
     assert ("chest", "OPEN") in found
-    assert "casket" not in {name for name, _ in found}  # the chest around it is shut
+    assert "casket" not in {name for name, _ in found}  # the chest around the casket is shut
     inside = "SELECT ?x ?y WHERE { ?x <https://w3id.org/confab/packing#isInside> ?y }"
     rows = {
         tuple(local_name(text(term)) for term in row) for row in graph.select(inside, [SITUATION.rsplit(":", 1)[-1]])

@@ -1,4 +1,4 @@
-"""Derived amounts: sums and counts that effects keep, maxima and minima as conditions, and rules as CONSTRUCT queries."""
+"""Derived amounts: sums and counts that effects maintain, maxima and minima as conditions, and rules as CONSTRUCT queries."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -40,7 +40,7 @@ SEEDS = (
     44,
     45,
     20061,
-)  # whose worlds have derived amounts
+)  # these worlds have derived amounts
 STATES = 300
 CONSTRUCTED = '''
 d:OVER a owl:Class, owl:NamedIndividual, c:SituationType . d:Cart c:hasSituationType d:OVER .
@@ -115,9 +115,9 @@ def test_the_checker_works_a_total_out_from_its_rule() -> None:
     assert validate(problem, plan) == []
     effects = {name: replace(one, amounts=()) for name, one in problem.domain.behaviors.items()}
     unkept = replace(problem, domain=replace(problem.domain, behaviors=effects))
-    assert validate(unkept, plan) == []  # no effect keeps the totals, and all of them are as the goal wants
+    assert validate(unkept, plan) == []  # no effect maintains the totals, and all totals have their goal values
     heavy = {symbol: ("9" if symbol == Symbol("STOCK", ("shop",)) else v) for symbol, v in problem.initial.items()}
-    assert validate(replace(problem, initial=heavy), plan) == []  # nor is what is said of them believed
+    assert validate(replace(problem, initial=heavy), plan) == []  # stated totals are ignored, too
     full = replace(problem, goal={Symbol("STOCK", ("store",)): ">=1"})
     assert [fault.text for fault in validate(full, plan)] == [
         "the goal <store, STOCK> = >=1 isn't reached: it is 0 in the end"
@@ -157,7 +157,7 @@ LAMPS = """
 :task.one a owl:NamedIndividual, c:ValueCondition ; c:about :l1 ; c:situationType :ON ; c:value c:true .
 :task.two a owl:NamedIndividual, c:ValueCondition ; c:about :l2 ; c:situationType :ON ; c:value c:true .
 """
-"""Two lamps shall be on, and a house has one lamp on at most: nothing but the count names the house."""
+"""The goal requires that two lamps are on, but at most one lamp of a house may be on; only the count mentions the house."""
 
 
 def test_the_bound_of_a_count_holds_though_no_goal_and_no_behaviour_names_its_individual(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""The slice is closed: it has what a step asks, changes or could be refused by. One world for each kind of condition and effect."""
+"""The part that is read is closed: it contains all individuals that a step requires or changes, or that could make a step invalid.
+
+There is one world for each kind of condition and effect.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A class defined by situations becomes conditions, so that it stays true as the state changes."""
+"""A class that is defined by situations becomes conditions, so membership follows the changes of the state."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +29,7 @@ DIRTY = "c:about :B1_WASH.item ; c:situationType :CLEANLINESS ; c:value :dirty"
 
 
 def scene(folder: Path, *definitions: str, asked: str = "Special") -> Path:
-    """Write the skeleton, with washing allowed for items of a class `asked` that is defined by the given axioms."""
+    """Write the skeleton, in which washing requires items of a class `asked` that the given axioms define."""
     path = skeleton(folder)
     domain = folder / "washing.ttl"
     text = domain.read_text()
@@ -128,7 +128,7 @@ def test_an_inverse_property_turns_the_condition_round(tmp_path: Path) -> None:
 
 
 def applicable(reading: Reading, item: str, **changes: str) -> bool:
-    """Tell whether an item can be washed in the initial state with some changes to that item."""
+    """Return whether an item can be washed in the initial state with some changes to the item."""
     model = Model(reading.problem)
     state = {**reading.problem.initial, **{Symbol(name, (item,)): value for name, value in changes.items()}}
     return model.apply(GroundBehavior(0, "B1_WASH", (item,)), model.values(state)) is not None
@@ -206,7 +206,10 @@ RULED = """@prefix : <https://example.org/port#> .
 
 
 def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_path: Path) -> None:
-    """Nothing is stated to be in the class: taken for one that never changes, it would be empty, and each box sealed for ever."""
+    """No individual is stated to be in the class.
+
+    If the class were considered static, it would be empty, and each box would stay sealed.
+    """
     path = tmp_path / "port.ttl"
     path.write_text(RULED)
     problem = read(load(path)).problem
@@ -231,7 +234,7 @@ def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_pa
 def test_a_class_that_never_changes_is_closed_where_owl_rl_finds_nobody(
     tmp_path: Path, expression: str, members: set[str]
 ) -> None:
-    """So is one that names it, and who is stated to be in it is."""
+    """A class that names such a class is closed, too, and contains the individuals that are stated to be its members."""
     old = (
         defined(both(":Place", "[ a owl:Class ; owl:oneOf ( :hook ) ]"), "Old")
         + " :hook a owl:NamedIndividual, :Sink . <https://example.org/washing-scene#shelf> a :Old ."

@@ -1,4 +1,4 @@
-"""Goals that are no facts: alternatives, some or no individual, comparisons of two amounts, and of a maximum."""
+"""Goals that aren't facts: alternatives, quantified goals, comparisons of two amounts, and goals on a maximum."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ GOALS = {
         5,
     ),
 }
-"""Each with the number of primitives of its cheapest plan."""
+"""Each goal has the number of primitives of its cheapest plan."""
 
 
 @pytest.mark.parametrize("name", GOALS)

@@ -1,4 +1,4 @@
-"""PDDL 2.1: durative actions and timed facts become scenes, whose plans unified-planning's validator accepts."""
+"""PDDL 2.1: durative actions and timed initial literals become scenes; unified-planning's validator accepts their plans."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -55,7 +55,7 @@ def planned(found: Imported) -> TimedPlan:
 
 
 def accepted(domain: str, problem: str, found: Imported, timed: TimedPlan) -> bool:
-    """Return whether unified-planning's validator accepts a plan in time."""
+    """Return whether unified-planning's validator accepts a timed plan."""
     pytest.importorskip("unified_planning")
     from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
     from unified_planning.io import PDDLReader
@@ -76,7 +76,7 @@ def test_fuses_are_mended_while_a_match_burns() -> None:
     found = imported(parse(CELLAR, FUSES))
     timed = planned(found)
     assert only_during(found.problem) == {"STRIKE"}
-    assert 6 < timed.makespan < 7  # three fuses, one hand
+    assert 6 < timed.makespan < 7  # three fuses and one hand
     assert accepted(CELLAR, FUSES, found, timed)
 
 

@@ -1,4 +1,4 @@
-"""Counts that only grow: merging them is adding, in any order and any number of times."""
+"""Counts never decrease: a merge adds counts, in any order and any number of times."""
 
 from copy import deepcopy
 

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, in turns, whoever they belong to and however they are reached."""
+"""A file is written completely or not at all, by one process at a time, whatever its owner and its path."""
 
 import os
 import stat
@@ -13,7 +13,7 @@ from confab.reasoner.files import alone, as_iri_part, made_folder, write_whole
 from confab.reasoner.limits import LimitError
 
 ROWS = "thing\n"
-"""The columns of a query's rows, which replace rows of the same columns."""
+"""The columns of a query result; new rows replace rows with the same columns."""
 
 
 def left(folder: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Generated scenes are ordinary ontology files, the same for the same seed."""
+"""Generated scenes are ordinary ontology files, and equal seeds give equal scenes."""
 
 import re
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Loading: shipped names and files, imports offline, and errors that say where and what to do."""
+"""Loading: shipped names and files, offline imports, and errors that name the place and the remedy."""
 
 from pathlib import Path
 

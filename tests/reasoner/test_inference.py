@@ -1,4 +1,4 @@
-"""What follows by OWL 2 RL is written down before planning: the static part of it, and only if something follows."""
+"""Static conclusions of OWL 2 RL are added before planning, and only if there are any."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a condition names, needs and holds inside, kind by kind: who searches rests on it."""
+"""The variables that each kind of condition names, binds and contains; all searches rely on these functions."""
 
 from fractions import Fraction
 
@@ -38,7 +38,8 @@ EITHER = AnyOf(((has("AT", "?c", "?p"), NEAR), (KIND, SAME)))
         (KIND, ("?c",), {"?c"}, {"?c"}),
         (SAME, ("?c", "?d"), {"?c", "?d"}, {"?c", "?d"}),
         (FULL, ("?c", "?c", "?d"), {"?c", "?d"}, {"?c", "?d"}),
-        # It finds out ?p by itself, and with it ?room; but who isn't at ?q can't be told without ?q.
+        # The condition determines ?p, and with ?p also ?room; but the individuals that aren't at ?q can't be determined without
+        # ?q.
         (LOOKED_FOR, (), {"?p", "?room", "?q"}, {"?q"}),
         (EITHER, (), {"?c", "?p", "?d"}, {"?c", "?d"}),
         (Witness("?o", "Cup", (NEAR,)), (), {"?p"}, {"?p"}),

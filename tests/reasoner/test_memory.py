@@ -1,4 +1,4 @@
-"""The memory file: what was learned survives it, it is annotated axioms, and broken files are clear errors."""
+"""The memory file: it preserves what was learned, consists of annotated axioms, and a broken file gives a clear error."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What was learned, line by line: what it is called, how people may edit it, and what a broken part of it is answered with."""
+"""The parts of a memory: their names, the edits that people may make, and the error for each broken part."""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What was seen goes back into the graph as facts, and planning can start from it."""
+"""Observed facts are written into the graph, and planning can start from them."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""PDDL both ways: what goes in comes out again, and what can't be used is refused with its place."""
+"""PDDL import and export: imported problems are exported without a change; unsupported constructs are refused with their place."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ BOXES = (
 )
 OWN = {"boxes": BOXES, "trucks": TRUCKS, "lamps": LAMPS, "tolls": TOLLS}
 GIVEN = Path(os.environ.get("CONFAB_PDDL", Path(__file__).resolve().parents[3] / "shared" / "pddl"))
-"""Problems that others wrote: not part of this repository, tested where they are."""
+"""Problems of other authors, which aren't part of this repository; they are tested if they are available."""
 
 
 def given_problems() -> list[Path]:
@@ -104,7 +104,7 @@ def task_of(problem: Problem) -> Task:
 
 
 def same(first: Problem, second: Problem) -> bool:
-    """Return whether two problems say the same, parents and the classes of the core vocabulary aside."""
+    """Return whether two problems are equal, except for parent classes and the classes of the core vocabulary."""
     return (
         (first.scene, first.domain.behaviors, first.domain.situations, first.domain.rules, first.goal, first.initial)
         == (
@@ -121,7 +121,10 @@ def same(first: Problem, second: Problem) -> bool:
 
 
 def assert_same_behaviour(first: Problem, exported: Exported, second: Imported, steps: int = 60) -> None:
-    """Walk at random through both: in every state the same behaviours are applicable, and the goal holds in both or neither."""
+    """Walk at random through both problems.
+
+    In every state the same behaviours are applicable, and the goal holds in both or in neither.
+    """
     one, other = task_of(first), task_of(second.problem)
 
     def applicable(task: Task, state: int) -> dict[tuple[str, tuple[str, ...]], int]:
@@ -187,7 +190,7 @@ def test_import_export_import_is_the_same_problem(name: str) -> None:
     assert_same_behaviour(first, exported, imported(parse(exported.domain, exported.problem)))
 
 
-@pytest.mark.parametrize("name", sorted(OWN.keys() - {"boxes"}))  # its reader knows no derived predicates
+@pytest.mark.parametrize("name", sorted(OWN.keys() - {"boxes"}))  # its reader doesn't support derived predicates
 def test_plans_of_imported_problems_are_accepted_by_unified_planning(name: str) -> None:
     scene = imported(parse(*OWN[name]))
     task = task_of(scene.problem)
@@ -205,7 +208,7 @@ def accepted(domain: str, problem: str, plan: list[str]) -> bool:
     from unified_planning.plans import ActionInstance, SequentialPlan
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its parser's deprecations; and it isn't sure of action costs
+        warnings.simplefilter("ignore")  # deprecation warnings of the parser, and a warning about action costs
         task = PDDLReader().parse_problem_string(domain, problem)
         term = task.environment.expression_manager.ObjectExp
         steps = [
@@ -223,7 +226,7 @@ def test_costs_that_depend_on_objects_are_kept() -> None:
     assert {b.name: b.price for b in problem.domain.behaviors.values()} == {"GO": Measure("toll", ("?a", "?b"))}
     exported = to_pddl(problem)
     assert "(increase (total-cost) (toll ?a ?b))" in exported.domain
-    assert ":numeric-fluents" not in exported.domain  # so that planners take it that only know costs
+    assert ":numeric-fluents" not in exported.domain  # so that planners that support only costs accept the domain
     for one in (problem, imported(parse(exported.domain, exported.problem)).problem):
         outcome = solve(Request(one, "optimal"))
         assert outcome.cost == outcome.bound == 3
@@ -301,7 +304,7 @@ def test_a_hundred_thousand_objects_are_read_in_seconds(tmp_path: Path) -> None:
 
 
 def bound(problem: Problem, plan: Plan) -> Iterator[Step]:
-    """Yield a plan's steps with what their variables stand for, which the grounded task knows too."""
+    """Yield the steps of a plan with the individuals of their variables; the grounded task knows these individuals, too."""
     task = ground(problem, plan.steps[0].level)
     assert isinstance(task, Task)
     state = task.initial
@@ -342,7 +345,7 @@ def test_a_derived_predicate_is_followed_and_what_changes_it_directly_is_refused
     assert found.plan is not None
     assert (
         len(found.plan.steps) >= 5
-    )  # the large box is opened, the ball taken out, packed into the small one, and that away
+    )  # the large box is opened, the ball is taken out and packed into the small box, and the small box is put away
     domain, problem = BOXES
     with pytest.raises(PddlError, match=r"domain:\d+:\d+: 'loose' is derived, so it can't be an effect"):
         parse(domain.replace(":effect (in ?t ?b))", ":effect (and (loose ?t) (in ?t ?b)))"), problem)

@@ -1,4 +1,4 @@
-"""What PDDL can say, a small problem each: it goes in, is planned in as few steps as it takes, and goes out and in again."""
+"""The constructs of PDDL, one small problem each: imported, planned with the least number of steps, exported and imported again."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AT = "(:predicates (at ?x) (way ?x ?y))"
 GO = """(:action go :parameters (?x ?y) :precondition (and (at ?x) (way ?x ?y))
  :effect (and (at ?y) (not (at ?x))))"""
 
-CONSTRUCTS = {  # domain, problem, steps of a plan
+CONSTRUCTS = {  # domain, problem, number of steps of a plan
     "no types no req": (
         AT + GO,
         "(:objects a b c) (:init (at a) (way a b) (way b c)) (:goal (at c))",

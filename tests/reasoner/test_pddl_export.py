@@ -1,4 +1,4 @@
-"""What is exported means what the scene means, whoever reads it."""
+"""An export has the same meaning as the scene, for every reader."""
 
 import warnings
 from collections.abc import Callable
@@ -45,7 +45,7 @@ MOST = 2_000
 def read_by_unified_planning(domain: str, problem: str) -> None:
     io = pytest.importorskip("unified_planning.io")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of pyparsing
+        warnings.simplefilter("ignore")  # warnings of pyparsing
         io.PDDLReader().parse_problem_string(domain, problem)
 
 
@@ -57,7 +57,7 @@ def least(problem: Problem, level: int | None = None, most: int = MOST) -> float
 
 def round_trip(problem: Problem, level: int | None = None) -> Problem:
     exported = to_pddl(problem, level)
-    if ":derived " not in exported.domain:  # which its reader doesn't know
+    if ":derived " not in exported.domain:  # the reader doesn't support derived predicates
         read_by_unified_planning(exported.domain, exported.problem)
     return imported(parse(exported.domain, exported.problem)).problem
 
@@ -104,7 +104,7 @@ def test_an_import_that_could_not_be_planned_in_is_refused_and_writes_nothing(tm
     assert list(tmp_path.iterdir()) == []
 
 
-# ------------------------------------------------------------------------------------------------------ what is said
+# ---------------------------------------------------------------------------------------------------------- messages
 
 AT = SituationType("AT", ("Thing",), "Place")
 LIT = SituationType("LIT", ("Thing",), "Truth", default=FALSE, boolean=True)
@@ -154,9 +154,10 @@ SWAP = Behavior(
         ([MOVE], 3.0),
         ([JUMP], 2.0),
         ([SWAP], 1.0),
-        ([MOVE, JUMP], 2.0),  # two may be at one place, so that being free isn't kept as such
+        ([MOVE, JUMP], 2.0),  # two objects may be at one place, so the predicate "free" isn't maintained by itself
         ([replace(MOVE, preconditions=(NOBODY, at("?x", "?p", negated=True)))], 3.0),
-        ([replace(JUMP, effects=(*JUMP.effects, ValueEffect("AT", ("b",), "m")))], 1.0),  # the later one counts
+        # the later effect takes precedence
+        ([replace(JUMP, effects=(*JUMP.effects, ValueEffect("AT", ("b",), "m")))], 1.0),
         ([replace(JUMP, effects=(ValueEffect("AT", ("b",), "m"), *JUMP.effects))], 1.0),
         ([replace(SWAP, preconditions=SWAP.preconditions[:2])], 1.0),
         ([replace(SWAP, effects=(ValueEffect("AT", ("?x",), "?q", (at("?y", "?q"),)), *SWAP.effects[1:]))], 1.0),

@@ -1,4 +1,4 @@
-"""Numbers in PDDL: random problems are imported, planned, exported and imported again; unified-planning is the judge of both."""
+"""Numbers in PDDL: random problems are imported, planned, exported and imported again; unified-planning judges both versions."""
 
 from collections import deque
 from pathlib import Path
@@ -19,11 +19,11 @@ from confab.reasoner.symbols import Problem
 
 FUNCTIONS = ("(level ?x)", "(level ?y)", "(total)")
 STATES = 300
-"""So many states of a problem are looked at before it counts as too large."""
+"""Maximum number of states of a problem that are examined before the problem counts as too large."""
 
 
 def amount(rng: Random, own: str, depth: int = 1) -> str:
-    """Return a number, a function or a calculation, linear in what changes."""
+    """Return a number, a function or a calculation that is linear in the changing amounts."""
     match rng.choice(("number", "function", "size", "sum", "times") if depth else ("number", "function")):
         case "function":
             return rng.choice([f for f in FUNCTIONS if "?y" not in f or "?y" in own])
@@ -73,7 +73,7 @@ def pddl(seed: int) -> tuple[str, str]:
 
 
 def judged(domain: str, problem: str, plan: list[str]) -> bool:
-    """Return whether unified-planning calls steps a plan."""
+    """Return whether unified-planning accepts steps as a plan."""
     shortcuts = pytest.importorskip("unified_planning.shortcuts")
     from unified_planning.engines import SequentialPlanValidator
     from unified_planning.io import PDDLReader
@@ -88,7 +88,7 @@ def judged(domain: str, problem: str, plan: list[str]) -> bool:
 
 
 def shortest(domain: str, problem: str) -> int | None:
-    """Return the length of a shortest plan, by unified-planning's simulator; -1 if there is none, None if that isn't known."""
+    """Return the length of a shortest plan, computed by unified-planning's simulator; -1 if there is no plan, None if unknown."""
     pytest.importorskip("unified_planning")
     from unified_planning.engines.sequential_simulator import UPSequentialSimulator
     from unified_planning.io import PDDLReader
@@ -150,7 +150,7 @@ def test_what_is_imported_is_read_back_from_turtle(tmp_path: Path) -> None:
 
 
 def levels_and_total(effect: str) -> tuple[str, str]:
-    """Return a domain with one effect beside another that raises levels, and a problem whose goal is a total."""
+    """Return a domain with the given effect and another effect that raises levels, and a problem whose goal is a total."""
     return (
         "(define (domain d) (:types thing) (:functions (level ?x - thing) (total))"
         f"(:action go :parameters (?x - thing) :effect {effect})"

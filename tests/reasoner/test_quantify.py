@@ -1,4 +1,4 @@
-"""Quantification by SPARQL yields the paper's numbering, and the same set as enumeration."""
+"""The SPARQL queries for quantification yield the paper's numbering, and the same set as enumeration."""
 
 import re
 from pathlib import Path
@@ -69,7 +69,7 @@ def test_query_and_enumeration_give_the_same_behaviours_on_a_table(tmp_path: Pat
 
 
 def test_individuals_of_several_namespaces_and_of_two_indices_are_numbered_once(tmp_path: Path) -> None:
-    """What SPARQL orders by its IRI has the ID that its short name gives it; a second index makes no second row."""
+    """An individual that SPARQL sorts by its IRI has the ID of its short name; a second index doesn't add a second row."""
     path = tmp_path / "scene.ttl"
     write_scene(path, "served")
     far = "".join(

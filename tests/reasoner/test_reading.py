@@ -1,4 +1,4 @@
-"""From graph to values: what the scene says, defaults, goals, and facts that people type."""
+"""From graph to problem: the stated facts, defaults, goals, and facts that people type."""
 
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def test_a_situated_object_needs_exactly_one_value(tmp_path: Path, stated: str, 
 
 
 def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(tmp_path: Path) -> None:
-    """A towel that can't be clean isn't: with that goal as without it."""
+    """A towel for which CLEAN doesn't exist isn't clean, with or without that goal."""
     scene = (SCENES / "drawers-small.ttl").read_text()
     goal = ":keepsakes.never a owl:NamedIndividual, c:ValueCondition ; c:about :album ; c:situationType d:OPENED ; c:negated true ."
     path = tmp_path / "mine.ttl"
@@ -94,7 +94,7 @@ def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(t
 
 
 def test_what_a_scene_states_of_what_cannot_be_so_is_not_so(tmp_path: Path) -> None:
-    """A drawer can be opened, an album can't; with what is said of the album nothing follows from its being open."""
+    """A drawer can be opened, an album can't; no fact follows from the statement that the album is open."""
     path = tmp_path / "mine.ttl"
     said = ":open_album a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :album ; c:situationType d:OPENED ."
     path.write_text((SCENES / "drawers-small.ttl").read_text() + said)

@@ -1,4 +1,4 @@
-"""The slice that a task can need has the same answer as the whole world, and doesn't grow with what is irrelevant."""
+"""The part that is read for a task has the same answer as the whole world, and doesn't grow with irrelevant objects."""
 
 from collections import Counter
 from pathlib import Path
@@ -25,7 +25,7 @@ from tests.reasoner.worlds import HEAD, graph_of, worlds
 
 
 def solvable(problem: Problem, most: int) -> bool | None:
-    """Return whether exhaustive search of level 1 finds the goal; None if that is too much."""
+    """Return whether an exhaustive search of level 1 finds the goal, or None if the search is too large."""
     model = Model(problem)
     grounds = ground(problem, 1)
     start = model.values(problem.initial)
@@ -64,7 +64,7 @@ def test_the_slice_has_a_plan_exactly_if_the_world_has_one(text: str) -> None:
 
 
 def test_who_has_to_come_from_elsewhere_is_found(tmp_path: Path) -> None:
-    """To color x, somebody has to be where x is; y can come from s1, from which s0 is near, but not from s0 back."""
+    """To color x, an individual must be at the place of x; y can come from s1, which is near s0, but s0 isn't near s1."""
     text = (
         HEAD
         + """
@@ -100,7 +100,7 @@ def test_who_has_to_come_from_elsewhere_is_found(tmp_path: Path) -> None:
 
 
 def test_what_a_class_is_defined_by_is_read(tmp_path: Path) -> None:
-    """A behaviour that takes blue things needs to know of blue, which nobody is in this world at first."""
+    """A behaviour that takes blue things needs the definition of blue; initially, no individual of the world is blue."""
     text = (
         HEAD
         + """
@@ -134,7 +134,7 @@ def test_clutter_is_left_out_and_nothing_else_that_moves(tmp_path: Path, family:
     reached = {place for _, place in bare.problem.relations["canReach"]}
     places = reached | {value for symbol, value in bare.problem.goal.items() if symbol.situation == "LOCATION"}
     assert places <= set(sliced.problem.classes["Location"])
-    if family != "random":  # where an object can stand beyond every reach
+    if family != "random":  # an object can be at a place beyond every reach
         for kind in ("Movable", "Hand", "Location", "Beverage"):
             assert sliced.problem.classes[kind] == bare.problem.classes[kind]
         assert sliced.problem.initial == bare.problem.initial
@@ -176,7 +176,7 @@ def test_at_most_twelve_queries_at_any_size(
 
 
 def test_a_task_on_one_of_two_tables_leaves_the_other_out(tmp_path: Path) -> None:
-    """Hands, places and objects of a second table, with the same beverage or in a hand as others may be, aren't read."""
+    """Hands, places and objects of a second table aren't read, although they may have the same beverage or be in a hand."""
     second = "".join(
         f":far_hand a owl:NamedIndividual, c:Hand ; k:canReach :far{i} .\n"
         f":far{i} a owl:NamedIndividual, k:Location .\n"
@@ -218,7 +218,7 @@ def test_random_tables_are_solvable_in_the_slice_if_in_the_world(seed: int, obje
 
 
 def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -> None:
-    """A robot's hand of the name of a role that only physics knows is no less ambiguous where the role isn't read."""
+    """A hand whose name equals the name of a role of physics stays ambiguous, even if the role isn't read."""
     for name in ("scenes/one-arm-serving.ttl", "scenes/one-arm-serving.reach.ttl", "robots/one-arm.ttl"):
         text = (ROOT / name).read_text(encoding="utf-8").replace("confab/one-arm", "confab/one-hand")
         text = text.replace("r:gripper", "r:hand").replace("\n:gripper", "\n:hand")
@@ -229,7 +229,10 @@ def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -
 
 @pytest.mark.parametrize("where", ["prefix", "import", "class"])
 def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_path: Path, where: str) -> None:
-    """Another cup1, far away in a namespace of its own, isn't read; the cup1 of the task is called as in the whole scene."""
+    """Another cup1 in a separate namespace is far away and isn't read.
+
+    The cup1 of the task has the name that it has in the whole scene.
+    """
     space, text = "<https://example.org/far#{}>", generate("served", clutter=5)
     cup, shelf, cat = map(space.format, ("cup1", "shelf", "cat"))
     more = f"{cup} a owl:NamedIndividual, k:Cup ; k:location {shelf} ; k:beverage k:no_beverage .\n"
@@ -260,7 +263,7 @@ def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_pat
 
 @pytest.mark.parametrize("word", ["Task", "Level", "Parameter"])
 def test_a_class_may_be_called_like_a_part_of_the_model(tmp_path: Path, word: str) -> None:
-    """The core's own classes of that name have no individuals that are planned with, so that they change no name."""
+    """The core's own classes of that name have no individuals in the problem, so they change no name."""
     text = generate("served").replace(":cup1 a owl:NamedIndividual, k:Cup", f":cup1 a owl:NamedIndividual, :{word}", 1)
     text += f":{word} a owl:Class ; rdfs:subClassOf k:Cup .\n"
     (tmp_path / "scene.ttl").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Experience outlives its process: files in any layout, crashes, other robots at the same endpoint; and broken files say so."""
+"""A memory outlives its process: in any file layout, after crashes, with other robots at an endpoint; broken files are reported."""
 
 import contextlib
 import re

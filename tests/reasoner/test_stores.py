@@ -1,4 +1,4 @@
-"""A scene is the same in memory, on disk and behind an endpoint; an endpoint that fails says so in one sentence."""
+"""A scene is the same in memory, on disk and behind an endpoint; a failing endpoint is reported in one sentence."""
 
 import base64
 import socket
@@ -27,7 +27,7 @@ PAPER = "https://w3id.org/confab/beverage-serving"
 
 
 def files_of(*sources: str | Path) -> list[Path]:
-    """Return the files of some scenes, each once, reach files included."""
+    """Return the files of some scenes, each file once, including the files of reach facts."""
     found: dict[Path, None] = {}
     for source in sources:
         graph = load(source)
@@ -131,7 +131,7 @@ Reply = Callable[[BaseHTTPRequestHandler, int], tuple[int, bytes]]
 
 @contextmanager
 def stub(reply: Reply) -> Iterator[str]:
-    """Run a server whose answers are made up: `reply` gets the request and its number."""
+    """Run a server with artificial answers: `reply` gets the request and its number."""
     seen: list[str] = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -140,14 +140,14 @@ def stub(reply: Reply) -> Iterator[str]:
             seen.append(self.path)
             try:
                 status, body = reply(self, len(seen))
-            except BrokenPipeError:  # it has answered by itself
+            except BrokenPipeError:  # the server has answered by itself
                 self.close_connection = True
                 return
             self.send_response(status)
             self.send_header("Content-Type", getattr(self, "kind", ""))
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
-            with suppress(BrokenPipeError):  # who asked may have stopped waiting
+            with suppress(BrokenPipeError):  # the client may have stopped waiting
                 self.wfile.write(body)
 
         def log_message(self, *_: object) -> None:
@@ -278,7 +278,7 @@ def test_data_that_change_while_they_are_read_are_never_planned_with(
     with oxigraph({"": files_of(scene)}) as url:
         steady = confab.load(url)
         assert steady.plan().plan
-        steady.query("SELECT (RAND() AS ?x) {}")  # what people ask isn't asked again
+        steady.query("SELECT (RAND() AS ?x) {}")  # a query of a user isn't repeated
         assert steady.plan().plan
         sent: list[bytes] = []
         post = Endpoint._post

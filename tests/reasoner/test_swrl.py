@@ -1,4 +1,4 @@
-"""Definitions of every kind in one small world: held against HermiT in random states, planned with, and refused where need be."""
+"""Definitions of every kind in one small world: compared with HermiT, used in planning, and refused if unsupported."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -100,7 +100,7 @@ BUILT_IN = "http://www.w3.org/2003/11/swrlb#"
 
 
 def counted(built_in: str, number: str) -> str:
-    """Return a rule: a box is guarded whose weight, added to itself, compares so with a number."""
+    """Return a rule: a box is guarded if the double of its weight satisfies a comparison with a number."""
     x, w, s = (f"<urn:swrl:var#{name}>" for name in "xws")
 
     def atoms(*said: str) -> str:
@@ -163,7 +163,7 @@ def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) 
     problem = with_goals(read(load(path)).problem, ["cup1 KEPT", "cup1 LIES_IN box3"])
     plan = solve(Request(problem)).plan
     assert plan is not None
-    assert len(plan.steps) == 2  # the cup into the third box, and that into the first
+    assert len(plan.steps) == 2  # the cup is put into the third box, and this box into the first
     assert validate(problem, plan) == []
 
 

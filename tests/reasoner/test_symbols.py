@@ -1,4 +1,4 @@
-"""The values that everybody plans with mean what they say: numbers, levels, rest, and conditions with other terms put in."""
+"""The values of a planning problem have their stated meaning: numbers, levels, rest values, and conditions after substitution."""
 
 from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
 from fractions import Fraction
@@ -38,7 +38,7 @@ HALF = Fraction(1, 2)
 
 
 def small() -> Problem:
-    """Two cups, three places one of which only level 2 knows, a door at rest when shut and a lamp that is at rest when off."""
+    """Return two cups, three places (one only on level 2), a door that is at rest when shut, and a lamp at rest when off."""
     return world(
         [
             SituationType("AT", ("Cup",), "Place"),
@@ -125,7 +125,7 @@ def test_a_level_sees_what_exists_on_it() -> None:
 def test_what_a_level_finds_at_rest_is_to_be_so_in_the_end_but_for_what_is_wanted_otherwise() -> None:
     problem = small()
     assert problem.at_rest(1) == {}
-    # The second lamp is off though nobody says so, and the level can change that; nothing makes cups hot.
+    # The second lamp is off although no fact states it, and the level can change that; no behaviour makes cups hot.
     assert problem.at_rest(2) == {Symbol("DOOR", ("door",)): "shut", Symbol("LIT", ("lamp2",)): FALSE}
     wanted = replace(problem, goal={Symbol("DOOR", ("door",)): "open"})
     assert wanted.goal_on(2) == {Symbol("DOOR", ("door",)): "open", Symbol("LIT", ("lamp2",)): FALSE}

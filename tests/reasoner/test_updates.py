@@ -1,4 +1,4 @@
-"""A behaviour written as a SPARQL update is the same as one written as individuals, both ways; its faults have line and column."""
+"""A behaviour as a SPARQL update equals the same behaviour as individuals, in both directions; faults have line and column."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def behaviors(graph: KnowledgeGraph) -> dict[str, Behavior]:
 
 
 def again(graph: KnowledgeGraph, iri: str, behavior: Behavior, prefixes: dict[str, str]) -> tuple[str, object]:
-    """Return the update of a behaviour, and what that says."""
+    """Return the update of a behaviour, and the behaviour that is read from this update."""
 
     def spell(term: str) -> str:
         found = [f"{prefix}:{term.removeprefix(ns)}" for prefix, ns in prefixes.items() if term.startswith(ns)]
@@ -63,7 +63,7 @@ def test_any_behavior_comes_back_from_its_update_as_it_was(seed: int) -> None:
     for iri, behavior in behaviors(graph).items():
         try:
             written, found = again(graph, iri, behavior, {"": f"{RANDOM}#", "c": CORE})
-        except ValueError as error:  # an amount becomes "itself and something", but not by an increase
+        except ValueError as error:  # an amount becomes the sum of itself and a number, but not by an increase
             assert "assigns an amount" in str(error)
             continue
         assert found == plainly(behavior), written
@@ -117,7 +117,7 @@ def test_the_laboratory_in_updates_is_under_a_hundred_lines_and_plans_like_its_i
         outcome = solve(Request(read(graph).problem))
         assert outcome.plan is not None
         plans.append([str(step) for step in outcome.plan.walk()])
-        assert len(outcome.plan.primitives) <= 52  # the length with each step of level 1 refined alone
+        assert len(outcome.plan.primitives) <= 52  # the length if each step of level 1 is refined alone
     assert plans[0] == plans[1]
     assert validate([LABORATORY / "lab-scene.ttl"]) == []
 
@@ -277,7 +277,7 @@ def test_a_store_elsewhere_has_the_text_alone(tmp_path: Path) -> None:
 
 @dataclass
 class Elsewhere:
-    """A store that answers as an endpoint does."""
+    """A store that answers like an endpoint."""
 
     graph: KnowledgeGraph
 

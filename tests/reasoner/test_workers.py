@@ -1,4 +1,4 @@
-"""Nothing outlives the process that started it, and every process has a limit of its own."""
+"""No process outlives the process that started it, and every process has its own limit."""
 
 import os
 import signal
@@ -35,14 +35,14 @@ time.sleep(60)
 
 
 def group(number: int) -> list[str]:
-    """Return the processes of a group that still run."""
+    """Return the running processes of a group."""
     listed = subprocess.run(["ps", "-eo", "pgid=,stat=,args="], capture_output=True, text=True, check=True).stdout
     rows = (line.split(None, 2) for line in listed.splitlines())
     return [row[2] for row in rows if row[0] == str(number) and not row[1].startswith("Z")]
 
 
 def ended(number: int) -> bool:
-    """Whether a group ends within two seconds."""
+    """Return whether a group ends within two seconds."""
     for _ in range(40):
         if not group(number):
             return True
@@ -71,7 +71,7 @@ def test_the_end_of_a_process_is_that_of_all_that_it_started() -> None:
     process.stdout.readline()
     end(process)
     assert ended(process.pid)
-    end(process)  # again does nothing
+    end(process)  # a second call does nothing
 
 
 def test_what_is_tied_to_a_pipe_that_is_closed_already_never_begins(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Random worlds: behaviours and situations drawn at random, written as ordinary Turtle, for property tests."""
+"""Random worlds for property tests: behaviours and situations are drawn at random and written as ordinary Turtle."""
 
 import re
 from pathlib import Path
@@ -43,7 +43,7 @@ THINGS, SPOTS = ["x", "y", "v"], ["z", "u"]
 
 @st.composite
 def leaf(draw: st.DrawFn, behavior: str, name: str) -> str:
-    """Return a condition that isn't nested, over the terms of a behaviour."""
+    """Return a condition without nested conditions, over the terms of a behaviour."""
     thing, other = (f"w:{behavior}.{draw(st.sampled_from(THINGS))}" for _ in range(2))
     spot, spot2 = (f"w:{behavior}.{draw(st.sampled_from(SPOTS))}" for _ in range(2))
     negated = draw(st.sampled_from(["", "", "", " ; :negated true"]))
@@ -77,7 +77,7 @@ def leaf(draw: st.DrawFn, behavior: str, name: str) -> str:
 
 @st.composite
 def condition(draw: st.DrawFn, behavior: str, name: str) -> str:
-    """Return a condition, sometimes that a spot is free, a witness or alternatives."""
+    """Return a condition; some are nested: a free spot, a witness or alternatives."""
     kind = draw(st.sampled_from(["leaf"] * 4 + ["free", "witness", "any"]))
     spot = f"w:{behavior}.{draw(st.sampled_from(SPOTS))}"
     if kind == "free":
@@ -112,7 +112,7 @@ def condition(draw: st.DrawFn, behavior: str, name: str) -> str:
 
 @st.composite
 def of_each(draw: st.DrawFn, name: str) -> str:
-    """Return an effect on all things or tools, sometimes only on those at a spot or of a color, or on another thing."""
+    """Return an effect on all things or tools, sometimes only on those at a spot or of a color, or an effect on another thing."""
     about = draw(st.sampled_from(["w:Thing", "w:Tool", f"w:{name}.v"]))
     what = draw(
         st.sampled_from(
@@ -140,7 +140,7 @@ def of_each(draw: st.DrawFn, name: str) -> str:
 
 @st.composite
 def behavior(draw: st.DrawFn, name: str) -> str:
-    """Return a behaviour; a spot that a condition determines is sometimes a variable, every other term a parameter."""
+    """Return a behaviour; a spot that a condition determines is sometimes a variable, and every other term is a parameter."""
     conditions = draw(st.integers(1, 3))
     text = "".join(draw(condition(name, f"{name}_{i}")) for i in range(conditions))
     thing, spot = draw(st.sampled_from(THINGS)), draw(st.sampled_from(SPOTS))
@@ -193,7 +193,7 @@ def _determines(text: str, condition: str, term: str) -> bool:
 
 @st.composite
 def worlds(draw: st.DrawFn) -> str:
-    """Return a world as Turtle: two or three behaviours, a few things and spots, a goal of one or two facts."""
+    """Return a world as Turtle: two or three behaviours, a few things and spots, and a goal of one or two facts."""
     text = HEAD
     spots = [f"s{i}" for i in range(draw(st.integers(1, 3)))]
     things = [f"t{i}" for i in range(draw(st.integers(1, 4)))]

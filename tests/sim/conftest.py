@@ -1,4 +1,4 @@
-"""The shipped scenes with their bodies, the primitives of their plans, and the states that these promise."""
+"""The shipped scenes with their bodies, the primitives of their plans, and the expected states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from confab.sim.verify import expectations
 
 @dataclass(frozen=True)
 class Case:
-    """What `confab.sim.verify.verify` takes."""
+    """The arguments of `confab.sim.verify.verify`."""
 
     embodiment: Embodiment
     initial: State

@@ -1,4 +1,4 @@
-"""A small robot behind HTTP: two rooms and a door, in words of its own. Faults are planted by a function."""
+"""A small robot behind HTTP with two rooms and a door, and with its own vocabulary. Faults are planted by a function."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from threading import Event, Thread
 from typing import Any
 
 Fault = Callable[[str, dict[str, str]], str]
-"""Says of an action what goes wrong: hang, half, lie, refuse, garbage, or nothing."""
+"""Function that returns the fault of an action: hang, half, lie, refuse, garbage, or an empty text."""
 
 PLACES = {"hall": "hall", "den": "den", "door": "", "shelf_top": "hall", "chest_inside": "den"}
 FURNITURE = {"shelf_top": "shelf", "chest_inside": "chest"}
 
 
 class Robot:
-    """What the robot does; each action takes effect at once, unless a fault is planted."""
+    """The actions of the robot; each action takes effect at once, unless a fault is planted."""
 
     def __init__(self, fault: Fault = lambda action, arguments: "") -> None:
         self.fault = fault
@@ -115,7 +115,7 @@ def served(robot: Robot) -> Iterator[str]:
         daemon_threads = True
 
         def handle_error(self, *_: object) -> None:
-            pass  # the client has left: the action was cancelled
+            pass  # the client has disconnected: the action was cancelled
 
     server = Server(("127.0.0.1", 0), Handler)
     Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
@@ -128,7 +128,7 @@ def served(robot: Robot) -> Iterator[str]:
 
 
 def interface(name: str = "rover", seconds: float = 5.0) -> str:
-    """Return the robot's interface in Turtle: its own words for actions, arguments and answers."""
+    """Return the robot's interface in Turtle, with its own words for actions, arguments and answers."""
 
     def argument(action: str, word: str, *parameters: str, constant: str = "") -> str:
         takes = f"e:takes {', '.join('r:' + one for one in parameters)}" if parameters else f'e:constant "{constant}"'

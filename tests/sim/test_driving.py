@@ -1,4 +1,4 @@
-"""A base that drives: it finds its way between things, carries along what the hands hold, and says what stops it."""
+"""A mobile base: it finds its path between objects, carries what the hands hold, and reports the obstacle that stops it."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def tables() -> Embodiment:
 
 
 def world(embodiment: Embodiment, *fixtures: Fixture, perturb: Perturbation | None = None) -> PhysicsWorld:
-    """Return a world of the robot between its tables, with more furniture."""
+    """Return a world with the robot between its tables and more furniture."""
     more = replace(embodiment, fixtures=(*embodiment.fixtures, *fixtures))
     return PhysicsWorld(more, case("two-tables").initial, beads=False, perturb=perturb)
 
@@ -42,7 +42,7 @@ def test_the_arms_know_where_the_base_has_come_to(tables: Embodiment) -> None:
     with world(tables, perturb=Perturbation()) as here:
         drive(here, "two_arms", "aside")
         away = np.abs(here.bases["two_arms"].pose()[:2] - np.array([-0.8, 0.5])).max()
-        assert 1e-4 < away < 0.011  # it stops a little beside its stand, and knows
+        assert 1e-4 < away < 0.011  # the base stops a little beside its stand, and perceives this
         for hand in here.hands.values():
             state = pybullet.getLinkState(hand.body, hand.tip, computeForwardKinematics=1, physicsClientId=here.client)
             found = hand_frames(hand.arm, hand.measured()[None])[1][0]

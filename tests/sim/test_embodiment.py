@@ -36,7 +36,7 @@ def test_every_situation_type_of_the_scene_has_a_perceiver(serving: Case) -> Non
 
 
 def changed(subject: str, name: str, value: ox.Literal | None) -> ox.Store:
-    """The shipped scene with one attribute taken away, or put in another's place."""
+    """The shipped scene with one attribute removed or replaced."""
     store = load("beverage-serving").store
     for quad in list(store.quads_for_pattern(ox.NamedNode(subject), ox.NamedNode(E + name), None, None)):
         store.remove(quad)

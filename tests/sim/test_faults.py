@@ -1,4 +1,4 @@
-"""Planted faults stop the plan at the right primitive, with code, objects and number (all of them: benchmarks/faults.py)."""
+"""Planted faults stop the plan at the expected primitive, with code, objects and number; benchmarks/faults.py plants them all."""
 
 import pickle
 from dataclasses import replace

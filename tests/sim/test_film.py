@@ -1,4 +1,4 @@
-"""What a film shows: names of visible things only, from a camera that sees the action."""
+"""The contents of a film: names of visible objects only, and a camera that sees the action."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -26,15 +26,15 @@ def test_a_name_is_written_only_where_the_thing_is_seen(world: PhysicsWorld) -> 
     film.camera = view_of(SCENE.embodiment, film.width, film.height, BAR)
     named = film._named(BLANK, world)
     assert (named != BLANK).any()
-    film.names = {"cup": "a cup with a name as long as half the picture"}  # it is in the shut cupboard
+    film.names = {"cup": "a cup with a name as long as half the picture"}  # the cup is in the shut cupboard
     assert (film._named(BLANK, world) == named).all()
     world.links["door"].set("door", True)
-    film.names = {"jar": "a jar with a name as long as half the picture"}  # it is seen
+    film.names = {"jar": "a jar with a name as long as half the picture"}  # the jar is visible
     assert not (film._named(BLANK, world) == named).all()
 
 
 def test_the_camera_goes_where_the_handle_is_seen(world: PhysicsWorld) -> None:
-    """From across the table the drawer's handle is behind its chest."""
+    """From the other side of the table, the chest hides the drawer's handle."""
     film = Film("unwritten.mp4", [step for step in SCENE.plan().plan.primitives if "drawer" in step.arguments])
     first, handle = view_of(SCENE.embodiment, film.width, film.height, BAR), _points(world, "drawer")[0][0]
     world.current = 0

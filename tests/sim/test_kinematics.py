@@ -22,7 +22,7 @@ def arm_of(side: str) -> Arm:
 
 
 def postures(arm: Arm, count: int) -> Array:
-    """Postures within the limits, middle joints of the spheres within a right angle."""
+    """Return postures within the limits; the middle joints of spherical joints are within ±90°."""
     most = np.array([9.0, 1.5, 9.0, 9.0, 9.0, 1.5, 9.0])
     return np.random.default_rng(0).uniform(np.maximum(arm.lower, -most), np.minimum(arm.upper, most), (count, 7))
 
@@ -63,7 +63,8 @@ def test_points_at_which_an_arm_is_nearly_stretched_can_be_kept_off() -> None:
         _, farther = inverse(arm, *given, fold=0.3)
         assert farther.sum() < anywhere.sum()
         r, p, swivel = (part[farther] for part in given)
-        for shift in np.vstack([np.eye(3), -np.eye(3)]) * 0.003:  # a little beside, such a point can still be reached
+        # a point a little beside such a point is still reachable
+        for shift in np.vstack([np.eye(3), -np.eye(3)]) * 0.003:
             assert (
                 inverse(arm, r, p + shift, swivel)[1].mean()
                 > inverse(arm, given[0], given[1] + shift, swivel_of(arm, q))[1][anywhere].mean()
@@ -107,7 +108,7 @@ def test_three_angles_rebuild_any_rotation(axes: tuple[Array, Array, Array]) -> 
 
 
 def bent(folder: Path) -> Arm:
-    """An arm of seven joints, one axis of whose wrist passes the others by 3 cm."""
+    """Return an arm of seven joints in which one axis of the wrist misses the others by 3 cm."""
     file, joint = folder / "bent.urdf", '<child link="left_wrist_pitch_link"/>\n    <origin xyz="'
     text = Path(URDF).read_text(encoding="utf-8")
     assert joint in text
@@ -116,7 +117,7 @@ def bent(folder: Path) -> Arm:
 
 
 def xarm(folder: Path) -> Arm:
-    """The xArm of six joints that PyBullet has, with a gripper."""
+    """Return PyBullet's xArm of six joints, with a gripper."""
     (robot,) = load("xarm-serving").embodiment.robots
     (hand,) = robot.hands
     return read_arm(read_robot(robot), hand.arm, hand.tip, hand.turned, hand.home)
@@ -140,7 +141,7 @@ def test_arms_whose_axes_do_not_meet_are_solved_numerically(made: Callable[[Path
     assert not inverse(arm, r, p + np.array([2.0, 0.0, 0.0]), swivel)[1].any()
     anywhere = np.random.default_rng(0).uniform(arm.lower / 2, arm.upper / 2, (200, len(arm.joints)))
     given = (*hand_frames(arm, anywhere), swivel_of(arm, anywhere))
-    assert inverse(arm, *given, fold=0.3)[1].sum() < inverse(arm, *given)[1].sum()  # some are nearly stretched
+    assert inverse(arm, *given, fold=0.3)[1].sum() < inverse(arm, *given)[1].sum()  # some postures are nearly stretched
 
 
 def test_numeric_postures_of_neighbouring_poses_are_neighbours_and_always_the_same(tmp_path: Path) -> None:
@@ -154,7 +155,7 @@ def test_numeric_postures_of_neighbouring_poses_are_neighbours_and_always_the_sa
         assert valid.all()
         assert np.abs(np.diff(q, axis=0)).max() < 0.1
         np.testing.assert_array_equal(q[30:31], inverse(arm, level[:1], points[30:31], zero[:1])[0])
-    assert not inverse(arm, level, points, zero + 0.2)[1].any()  # six joints leave nothing to turn
+    assert not inverse(arm, level, points, zero + 0.2)[1].any()  # six joints have no swivel
 
 
 def test_an_arm_of_too_few_joints_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""A world in which people interfere: what can happen in it, what does, and who is to blame."""
+"""A world in which people interfere: possible interventions, their effects, and the attribution of failures."""
 
 from collections.abc import Iterator
 
@@ -51,7 +51,7 @@ def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) 
     assert (verdict.ok, verdict.code) == (False, "interrupted")
     seen = live.observe()
     assert Symbol("LOCATION", ("bottle1",)) not in seen
-    assert Symbol("HAND_POSITION", ("right_hand",)) in seen  # whatever it is, it has a name
+    assert Symbol("HAND_POSITION", ("right_hand",)) in seen  # the position has a name in any case
 
 
 def test_what_is_gone_is_moved_by_nobody(live: LiveWorld) -> None:
@@ -75,7 +75,7 @@ def test_what_slipped_is_held_the_way_it_is(live: LiveWorld) -> None:
 
 
 def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
-    """The hand is on its way to the jar in it: the drawer is seen to be shut, and the plan is repaired."""
+    """The hand is on its way to a jar in the drawer: the robot perceives that the drawer is shut, and the plan is repaired."""
     scene = confab.load("kitchen-corner")
     goals = ("jar LOCATION left_spot", "cup LOCATION shelf", "lid LOCATION right_spot")
     run = scene.execute(interventions="at=7 drawer OPENED false", world="pybullet", goals=goals)
@@ -87,7 +87,7 @@ def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
 
 
 def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
-    """It lies on its side around the handle, where it can't turn: it draws back first."""
+    """The hand lies on its side around the handle and can't turn there, so it draws back first."""
     scene = confab.load("kitchen-corner")
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         live, opening = LiveWorld(world, scene.problem.classes), Step((0,), 0, 3, "F3_OPEN", ("right_hand", "drawer"))
@@ -114,7 +114,7 @@ def test_what_stands_beside_its_places_is_at_a_spot_that_the_same_hand_reaches(l
     assert "Location" in spot.kinds
     assert ("canReach", ("left_hand", "spot1")) in spot.relations
     assert live.discoveries() == ()
-    assert live.observe()[LOCATION["cup2"]] == "spot1"  # it isn't discovered twice
+    assert live.observe()[LOCATION["cup2"]] == "spot1"  # the spot isn't discovered twice
     live.disturb(handled(InterventionKind.PUSH, "cup2", -0.02, -0.08))
     assert live.observe()[LOCATION["cup2"]] == "location1"
 
@@ -132,7 +132,7 @@ def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
     assert LOCATION["cup1"] not in live.observe()
     assert live.why_unplaced("cup1").startswith("lies ")
     assert live.why_unplaced("cup2").startswith("stands ")
-    assert live.execute(REACH).ok  # only the primitive during which it fell would fail for it
+    assert live.execute(REACH).ok  # only the primitive during which the cup fell would fail because of it
 
 
 def test_room_on_the_table_is_within_reach_and_clear_of_everything(live: LiveWorld) -> None:

@@ -1,4 +1,4 @@
-"""Physics worlds come and go: what they took they give back."""
+"""Physics worlds free their memory when they are closed."""
 
 import ctypes
 import gc
@@ -12,13 +12,13 @@ from tests.sim.conftest import Case
 
 
 class Malloc(ctypes.Structure):
-    """What glibc says of its memory."""
+    """Memory statistics of glibc."""
 
     _fields_ = [(name, ctypes.c_size_t) for name in ["arena", "b", "c", "d", "e", "f", "g", "used", "free", "keep"]]
 
 
 def used() -> int:
-    """Return the bytes that are allocated, by Python or by PyBullet, but for Python's small objects."""
+    """Return the number of bytes that Python and PyBullet have allocated, without Python's small objects."""
     gc.collect()
     ask = ctypes.CDLL("libc.so.6").mallinfo2
     ask.restype = Malloc
@@ -34,6 +34,6 @@ def test_worlds_that_come_and_go_take_no_memory_and_leave_no_files(serving: Case
     come_and_go(3)
     before = used()
     come_and_go(10)
-    assert used() - before < 200_000  # four vessels each, whose meshes would be 2 MB
+    assert used() - before < 200_000  # four vessels in each world; their meshes would take 2 MB
     assert not any(pybullet.isConnected(client) for client in range(64))
     assert not list(Path(tempfile.gettempdir()).glob(f"confab-bodies-{Path('/proc/self').resolve().name}-*"))

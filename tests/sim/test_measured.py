@@ -1,4 +1,4 @@
-"""Situation types of one's own that are perceived by measured quantities: bounds in Turtle, no Python."""
+"""A user's own situation types that are perceived by measured quantities: bounds in Turtle, without Python."""
 
 from pathlib import Path
 

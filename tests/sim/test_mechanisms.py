@@ -1,4 +1,4 @@
-"""Furniture with moving links: opened, shut and pressed by skills that the ontology describes, with friction alone."""
+"""Furniture with moving links: skills that the ontology describes open, shut and press the links, by friction alone."""
 
 import re
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ PANEL = Mechanism(
         ),
     ),
 )
-"""A board with a button that stays in when it is pressed, and comes out when it is pressed again."""
+"""A board with a button that stays in after one press, and comes out after the next press."""
 
 
 @cache
@@ -63,7 +63,7 @@ def by_skill(embodiment: Embodiment) -> Mapping[str, SkillUse]:
 
 
 def with_panel(**changed: float) -> PhysicsWorld:
-    """A world with the board alone; the button's joint may be another one."""
+    """Return a world with only the board; the joint of the button may be replaced."""
     button = replace(PANEL.links[0], **changed)  # type: ignore[arg-type]
     return PhysicsWorld(
         replace(kitchen().embodiment, mechanisms=(replace(PANEL, links=(button,)),), places={}, perceivers={}), {}

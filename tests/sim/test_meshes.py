@@ -1,4 +1,4 @@
-"""Meshes are covered by spheres that stand out little, and what is no mesh is said."""
+"""Spheres that protrude little cover a mesh; a file that isn't a mesh is reported."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name:
     centers, radii = cover(corners)
     points = surface(corners)
     gaps = np.linalg.norm(points[:, None] - centers, axis=-1) - radii
-    assert gaps.min(1).max() < 0.01  # between the points that were looked at
+    assert gaps.min(1).max() < 0.01  # between the points that the algorithm considers
     low, high = bounds(FOLDER / name, (1.0, 1.0, 1.0))
     assert ((centers - radii[:, None]).min(0) > low - MOST - 1e-9).all()
     assert ((centers + radii[:, None]).max(0) < high + MOST + 1e-9).all()

@@ -112,7 +112,7 @@ def test_a_line_begins_as_far_as_it_is_free(serving: Case) -> None:
 
 def test_a_search_grows_from_all_goals_at_once_and_says_which_one_it_came_to(serving: Case) -> None:
     blocked = reacher(serving.embodiment, pillar())
-    far = GOAL + np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])  # no hand gets there
+    far = GOAL + np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])  # no hand reaches this pose
     found = connect(blocked, START, [far, GOAL], np.random.default_rng(3))
     assert found is not None
     assert found[0] == 1
@@ -132,7 +132,7 @@ def test_postures_that_touch_nothing_are_those_whose_distances_say_so(serving: C
 
 
 def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
-    """A search that grew from it would end there, and the hand could plan no further motion from where it is."""
+    """A search that grew from this goal would end there, and the hand could plan no further motion from that pose."""
     blocked = reacher(serving.embodiment, pillar())
     bent = START.copy()
     bent[:3] = (0.25, 0.22, 0.85)  # so near to the shoulder that the elbow would fold beyond its limit
@@ -157,7 +157,7 @@ def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
 
 
 def put_beside(attempt: Attempt, q: Array, gap: float) -> None:
-    """Put a post as many metres beside the hand as it is at some postures, on its left."""
+    """Put a post on the left of the hand, at the distance that the hand has in metres at some postures."""
     mover = attempt.hand.mover()
     centers, radii = mover.at(q).reshape(-1, 3), np.tile(mover.spheres.radii, len(q))
     left = int(np.argmax(centers[:, 1] + radii))
@@ -181,7 +181,7 @@ def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, 
 
 
 def test_corners_are_rounded_only_as_far_as_the_path_keeps_off_everything(serving: Case) -> None:
-    """Among posts around a path there are some that it passes and that it would come too near to if it were rounded."""
+    """Some posts beside a path are far enough from the path, but would be too near to the rounded path."""
     corner, aside, down = np.array([0.45, 0.2, 0.95, 0.0, 0.0, 0.6]), np.eye(6)[1], np.eye(6)[2]
     alone = replace(reacher(serving.embodiment), around=Surroundings())
     q = alone.solve(polyline(np.array([corner - 0.15 * aside, corner, corner - 0.15 * down])))[0]

@@ -1,4 +1,4 @@
-"""What is perceived is what is there, over random worlds, and noise up to the thresholds changes nothing."""
+"""Perceived facts are true in random worlds, and noise up to the thresholds changes no fact."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from .conftest import Case, case
 
 
 def shuffled(case: Case, seed: int) -> State:
-    """Return the case's facts with objects at other places and cups filled or not, by a seed."""
+    """Return the case's facts with objects at random other places and some cups filled."""
     rng = np.random.default_rng(seed)
     places = iter(rng.permutation(list(case.embodiment.places)).tolist())
     fillings = [*case.embodiment.fillings, "no_beverage"]
@@ -72,7 +72,7 @@ def test_what_is_not_as_expected_is_looked_at_again_and_what_is_not_so_stays_fou
     who = symbol.arguments[0]
     with PhysicsWorld(moved.embodiment, moved.initial, beads=False, noise=0.002) as world:
         world.observe()
-        world.errors[who] = world.steps, np.array([0.0, 0.0, 0.02])  # a look that was far off
+        world.errors[who] = world.steps, np.array([0.0, 0.0, 0.02])  # a measurement with a large error
         assert symbol not in world.observe()
         assert compare(world, {**world.observe(), **wanted}, Verdict(True)).ok
         displaced(who, (0.1, 0.0))(world)

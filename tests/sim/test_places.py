@@ -1,4 +1,4 @@
-"""Places in holes, below shelves and in drawers behind doors: a load comes and goes without touching what is around it."""
+"""Places in holes, below shelves and in drawers behind doors: a load is put down and taken without other contact."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Plans in physics: the two of the paper, from their scenes, with beads."""
+"""Plans in physics: both plans of the paper, from their scenes, with beads."""
 
 import subprocess
 import sys
@@ -44,7 +44,7 @@ def test_another_robot_at_another_table_serves_without_a_change_of_python() -> N
 
 
 def test_the_panda_of_pybullet_s_own_data_serves() -> None:
-    """A URDF with meshes, a wrist with an offset and a gripper that opens by 8 cm: in Turtle alone."""
+    """A robot with mesh files, an offset wrist and a gripper that opens by 8 cm, described in Turtle alone."""
     one = case("panda-serving")
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
     assert rollout.failure is None
@@ -66,7 +66,7 @@ def test_an_iiwa_serves_with_a_gripper_that_turtle_mounts_on_its_flange() -> Non
     assert robot.hands[0].fingers == ("iiwa_hand.finger_a_joint", "iiwa_hand.finger_b_joint")
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
     assert rollout.failure is None
-    assert rollout.clock.planning <= 3  # with its wrist the other way round, paths were searched for twenty seconds
+    assert rollout.clock.planning <= 3  # with the reversed wrist, the search for paths took twenty seconds
 
 
 def test_an_arm_of_six_joints_with_an_offset_wrist_brings_a_cup_and_pours() -> None:
@@ -80,7 +80,8 @@ def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
     assert rollout.failure is None
     assert rollout.poured == (1.0, 1.0)
-    assert max(report.verdict.measured.get("poured", 0.0) for report in rollout.steps) < 2.0  # no second serving
+    # no second serving is poured
+    assert max(report.verdict.measured.get("poured", 0.0) for report in rollout.steps) < 2.0
     assert dict(rollout.state) == dict(one.expected[-1])
 
 
@@ -96,7 +97,7 @@ def test_a_bottle_of_four_servings_fills_three_cups_and_is_seen_to_have_one_left
         "bottle2": "1",
     }
     without = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
-    assert without.failure is None  # what isn't seen as beads is counted
+    assert without.failure is None  # without beads, servings are counted
 
 
 def test_a_full_bottle_that_gushes_gives_one_serving_all_the_same() -> None:
@@ -106,7 +107,7 @@ def test_a_full_bottle_that_gushes_gives_one_serving_all_the_same() -> None:
     rollout = verify(one.embodiment, one.initial, steps, expected, seed=9208, perturb=Perturbation())
     assert rollout.failure is None
     (poured,) = (report.verdict.measured["poured"] for report in rollout.steps if "poured" in report.verdict.measured)
-    assert 0.8 <= poured < 1.2  # 1.65 where nothing is looked ahead
+    assert 0.8 <= poured < 1.2  # 1.65 without prediction of the flow
 
 
 @pytest.mark.slow
@@ -203,7 +204,7 @@ def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(se
 
 @pytest.mark.parametrize("scene", ["panda-pair-serving", "iiwa-serving", "xarm-serving", "two-tables"])
 def test_robots_at_rest_are_wholly_in_the_picture(scene: str) -> None:
-    """An arm that is all there is of a robot, too, and one of several robots."""
+    """This also holds for a robot that consists of a single arm, and for each of several robots."""
     embodiment = case(scene).embodiment
     camera = view_of(embodiment)
     for robot in embodiment.robots:

@@ -1,4 +1,4 @@
-"""Watching a flow: when the hand turns on, waits, and takes the vessel back."""
+"""Control of a flow: when the hand rolls on, waits, and rolls the vessel back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NUMBERS = {"lag": 0.3, "flow": 0.15, "wait": 1.0, "pour_angle": 2.09, "slow": 0.
 
 
 def servo_at(angle: float) -> tuple[_Servo, Any]:
-    """Return a servo of a hand of one joint, which is as it is told, and its world, which counts steps."""
+    """Return a servo of a hand with one joint that follows each command, and its world, which counts steps."""
     world: Any = SimpleNamespace(rate=240, steps=0, check_course=lambda hand: None)
     world.run = lambda steps: setattr(world, "steps", world.steps + steps)
     hand: Any = SimpleNamespace(posture=np.zeros(1), command=lambda posture, speed: None)
@@ -24,7 +24,7 @@ def test_what_has_stopped_flowing_and_is_nearly_enough_is_enough() -> None:
     servo, world = servo_at(1.7)
 
     def poured() -> float:
-        """Eighteen beads at ten a second, then something is stuck until the hand turns on: a burst."""
+        """Eighteen beads at ten per second; then the flow is blocked until the hand rolls on and releases a burst."""
         return 1.6 if servo.angle > 1.75 else min(world.steps // 24, 18) / 20
 
     assert servo.meter(NUMBERS, enough=1.15, nearly=0.9, poured=poured)

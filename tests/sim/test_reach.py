@@ -62,7 +62,7 @@ def test_a_height_at_which_no_hand_takes_anything_excludes_no_place(serving: Cas
 
 
 def below_a_lamp(serving: Case, height: float) -> Embodiment:
-    """Return the embodiment with a board of 2 cm whose middle is at a height above location5; a bottle is 16 cm high."""
+    """Return the embodiment with a board of 2 cm whose middle is `height` above location5; a bottle is 16 cm high."""
     x, y, z = serving.embodiment.places["location5"].position
     lamp = Fixture("lamp", (0.5, 0.5, 0.02), (x, y, z + height))
     return replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, lamp))

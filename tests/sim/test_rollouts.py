@@ -1,4 +1,4 @@
-"""Many rollouts: wherever they run, seed by seed the same."""
+"""Many rollouts: each seed gives the same result, wherever it runs."""
 
 import functools
 import os
@@ -16,7 +16,7 @@ SEEDS = range(5000, 5003)
 
 
 def first_steps(serving: Case, count: int = 2) -> Trial:
-    """Reach for a cup and grasp it, without beverage, perturbed."""
+    """Reach for a cup and grasp it, without beverage and with perturbation."""
     return Trial(
         serving.embodiment,
         serving.initial,
@@ -28,7 +28,7 @@ def first_steps(serving: Case, count: int = 2) -> Trial:
 
 
 def die_once(mark: Path, world: PhysicsWorld) -> None:
-    """Kill the process that runs the second seed, the first time."""
+    """Kill the process that runs the second seed, at the first attempt."""
     del world
     try:
         mark.touch(exist_ok=False)

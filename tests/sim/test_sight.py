@@ -1,4 +1,4 @@
-"""What is in view: under a lid, in a shut cupboard or drawer things are believed to be where they were, until uncovered."""
+"""Visibility: objects under a lid or behind a door are believed to be at their last places until they are uncovered."""
 
 from dataclasses import replace
 from functools import cache
@@ -29,7 +29,7 @@ def kitchen() -> Scene:
 
 
 def set_joint(world: PhysicsWorld, link: str, opened: bool) -> None:
-    """Open or shut a link at once, with what it carries."""
+    """Open or shut a link at once, with everything that it carries."""
     live = LiveWorld(world, {})
     live.disturb(Intervention(InterventionKind.WORLD, (Fact(Symbol("OPENED", (link,)), str(opened).lower()),)))
 
@@ -39,7 +39,7 @@ def covered(world: PhysicsWorld, name: str) -> str | None:
 
 
 def with_hollow_pot() -> Embodiment:
-    """The kitchen with a pot into which the jar goes, as high as the jar and a little more."""
+    """Return the kitchen with a hollow pot that can cover the jar; the pot is slightly higher than the jar."""
     sides = ((0.065, 0.0, 0.01, 0.14), (-0.065, 0.0, 0.01, 0.14), (0.0, 0.065, 0.14, 0.01), (0.0, -0.065, 0.14, 0.01))
     walls = (Part(f"wall{i}", "box", (dx, dy, 0.14), (x, y, 0.07)) for i, (x, y, dx, dy) in enumerate(sides))
     body = kitchen().embodiment

@@ -1,4 +1,4 @@
-"""Mechanisms and objects are solid: what is in one place with something else is found before physics moves it."""
+"""Mechanisms and objects are solid: overlaps are found before physics pushes the bodies apart."""
 
 import re
 from dataclasses import replace
@@ -32,7 +32,7 @@ def test_blocks_that_overlap_at_first_are_refused_with_their_names_and_millimetr
 
 
 def changed(embodiment: Embodiment, name: str, **new: object) -> list[str]:
-    """What is said of the mechanisms of a scene after a link has been changed."""
+    """Return the findings about the mechanisms of a scene after a link has been changed."""
 
     def of(mechanism: Mechanism) -> Mechanism:
         links = tuple(replace(link, **new) if link.name == name else link for link in mechanism.links)  # type: ignore[arg-type]
@@ -91,7 +91,8 @@ def test_a_world_in_which_solids_overlap_at_first_is_not_begun(file: str, said: 
 
 def test_perturbed_objects_do_not_overlap_at_first() -> None:
     scene = confab.load(WRONG / "overlap.ttl")
-    p2 = replace(scene.embodiment.places["p2"], position=(0.42, 0.135, 0.7))  # 5 mm beside the other, which may turn
+    # 5 mm beside the other body, which may be turned
+    p2 = replace(scene.embodiment.places["p2"], position=(0.42, 0.135, 0.7))
     embodiment = replace(scene.embodiment, places={**scene.embodiment.places, "p2": p2})
     for seed in range(5):
         with PhysicsWorld(embodiment, scene.problem.initial, seed, Perturbation()) as world:

@@ -1,4 +1,4 @@
-"""Hands that feel: what a finger meets is given way to, what is put down is let go when it stands; looks and their noise."""
+"""Hands with touch: they yield to contact with a finger, release a load when it stands, and perceive with noise."""
 
 from dataclasses import replace
 

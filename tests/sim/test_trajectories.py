@@ -1,4 +1,4 @@
-"""Trajectories as data: their shape, and a replay of them by joint servos alone."""
+"""Trajectories as data: their format, and their replay by joint servos alone."""
 
 import json
 from pathlib import Path

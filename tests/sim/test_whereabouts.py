@@ -1,4 +1,4 @@
-"""Where a hand is comes from what it did, in three dimensions: blocks are stacked as the guide says."""
+"""The position of a hand follows from its motions, in three dimensions: blocks are stacked as in the guide."""
 
 from collections.abc import Iterator
 from pathlib import Path
