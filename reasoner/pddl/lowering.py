@@ -432,8 +432,6 @@ class Lowering:
                 group = groups.setdefault((effect.situation, at, cell.when, cell.own), [])
                 by = self.words.number(effect.amount, inside)
                 group.append((effect.operation, by, effect.operation != "scale" or not situations_in(effect.amount)))
-                if effect.operation in ("assign", "scale"):
-                    self.words.assigned.add(effect.situation)
         for (situation, at, when, own), changes in groups.items():
             result: Number = at
             for operation, by, _ in changes:

@@ -42,7 +42,6 @@ class Vocabulary:
         self.functions: dict[str, list[set[str]]] = {}  # types of the terms at each argument position
         self.measured: dict[str, str] = {}  # function of each relation whose last argument is a number
         self.counted: dict[str, str] = {}  # function of each situation type that is an amount
-        self.assigned: set[str] = set()  # amounts that an effect assigns or scales
         self.existing: dict[str, set[tuple[str, ...]]] = {}
         for symbol in problem.initial:
             self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
@@ -259,7 +258,7 @@ class Vocabulary:
             elif symbol.situation in self.used and (value == TRUE or not boolean):
                 yield self.value(symbol.situation, its, None if boolean else self.object(value))
         every = dict.fromkeys(one for members in self.problem.classes.values() for one in members)
-        for situation in sorted(self.assigned):  # some planners require an initial value for all arguments
+        for situation in sorted(self.counted):  # many planners require an initial value for all arguments of a function
             kinds = self.situations[situation].arguments
             types = iter(map(self.common, self.functions[self.counted[situation]]))
             kept = self.about(situation, [Term(str(place)) for place in range(len(kinds))])

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -170,6 +171,15 @@ SWAP = Behavior(
 def test_a_behaviour_means_the_same_exported(behaviors: list[Behavior], cost: float) -> None:
     problem = problem_of(*behaviors)
     assert least(problem) == least(round_trip(problem)) == cost
+
+
+def test_an_exported_amount_has_a_value_for_each_object_that_its_function_accepts() -> None:
+    fill = AmountEffect("LOAD", ("?x",), "increase", Fraction(1))  # b has no LOAD, which stays as it is
+    problem = problem_of(replace(JUMP, amounts=(fill,)))
+    exported = to_pddl(problem)
+    assert "(= (load b) 0)" in exported.problem
+    assert "(has_load b)" not in exported.problem
+    assert least(problem) == least(round_trip(problem)) == 2.0
 
 
 def test_rules_are_written_where_they_are_asked_for_unless_they_need_themselves() -> None:
