@@ -288,8 +288,9 @@ class Known(metaclass=RightNames):
         has stated and inferred facts; default values are only in `facts`.
 
         A query can use the prefixes of the scene's file and of its imports. If two files declare a prefix, the scene's file has
-        precedence. ``:name`` denotes a term of the core ontology if the scene's namespace has no such name. The query runs in a
-        separate process (`confab.reasoner.graph.query_process`).
+        precedence. ``:name`` denotes a term of the core ontology if the scene's namespace has no such name. If the answer is
+        false, empty or 0, a warning names the terms of the query that the graph doesn't have. The query runs in a separate
+        process (`confab.reasoner.graph.query_process`).
 
         Raises
         ------
@@ -312,10 +313,11 @@ class Known(metaclass=RightNames):
 
         sparql = sparql_of(sparql, self.knowledge)
         kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
+        nothing = not found if kind == "truth" else all(_is_zero(term) for row in found for term in row)
+        if nothing and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
+            log.warning("confab: the scene has no term %s", ", ".join(unheard))
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
-        if not found and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
-            log.warning("confab: the scene has no term %s; is the prefix right?", ", ".join(unheard))
         columns = ["subject", "predicate", "object"] if kind == "triples" else columns
         rows = tuple(tuple(self._cell(term) for term in row) for row in found)
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
@@ -447,6 +449,10 @@ class Known(metaclass=RightNames):
         """Return a description of the scene in one line."""
         problem = self.problem
         return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
+
+
+def _is_zero(term: Any) -> bool:
+    return term is None or getattr(term, "value", "") == "0"
 
 
 def _sentence(facts: Iterable[Fact]) -> str:

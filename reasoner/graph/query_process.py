@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pyoxigraph as ox
 
-from confab.reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
+from confab.reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row, text
 from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.names import nearest
 from confab.reasoner.vocabulary import CORE
@@ -55,6 +55,8 @@ FROM = re.compile(
     re.DOTALL | re.IGNORECASE,
 )
 """Pattern of a literal, an IRI, a comment or a ``FROM`` clause."""
+STANDARDS = ("http://www.w3.org/", "http://purl.org/dc/")
+"""Beginnings of the namespaces of standard vocabularies, whose names any query may use."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
@@ -318,16 +320,30 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
 
 
 def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the prefixed names in a query that don't occur in the graph, each with the most probable correction."""
+    """Return the names in a query that the graph lacks although it describes their namespace, each with a correction if known.
+
+    Names of standard vocabularies are left out.
+    """
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
-    found = []
-    for match in WORDS.finditer(core_names(graph, query)):
-        prefix, name = match["prefix"] or "", match["name"]
-        if match["text"] is not None or name is None or prefix not in known or _speaks_of(graph, known[prefix] + name):
+    spaces = {space for space in known.values() if not space.startswith(STANDARDS)}
+    found = dict[str, str]()
+    for match in WORDS.finditer(core_names(graph, NAMESPACES.sub("", query))):
+        space, name = known.get(match["prefix"] or "", ""), match["name"]
+        if match[0].startswith("<"):
+            space, name = re.findall(r"<(.*[#/])?([^#/]*)>", match[0])[0]
+        if not name or space not in spaces or match[0] in found or _speaks_of(graph, space + name):
             continue
-        near = next((p for p, space in sorted(known.items()) if _speaks_of(graph, space + name)), None)
-        found.append(f"{prefix}:{name}" + (f" (did you mean {near}:{name}?)" if near is not None else ""))
-    return list(dict.fromkeys(found))
+        if names := _names_in(graph, space):
+            other = next((p for p, other in sorted(known.items()) if _speaks_of(graph, other + name)), None)
+            words = nearest(name, names) if other is None else f"; did you mean {other}:{name}?"
+            found[match[0]] = f" ({words[2:]})" if words else ""
+    return [name + words for name, words in found.items()]
+
+
+def _names_in(graph: KnowledgeGraph, space: str) -> list[str]:
+    """Return the names of a namespace that the graph describes."""
+    query = f'SELECT DISTINCT ?s WHERE {{ ?s a ?kind FILTER(STRSTARTS(STR(?s), "{space}")) }}'
+    return [text(term)[len(space) :] for (term,) in graph.select(query)]
 
 
 def _speaks_of(graph: KnowledgeGraph, iri: str) -> bool:

@@ -148,14 +148,21 @@ def test_any_file_of_rdf_can_be_asked_and_says_what_is_missing(
     assert confab.load(tmp_path / "any.ttl").query("SELECT ?o WHERE { :x :y ?o }")[0] == ("z",)
 
 
-def test_an_empty_answer_says_which_names_mean_nothing_here(
+def test_an_empty_answer_false_or_0_says_which_names_mean_nothing_here(
     scene: confab.Scene, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
         scene.query("SELECT ?o WHERE { ?o :location ?l ; rdfs:label ':cup1 x:y' . FILTER(?o != :cup1) }")
         assert "has no term :location (did you mean k:location?)" in caplog.text
         caplog.clear()
+        scene.query("SELECT (COUNT(?o) AS ?n) WHERE { ?o a k:Cupp }")
+        scene.query("ASK { <https://w3id.org/confab/beverage-serving#cup1> k:locaton ?place }")
+        assert "has no term k:Cupp (did you mean 'Cup'?)" in caplog.text
+        assert "has no term k:locaton (did you mean 'location'?)" in caplog.text
+        caplog.clear()
         scene.query("SELECT ?o WHERE { ?o k:location :cup1 }")
+        scene.query("PREFIX prov: <http://www.w3.org/ns/prov#> ASK { ?x prov:used ?y ; owl:sameAs ?z }")
+        scene.query("ASK { :cup1 a k:Bottle ; rdfs:subClassOf c:SituationType }")
         assert caplog.text == ""
 
 
