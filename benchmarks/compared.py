@@ -28,7 +28,7 @@ from confab.reasoner.symbols import Problem
 from worlds.families import family, random_table
 from worlds.hierarchies import hierarchy
 
-LIMIT = Limits(seconds=float(os.environ.get("COMPARED_SECONDS", "10")))
+LIMIT = Limits(seconds=float(os.environ.get("COMPARED_SECONDS", "10")), shortening="repeated")
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 LEAST = 0.05
 """Minimum CPU seconds of a call for the comparison of times, since shorter times are too inexact."""

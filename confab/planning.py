@@ -18,7 +18,7 @@ from confab.interchange import outcome_json
 from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Shortening, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -217,12 +217,13 @@ def _plan(
 
             more = asks_for_times(problem, options.minimise) or (others and some_installed(problem))
             seconds *= share * (OURS if more else 1.0)
+        shortening: Shortening = "brief" if brief else "once" if seconds is None else "repeated"
         alike = with_unit_costs(problem) if options.minimise == "steps" else problem
         request = Request(
-            alike, mode, Limits(seconds=seconds, brief=brief), advisor, links, grounds, options.leave_levels
+            alike, mode, Limits(seconds=seconds, shortening=shortening), advisor, links, grounds, options.leave_levels
         )
         soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
-        outcome = solve(replace(request, limits=Limits(work=OURS_WORK, brief=brief)) if soon else request)
+        outcome = solve(replace(request, limits=Limits(work=OURS_WORK, shortening=shortening)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
         began = perf_counter() - outcome.seconds

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING, Protocol, overload
+from typing import TYPE_CHECKING, Literal, Protocol, overload
 
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
@@ -369,21 +369,26 @@ class Outcome:
         return frozenset(one.fact.symbol for one in self.forgone)
 
 
+Shortening = Literal["brief", "once", "repeated"]
+"""The work for a shorter plan: see `Limits`."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In the
-    other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
-    together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
-    times operators, about a microsecond each. If `brief`, a plan is shortened only with little work, and not at all if
-    `seconds` is given.
+    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In
+    the other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for
+    all goals together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of
+    `work` is states times operators, about a microsecond each. `shortening` is the work for a shorter plan: one round
+    ("once"); one round with little work, and none if `seconds` is given ("brief"); or rounds until a round saves
+    nothing or until `seconds` have passed ("repeated").
     """
 
     expansions: int = 200_000
     seconds: float | None = None
     work: float = math.inf
-    brief: bool = False
+    shortening: Shortening = "once"
 
     def end(self, share: float = 1.0) -> float | None:
         """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`, or None without a limit.

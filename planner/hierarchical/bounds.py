@@ -21,12 +21,10 @@ from time import perf_counter
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.shortest import Bound, shortest, ways
 from confab.planner.grounded.task import Task
-from confab.planner.hierarchical.planner import SEARCHING, Call, Compiled, compiled
+from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
-from confab.planner.hierarchical.shortening import ORDERS
 from confab.planner.hierarchical.unsolvability import closed, refusal
-from confab.planner.hierarchical.windows import refined, windowed
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
@@ -61,9 +59,7 @@ def plan(
     deadline = limits.end(SEARCHING)
     with suppress(LimitError):
         using = using or compiled(problem)
-    best = hierarchical_plan(problem, limits=limits.until(deadline), using=using)
-    if using is not None:
-        best = _shortened(problem, best, limits, using, deadline)
+    best = hierarchical_plan(problem, limits=replace(limits.until(deadline), shortening="repeated"), using=using)
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)
@@ -78,32 +74,6 @@ def plan(
         bound=lower,
         seconds=perf_counter() - begin,
     )
-
-
-def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Return the outcome with a shortened plan.
-
-    First the goals are planned in other orders with increasing work; then cheaper steps replace consecutive steps.
-
-    Shortening uses at most half of the time.
-    """
-    begin = perf_counter()
-    improve = 2 * ORDERS
-    while best.plan is not None and improve <= 64 * ORDERS:
-        if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
-            break
-        again = hierarchical_plan(problem, limits=limits.until(deadline), using=using, improve=improve)
-        improve *= 4
-        if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
-            best = again
-    if best.plan is not None:
-        now = perf_counter()
-        call = Call(problem, using, None if deadline is None else now + (deadline - now) / 4, limits.expansions)
-        call.steps = refined(call, best.plan.steps)
-        with suppress(LimitError):
-            windowed(call, call.program.levels[-1], WORK)
-            best = replace(best, plan=min(best.plan, call.tree(), key=lambda plan: cost_of(problem, plan)))
-    return best
 
 
 def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:

@@ -106,7 +106,7 @@ def _plan(
         call = Call(problem, using or compiled(problem), deadline, limits.expansions)
     except LimitError as limit:
         return flat or Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
-    call.space.most_work, call.space.brief = limits.work, limits.brief
+    call.space.most_work, call.space.shortening = limits.work, limits.shortening
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     agenda = Agenda(call, levels)

@@ -39,7 +39,7 @@ LEAST_EFFORT = 400_000
 Because of this minimum, the planner also shortens plans that were found with little effort.
 """
 LEAST_ROUNDS = 5
-"""Minimum number of rounds of shortening with a time limit; the first rounds may be too short to improve a plan."""
+"""Minimum number of rounds of repeated shortening; the first rounds may be too short to improve a plan."""
 DOING, BEGINNING = 20, 1_000
 """Work of replaying a primitive, and work of beginning a call, in states times operators."""
 MANY = 1.25
@@ -59,16 +59,16 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
     """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
-    Without a time limit, there is one round. With a time limit, the number of rounds is at most twice the number of the last round
-    that made the plan cheaper. If windows of the lowest level can make refinements cheaper, there are at least `LEAST_ROUNDS`
-    rounds. A brief call has one round with little work, or no round if the call has a time limit.
+    By default, there is one round. A call with repeated shortening has at most twice as many rounds as the number of the last
+    round that made the plan cheaper. If windows of the lowest level can make refinements cheaper, this call has at least
+    `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
-    improve = 1 if call.space.brief else improve
+    brief, repeated = (call.space.shortening == name for name in ("brief", "repeated"))
+    improve = 1 if brief else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    limited = call.space.deadline is not None
-    most: float = 1 if not limited else 0 if call.space.brief else inf
+    most = 0 if brief and call.space.deadline is not None else inf if repeated else 1
     while rounds < min(most, max(least, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)

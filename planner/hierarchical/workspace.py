@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.subgoals import Subgoals
-from confab.planner.plan import Counts, Limits
+from confab.planner.plan import Counts, Limits, Shortening
 from confab.planner.transitions import Cell, Change, Table, arguments_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import FALSE
@@ -51,8 +51,8 @@ class Workspace:
         Maximum number of expansions of all searches together; `LimitError` is raised above this number.
     most_work : float
         Maximum work in scopes, in states times operators; `LimitError` is raised above this work.
-    brief : bool
-        Whether the plan is shortened only with little work, and not at all if there is a time limit.
+    shortening : str
+        Work for a shorter plan: "brief", "once" or "repeated" (`Limits.shortening`).
     dead_end_check : function
         Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
     """
@@ -63,7 +63,7 @@ class Workspace:
     deadline: float | None = None
     most: int = 200_000
     most_work: float = math.inf
-    brief: bool = False
+    shortening: Shortening = "once"
     dead_end_check: Callable[[], None] = no_check
     counts: dict[int, Counts] = field(default_factory=dict)
 

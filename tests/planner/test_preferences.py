@@ -164,10 +164,10 @@ def test_a_preference_that_is_no_fact_is_refused_by_name() -> None:
 
 def test_a_brief_call_with_a_time_limit_leaves_the_first_plan_as_it_is() -> None:
     problem = confab.load("carts-small").problem
-    first = solve(Request(problem, limits=Limits(seconds=60.0, brief=True)))
+    first = solve(Request(problem, limits=Limits(seconds=60.0, shortening="brief")))
     assert first.plan is not None
     assert first.saving is None
-    assert solve(Request(problem, limits=Limits(seconds=1.0))).saving is not None
+    assert solve(Request(problem, limits=Limits(seconds=1.0, shortening="repeated"))).saving is not None
 
 
 def test_the_chosen_soft_goals_get_the_full_work_and_the_comparison_of_choices_little() -> None:
